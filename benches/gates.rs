@@ -38,6 +38,8 @@ mod early;
 mod easing;
 #[path = "gates/edit_history.rs"]
 mod edit_history;
+#[path = "gates/reliability/empty_frames.rs"]
+mod empty_frames;
 #[path = "gates/far.rs"]
 mod far;
 #[path = "gates/flip.rs"]
@@ -254,6 +256,7 @@ fn main() {
     band::run(&mut h);
     spin::run(&mut h);
     damage::run(&mut h);
+    empty_frames::run(&mut h);
     surface::run(&mut h);
     early::run(&mut h);
     vortex::run(&mut h);

@@ -31,6 +31,9 @@ pub enum Error {
         /// The operating system's error.
         source: std::io::Error,
     },
+    /// Another run works in the folder.
+    #[error("{}: another run writes into this folder: wait for it, or choose another -o", .0.display())]
+    Busy(PathBuf),
     /// The work would need more memory than it may use.
     #[error("{what} needs about {} MB, more than the limit of {} MB", needed.div_ceil(1_000_000), limit / 1_000_000)]
     Memory {

@@ -215,6 +215,8 @@ pub const GATES: &[Gate] = &[
     // Small inputs from outside that failed once; valid glTF files without one of their optional fields.
     none("reliability.bugs", "cases"),
     none("reliability.gltf_valid", "files"),
+    // Empty and missing frames of sequences: what could be made of them and was not.
+    none("reliability.empty_frames", "frames"),
     gate("reliability.child_cost", "x", Most(2.2), Most(1.3)),
     // The rules of CONTRIBUTING.md that tests and tools hold.
     yes("house.stages"),

@@ -88,6 +88,20 @@ pub struct DetailedMesh {
 }
 
 impl DetailedMesh {
+    /// A mesh without vertices and faces that carries arrays of the same names.
+    pub fn emptied(&self) -> Self {
+        let uvs = self.uvs.as_ref().map(|uvs| Uvs {
+            places: Vec::new(),
+            corners: uvs.corners.as_ref().map(|_| Vec::new()),
+            missing: 0,
+        });
+        let arrays = self.arrays.iter().map(|array| {
+            let (name, on, number) = (array.name.clone(), array.on, array.number);
+            MeshArray { name, on, number, values: Vec::new() }
+        });
+        Self { mesh: TriMesh::default(), uvs, arrays: arrays.collect() }
+    }
+
     /// The mesh without the vertices that no triangle names, and without their numbers; the others keep their order.
     pub fn without_unused(self) -> Self {
         let Some(used) = used(self.mesh.positions.len(), &self.mesh.triangles) else { return self };

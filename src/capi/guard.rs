@@ -70,7 +70,7 @@ impl From<Error> for Failure {
         let status = match &error {
             Error::Argument(_) => FRZ_ERROR_ARGUMENT,
             Error::File { .. } | Error::Bytes(_) => FRZ_ERROR_FILE,
-            Error::Io { .. } => FRZ_ERROR_IO,
+            Error::Io { .. } | Error::Busy(_) => FRZ_ERROR_IO,
             Error::Memory { .. } | Error::OutOfMemory => FRZ_ERROR_MEMORY,
             Error::Cancelled => FRZ_CANCELLED,
             Error::OpenVdb(_) => FRZ_ERROR_OPENVDB,

@@ -14,7 +14,7 @@ use crate::motion::{Keys, Rigid};
 use crate::snow::{NoiseParams, base_layer};
 use crate::sweep::{self, Body, Settings, surface_bytes};
 use crate::vdb::level_set::{self, Scheme};
-use crate::vdb::{FloatGrid, GridClass};
+use crate::vdb::{FloatGrid, GridClass, distances};
 
 /// Operations of frz_levelset_csg.
 #[repr(u32)]
@@ -106,10 +106,13 @@ fn scheme_of(number: u32) -> Outcome<Scheme> {
 type Join = fn(&Context, &FloatGrid, &FloatGrid) -> Result<FloatGrid>;
 type Filter = fn(&Context, &mut FloatGrid, u32, u32, Scheme) -> Result<()>;
 
-/// Refuses a grid that is not a level set.
-fn level_set_of(grid: &FloatGrid) -> Outcome<&FloatGrid> {
+/// Refuses a grid that is not a level set, and warns of one whose values are no distances in metres.
+fn level_set_of<'a>(ctx: &Context, grid: &'a FloatGrid) -> Outcome<&'a FloatGrid> {
     if grid.class() != GridClass::LevelSet {
         return Err(Failure::argument("the grid is not a level set"));
+    }
+    if let Some(what) = distances::warning(grid)? {
+        ctx.warn(&format!("the grid {what}"));
     }
     Ok(grid)
 }
@@ -129,7 +132,7 @@ unsafe fn changes(
             let call = enter(context)?;
             let mut held = change(inout)?;
             let grid = held.own_floats()?;
-            level_set_of(grid)?;
+            level_set_of(call.ctx(), grid)?;
             work(call.ctx(), grid)
         }
     })
@@ -249,7 +252,7 @@ pub unsafe extern "C" fn frz_levelset_csg(
     unsafe {
         changes(context, inout, |ctx, first| {
             let other = read(other)?;
-            let second = level_set_of(other.floats()?)?;
+            let second = level_set_of(ctx, other.floats()?)?;
             ctx.allow("the joined level sets", first.memory_bytes().saturating_add(second.memory_bytes()))?;
             let known: [(u32, Join); 3] = [
                 (frz_csg::FRZ_CSG_UNION as u32, level_set::union_copy),

@@ -123,6 +123,8 @@ pub(super) struct Follower {
     /// Steps that were made ahead.
     pub outlook: Outlook,
     pub saved: Saved,
+    /// Whether what is wrong with the particles was logged.
+    pub is_told: bool,
 }
 
 /// Refuses to rebuild a mesh of a state that is not closed, as [`Tracker::new`] does one at the first frame.
@@ -240,7 +242,13 @@ pub unsafe extern "C" fn frz_tracker_create(
             if !tracker.is_rebuilt() {
                 tracker.set_lasting(mesh.attribute("detail", 1).unwrap_or_default().to_vec())?;
             }
-            Ok(Follower { tracker, edits: None, outlook: Outlook::default(), saved: Saved::default() })
+            Ok(Follower {
+                tracker,
+                edits: None,
+                outlook: Outlook::default(),
+                saved: Saved::default(),
+                is_told: false,
+            })
         })
     }
 }
@@ -305,6 +313,10 @@ pub unsafe extern "C" fn frz_tracker_ahead(
 /// Moves the mesh with its particles from one time to another. After a failure or a cancel it is as it was before. With
 /// frz_tracker_params.rebuild it may have other vertices and triangles afterwards.
 ///
+/// Either of both may have no particles: the mesh then loses its vertices, and gets others from the particles' surface when there are some
+/// again; without rebuild it waits where it was. The context's log hears once of ids and velocities that contradict each other, and of
+/// steps in which over half of the mesh is lost or made anew.
+///
 /// from: the particles as they were at the last step's end.
 /// to: the particles at this step's end. Those of the same id are the same; where one of the two has no ids, from must have
 ///     velocities.
@@ -342,6 +354,7 @@ pub unsafe extern "C" fn frz_tracker_step(
                 None => follower.tracker.step(call.ctx(), &from, &to, dt)?,
             };
             follower.saved.take();
+            done.news(&mut follower.is_told).for_each(|warning| call.ctx().warn(&warning));
             let drops = done.apart.iter().filter(|apart| apart.volume >= 0.0).count();
             let of_change = |count: fn(&Change) -> usize| done.change.as_ref().map_or(0, count);
             let told = frz_tracker_report {

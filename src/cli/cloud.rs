@@ -7,12 +7,13 @@ use frazil::base::{DVec3, Points};
 use frazil::io::mesh::extension;
 use frazil::io::particles::{self, Cloud};
 use frazil::io::sequence::Pattern;
-use frazil::io::{atomic, points_ply, source, usd_points};
+use frazil::io::{atomic, points_ply, usd_points};
 use frazil::motion::Space;
 use frazil::scene::{FrameChoice, Frames};
 use frazil::{Error, Result};
 use serde_json::{Map, Value, json};
 
+use super::each::Each;
 use super::exit::{Failure, Phase};
 use super::output;
 use super::session::Session;
@@ -68,12 +69,17 @@ pub fn is_one(input: &Path, output: &Path, frames: Option<&FrameChoice>) -> Resu
     if [input, output].into_iter().any(is_named) {
         return Ok(true);
     }
-    let first = frames.map_or(1, FrameChoice::first);
-    let one = Pattern::parse(input).map_or_else(|| input.to_path_buf(), |pattern| pattern.path(first));
-    Ok(extension(input) == "ply"
-        && ["ply", "usda"].contains(&extension(output).as_str())
-        && one.is_file()
-        && points_ply::holds_points(&one)?)
+    if extension(input) != "ply" || !["ply", "usda"].contains(&extension(output).as_str()) {
+        return Ok(false);
+    }
+    let one = match (Pattern::parse(input), frames) {
+        // The first frame that is there tells.
+        (Some(pattern), Some(frames)) => {
+            frames.iter().map(|frame| pattern.path(frame)).find(|path| path.is_file())
+        }
+        _ => Some(input.to_path_buf()).filter(|path| path.is_file()),
+    };
+    one.map_or(Ok(false), |one| points_ply::holds_points(&one))
 }
 
 /// Points of a file, and whether their voxels are more than a way to hold them.
@@ -130,22 +136,23 @@ impl Conversion<'_> {
         output::check_writable(self.output).before()?;
         for frame in frames.iter() {
             let from = place(&input, self.input, frame);
-            // A gap in a sequence is known before any work.
-            source::open(&from).before()?;
             output::refuse_input(&place(&output, self.output, frame), [from.as_path()]).before()?;
         }
-        let mut count = 0;
-        for (n, frame) in frames.iter().enumerate() {
+        let (mut each, mut made, mut count) = (Each::default(), 0, 0);
+        for frame in frames.iter() {
             session.ctx.check().during()?;
-            let read = self.read(&place(&input, self.input, frame));
-            // What the first file is without, no frame can be begun with.
-            let read = if n == 0 { read.before()? } else { read.during()? };
-            self.write(&place(&output, self.output, frame), frame, &read, session).during()?;
-            count += read.points.count();
+            let one = || {
+                let read = self.read(&place(&input, self.input, frame))?;
+                self.write(&place(&output, self.output, frame), frame, &read, session)?;
+                Ok(read.points.count())
+            };
+            if let Some(points) = each.take(frame, one())? {
+                (made, count) = (made + 1, count + points);
+            }
         }
-        session.record("frames", json!(frames.count()));
+        session.record("frames", json!(made));
         session.record("points", json!(count));
-        Ok(())
+        each.finish()
     }
 
     fn read(&self, path: &Path) -> Result<Read> {

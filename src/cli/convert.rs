@@ -7,12 +7,14 @@ use frazil::base::arrays::On;
 use frazil::base::{MeshArray, TriMesh, Uvs, Vec3};
 use frazil::io::mesh::extension;
 use frazil::io::sequence::Pattern;
+use frazil::io::usd_points::VELOCITIES;
 use frazil::io::{self, atomic, usd};
 use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs};
 use frazil::scene::{FrameChoice, Frames};
 use serde_json::json;
 
 use super::cloud;
+use super::each::Each;
 use super::exit::{Failure, Phase};
 use super::options::{Axis, MeshSpace, positive, warn_if_far};
 use super::output;
@@ -68,7 +70,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::refused("--voxel is for points"));
     }
     check_output(&args.output)?;
-    let (motion, frames) = args.motion()?;
+    let (mut source, frames) = args.source()?;
     let pattern = Pattern::parse(&args.output);
     if pattern.is_none() && frames.count() > 1 {
         let what = format!("{}: several frames need a pattern such as hero.%04d.ply", args.output.display());
@@ -83,19 +85,39 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let inputs = [read(frame), read(frame.saturating_add(1))];
         output::refuse_input(&path, inputs.iter().map(PathBuf::as_path)).before()?;
     }
-    args.warn_of_losses(frames.first(), &*motion).before()?;
+    let (mut each, mut made, mut triangles, mut is_told) = (Each::default(), 0, 0, false);
     for frame in frames.iter() {
         session.ctx.check().during()?;
         let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
-        args.write(&path, &*motion, frame).during()?;
+        let done = source.write(args, &path, frame, &mut is_told);
+        if let Some(count) = each.take(frame, done)? {
+            (made, triangles) = (made + 1, count);
+        }
     }
-    session.record("frames", json!(frames.count()));
-    session.record("triangles", json!(motion.triangles().len()));
-    Ok(())
+    session.record("frames", json!(made));
+    session.record("triangles", json!(triangles));
+    each.finish()
 }
 
 /// Arrays of the vertices that are their velocities (m/s).
 pub const VELOCITY: [&str; 3] = ["vx", "vy", "vz"];
+
+/// Gives velocities of another name, as other programs write them, their usual one.
+pub fn name_velocities(arrays: &mut [MeshArray]) {
+    for stem in VELOCITIES {
+        let named = |axis: &str| {
+            let name = format!("{stem}{axis}");
+            let is_it = |array: &MeshArray| array.on == On::Vertices && array.name.to_lowercase() == name;
+            arrays.iter().position(is_it)
+        };
+        if let (Some(x), Some(y), Some(z)) = (named("x"), named("y"), named("z")) {
+            for (at, name) in [x, y, z].into_iter().zip(VELOCITY) {
+                arrays[at].name = name.into();
+            }
+            return;
+        }
+    }
+}
 
 /// The vectors of the vertices whose parts are the arrays of these names.
 pub fn vectors(arrays: &[MeshArray], names: [&str; 3]) -> Option<Vec<Vec3>> {
@@ -172,7 +194,7 @@ impl Losses<'_> {
         if extension(one) != "ply" {
             return Ok(());
         }
-        let arrays = io::mesh::read_detailed(one)?.arrays;
+        let arrays = io::mesh::read_any(one)?.into_detailed().arrays;
         let is_lost = |array: &&MeshArray| match to.as_str() {
             "ply" | "usda" => self.is_sequence && array.on == On::Corners,
             _ => !TOLD.contains(&&*array.name),
@@ -189,6 +211,64 @@ impl Losses<'_> {
             log::warn!("{}: these vectors keep their axes and units: {}", one.display(), vectors.join(", "));
         }
         Ok(())
+    }
+}
+
+/// What is converted.
+enum Source {
+    /// A mesh that stands, or a character.
+    One(Box<dyn Motion>),
+    Sequence(Sequence),
+}
+
+/// A mesh for each frame.
+struct Sequence {
+    pattern: Pattern,
+    /// Last frame that is wanted.
+    last: i32,
+    /// The frames from one on that are there and have the same faces, as far as is known.
+    run: Option<Box<dyn Motion>>,
+}
+
+impl Source {
+    /// Writes the mesh of a frame; the count of its triangles.
+    fn write(&mut self, args: &Args, path: &Path, frame: i32, is_told: &mut bool) -> frazil::Result<usize> {
+        match self {
+            Self::One(motion) => {
+                args.warn_once(&args.input, &**motion, frame, is_told)?;
+                args.write(path, &**motion, frame, false)?;
+                Ok(motion.triangles().len())
+            }
+            Self::Sequence(sequence) => sequence.write(args, path, frame, is_told),
+        }
+    }
+}
+
+impl Sequence {
+    fn write(&mut self, args: &Args, path: &Path, frame: i32, is_told: &mut bool) -> frazil::Result<usize> {
+        let own = self.pattern.path(frame);
+        io::source::open(&own).inspect_err(|_| self.run = None)?;
+        if self.run.is_none() {
+            let is_there = |frame: &i32| self.pattern.path(*frame).is_file();
+            let last = (frame..=self.last).take_while(is_there).last().unwrap_or(frame);
+            let (pattern, origin) = (self.pattern.clone(), args.space.origin.at);
+            let run = MeshSequence::open_seen(pattern, frame, last, args.fps, 0.0, Arc::default(), origin);
+            self.run = run.ok().map(|run| args.placed(Box::new(run)));
+        }
+        if let Some(motion) = self.run.as_deref() {
+            args.warn_once(&own, motion, frame, is_told)?;
+            match args.write(path, motion, frame, true) {
+                Ok(()) => return Ok(motion.triangles().len()),
+                Err(error @ (frazil::Error::Cancelled | frazil::Error::Io { .. })) => return Err(error),
+                // Its faces, or those of the next frame, are others.
+                Err(_) => self.run = None,
+            }
+        }
+        let motion = args.still(&own)?;
+        args.warn_once(&own, &*motion, frame, is_told)?;
+        args.write(path, &*motion, frame, false)?;
+        log::info!("{}: is converted by itself: it or the next frame has other faces", own.display());
+        Ok(motion.triangles().len())
     }
 }
 
@@ -211,85 +291,82 @@ impl Args {
         })
     }
 
-    /// Warns about what the input contains and the output cannot.
-    fn warn_of_losses(&self, frame: i32, motion: &dyn Motion) -> frazil::Result<()> {
-        let pattern = Pattern::parse(&self.input);
-        let is_sequence = pattern.is_some();
+    /// Warns, for the first file that is converted, about what it contains and the output cannot.
+    fn warn_once(
+        &self,
+        one: &Path,
+        motion: &dyn Motion,
+        frame: i32,
+        is_told: &mut bool,
+    ) -> frazil::Result<()> {
+        if std::mem::replace(is_told, true) {
+            return Ok(());
+        }
+        let is_sequence = Pattern::parse(&self.input).is_some();
         let losses = Losses { output: &self.output, keeps_space: self.keeps_space(), is_sequence };
-        let one = pattern.map_or_else(|| self.input.clone(), |pattern| pattern.path(frame));
         let mut pose = Vec::new();
         motion.drawn_pose(f64::from(frame) / self.fps, &mut pose)?;
         let triangles = motion.drawn().triangles.to_vec();
-        warn_if_far(&one, &TriMesh { positions: usd::to_floats(&pose), triangles });
-        losses.warn(&one, motion.drawn().uvs)
+        warn_if_far(one, &TriMesh { positions: usd::to_floats(&pose), triangles });
+        losses.warn(one, motion.drawn().uvs)
     }
 
     /// What is converted, in metres with Y up, and at which frames.
-    fn motion(&self) -> Result<(Box<dyn Motion>, FrameChoice), Failure> {
+    fn source(&self) -> Result<(Source, FrameChoice), Failure> {
         let is_character = is_gltf(&self.input);
         if !is_character && (self.clip.is_some() || self.node.is_some()) {
             return Err(Failure::refused("--clip and --node are for .glb and .gltf files"));
         }
         let one = FrameChoice::from(Frames { first: 1, last: 1 });
-        let (motion, frames): (Box<dyn Motion>, FrameChoice) = match Pattern::parse(&self.input) {
+        match Pattern::parse(&self.input) {
             None if is_character => {
                 let frames = self.frames.clone().unwrap_or(one);
                 let (node, clip) = (self.node.clone(), self.clip.clone());
                 let start = f64::from(frames.first()) / self.fps;
                 let play = Play { node, clip, repeat: true, start };
-                (Box::new(Character::open(&self.input, play).before()?), frames)
+                let character = Box::new(Character::open(&self.input, play).before()?);
+                let motion = Placed::new(character, self.space.space(), Keys::default());
+                Ok((Source::One(Box::new(motion)), frames))
             }
-            None => {
-                if self.frames.is_some() {
-                    return Err(Failure::refused("--frames is of no use with one mesh"));
-                }
-                (
-                    Box::new(Rigid::of_polygons(
-                        self.space.origin.read(&self.input).before()?,
-                        Keys::default(),
-                    )),
-                    one,
-                )
-            }
+            None if self.frames.is_some() => Err(Failure::refused("--frames is of no use with one mesh")),
+            None => Ok((Source::One(self.still(&self.input).before()?), one)),
             Some(pattern) => {
                 let needed =
                     || Failure::refused(format!("{}: a sequence needs --frames A-B", self.input.display()));
                 let frames = self.frames.clone().ok_or_else(needed)?;
-                let (first, last) = (frames.first(), frames.last());
-                (
-                    Box::new(
-                        MeshSequence::open_seen(
-                            pattern,
-                            first,
-                            last,
-                            self.fps,
-                            0.0,
-                            Arc::default(),
-                            self.space.origin.at,
-                        )
-                        .before()?,
-                    ),
-                    frames,
-                )
+                let last = frames.last();
+                Ok((Source::Sequence(Sequence { pattern, last, run: None }), frames))
             }
-        };
-        let space = self.space.space();
-        // Meshes are read less the origin.
-        let space = if is_character { space } else { space.without_origin() };
-        Ok((Box::new(Placed::new(motion, space, Keys::default())), frames))
+        }
+    }
+
+    /// A mesh, or meshes, that were read less the origin, in metres with Y up.
+    fn placed(&self, motion: Box<dyn Motion>) -> Box<dyn Motion> {
+        Box::new(Placed::new(motion, self.space.space().without_origin(), Keys::default()))
+    }
+
+    /// A mesh that does not move.
+    fn still(&self, path: &Path) -> frazil::Result<Box<dyn Motion>> {
+        Ok(self.placed(Box::new(Rigid::of_polygons(
+            io::mesh::read_any_from(path, self.space.origin.at)?,
+            Keys::default(),
+        ))))
     }
 
     /// The arrays of a frame's mesh, where the output holds any: characters have none.
-    fn arrays(&self, output: &Path, frame: i32) -> frazil::Result<Vec<MeshArray>> {
+    fn arrays(&self, output: &Path, frame: i32, is_sequence: bool) -> frazil::Result<Vec<MeshArray>> {
         let input = Pattern::parse(&self.input).map_or_else(|| self.input.clone(), |p| p.path(frame));
         if is_gltf(&input) || extension(output) == "stl" {
             return Ok(Vec::new());
         }
-        let mut arrays = io::mesh::read_detailed(&input)?.arrays;
+        let mut arrays = io::mesh::read_any(&input)?.into_detailed().arrays;
+        if extension(output) == "usda" {
+            name_velocities(&mut arrays);
+        }
         // In another space velocities would be others.
         arrays.retain(|array| self.keeps_space() || !VELOCITY.contains(&&*array.name));
         // Each mesh of a sequence may cut its polygons in its own way, but all get the triangles of the first.
-        arrays.retain(|array| array.on != On::Corners || Pattern::parse(&self.input).is_none());
+        arrays.retain(|array| array.on != On::Corners || !is_sequence);
         Ok(arrays)
     }
 
@@ -298,7 +375,8 @@ impl Args {
         self.space.space().keeps_vectors() && self.to_scale == 1.0 && self.to_up == Axis::Y
     }
 
-    fn write(&self, path: &Path, motion: &dyn Motion, frame: i32) -> frazil::Result<()> {
+    /// Writes the mesh of a frame; as part of a sequence its velocities take it to the next one.
+    fn write(&self, path: &Path, motion: &dyn Motion, frame: i32, is_sequence: bool) -> frazil::Result<()> {
         let time = f64::from(frame) / self.fps;
         let (mut pose, mut velocities) = (Vec::new(), Vec::new());
         motion.drawn_pose(time, &mut pose)?;
@@ -312,7 +390,7 @@ impl Args {
         };
         out(&mut pose);
         let (positions, drawn) = (usd::to_floats(&pose), motion.drawn());
-        let arrays = self.arrays(path, frame)?;
+        let arrays = self.arrays(path, frame, is_sequence)?;
         if extension(path) != "usda" {
             let mesh = TriMesh { positions, triangles: drawn.triangles.to_vec() };
             let arrays: Vec<&MeshArray> = arrays.iter().collect();
@@ -327,7 +405,7 @@ impl Args {
         let others = arrays.iter().filter(|array| !(own.is_some() && is_own(array)));
         let others: Vec<&MeshArray> = others.collect();
         // Of a sequence they are what takes each mesh to the next.
-        let own = own.filter(|_| Pattern::parse(&self.input).is_none());
+        let own = own.filter(|_| !is_sequence);
         let velocities = own.unwrap_or_else(|| usd::to_floats(&velocities));
         let name = prim_name(&self.input);
         let mesh = usd::MeshFrame {

@@ -11,6 +11,9 @@ pub const FAILED: u8 = 1;
 /// Exit code: refused before the work began.
 pub const REFUSED: u8 = 2;
 
+/// Exit code: refused because another run is at work in the folder (`EX_TEMPFAIL` of sysexits.h): the same command may do later.
+pub const BUSY: u8 = 75;
+
 /// Why a command ends early.
 #[derive(Debug)]
 pub struct Failure {
@@ -46,7 +49,10 @@ pub trait Phase<T> {
 
 impl<T> Phase<T> for frazil::Result<T> {
     fn before(self) -> Result<T, Failure> {
-        self.map_err(Failure::refused)
+        self.map_err(|error| match error {
+            Error::Busy(_) => Failure { code: BUSY, message: error.to_string() },
+            error => Failure::refused(error),
+        })
     }
 
     fn during(self) -> Result<T, Failure> {

@@ -52,7 +52,7 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
 }
 
 fn mesh(path: &Path, origin: &Origin) -> frazil::Result<Vec<Value>> {
-    let mesh = origin.read(path)?.into_triangles();
+    let mesh = io::mesh::read_any_from(path, origin.at)?.into_triangles();
     warn_if_far(path, &mesh);
     let vertices = mesh.positions.len();
     let mesh = mesh.without_unused();

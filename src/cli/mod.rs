@@ -5,6 +5,7 @@ mod cloud;
 mod compare;
 mod compared;
 mod convert;
+mod each;
 mod exit;
 mod info;
 #[cfg(feature = "vdb")]

@@ -74,6 +74,9 @@ impl Origin {
 
 /// Warns of a mesh, as it was read, whose coordinates are too large for 32 bits.
 pub fn warn_if_far(path: &Path, mesh: &TriMesh) {
+    if mesh.positions.is_empty() {
+        return;
+    }
     if let Some(what) = is_coarse(&path.display().to_string(), mesh, BY_OPTION) {
         log::warn!("{what}");
     }

@@ -50,6 +50,36 @@ pub fn parse_polygons(path: &Path, bytes: &[u8]) -> Result<PolygonMesh> {
 /// # Errors
 /// As [`read`].
 pub fn parse_polygons_from(path: &Path, bytes: &[u8], origin: DVec3) -> Result<PolygonMesh> {
+    let mesh = parse(path, bytes, origin)?;
+    mesh.validate().map_err(|error| Error::file(path, error.to_string()))?;
+    Ok(mesh)
+}
+
+/// As [`read_polygons`], of a file that may hold an empty mesh, as frames of a liquid that has not come yet, or is gone, do: one that
+/// says so, as a .ply of 0 faces and an .obj of ours do, and any .stl.
+///
+/// # Errors
+/// As [`read`], but for a mesh that has neither vertices nor faces.
+pub fn read_any(path: &Path) -> Result<PolygonMesh> {
+    read_any_from(path, DVec3::zeros())
+}
+
+/// As [`read_any`], with positions less `origin`: see [`parse_polygons_from`].
+///
+/// # Errors
+/// As [`read_any`].
+pub fn read_any_from(path: &Path, origin: DVec3) -> Result<PolygonMesh> {
+    let bytes = source::read(path)?;
+    let mesh = parse(path, &bytes, origin)?;
+    let is_empty = mesh.positions.is_empty() && mesh.ends.is_empty();
+    if !is_empty || extension(path) == "obj" && !obj::is_empty_of_ours(&bytes) {
+        mesh.validate().map_err(|error| Error::file(path, error.to_string()))?;
+    }
+    Ok(mesh)
+}
+
+/// The mesh as the file has it, which may be empty or invalid.
+fn parse(path: &Path, bytes: &[u8], origin: DVec3) -> Result<PolygonMesh> {
     if bytes.is_empty() {
         return Err(Error::file(path, "the file is empty"));
     }
@@ -64,7 +94,6 @@ pub fn parse_polygons_from(path: &Path, bytes: &[u8], origin: DVec3) -> Result<P
         )),
     };
     let (mesh, warning) = caught(path, || parse().map_err(|what| Error::file(path, what)))?;
-    mesh.validate().map_err(|error| Error::file(path, error.to_string()))?;
     if let Some(warning) = warning {
         log::warn!("{}: {warning}", path.display());
     }

@@ -8,6 +8,8 @@ use super::{source, text};
 use crate::base::arrays::{MeshArray, Number, On};
 use crate::base::{PolygonMesh, TriMesh, Uvs, Vec3, uvs};
 
+/// What is written of a mesh without vertices.
+const EMPTY: &[u8] = b"# an empty mesh\n";
 /// Lines between two looks at whether to stop.
 const PIECE: usize = 1 << 14;
 /// Names of the arrays that a vertex' three numbers behind its place are.
@@ -57,6 +59,11 @@ fn continued(line: &[u8]) -> Option<&[u8]> {
     let word = begin.trim_ascii_start().split(u8::is_ascii_whitespace).next();
     let is_read = matches!(word, Some(b"v" | b"vt" | b"f"));
     (is_read && !begin.contains(&b'#')).then_some(begin)
+}
+
+/// Whether the file was written of a mesh without vertices: a file of any other text has none either.
+pub(super) fn is_empty_of_ours(bytes: &[u8]) -> bool {
+    bytes == EMPTY
 }
 
 /// The contents of the lines so far.
@@ -176,7 +183,7 @@ pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carried<'_>) 
     };
     if mesh.positions.is_empty() {
         // A file without bytes looks like one that was cut.
-        return writeln!(out, "# an empty mesh");
+        return out.write_all(EMPTY);
     }
     for (vertex, p) in mesh.positions.iter().enumerate() {
         match colours {

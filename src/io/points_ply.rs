@@ -20,14 +20,18 @@ const VOXEL: &str = "frazil voxel_size";
 /// How far rounding may move a point (voxels) before its place is written in 64 bits.
 const MOST_MOVED: f64 = 1e-3;
 
-/// Whether a .ply file has vertices and no faces.
+/// Whether a .ply file has vertices and no faces. One that has neither holds a mesh where it says that there are no faces, and points
+/// where it says nothing of faces.
 ///
 /// # Errors
 /// A file that cannot be read.
 pub fn holds_points(path: &Path) -> Result<bool> {
     let bytes = source::read(path)?;
     let is_face = |element: &Element| element.name == "face" || element.name == "tristrips";
-    Ok(ply::open(&bytes).is_ok_and(|body| !body.elements.iter().any(|e| is_face(e) && e.count > 0)))
+    Ok(ply::open(&bytes).is_ok_and(|body| {
+        let has_vertices = body.elements.iter().any(|e| e.name == "vertex" && e.count > 0);
+        !body.elements.iter().any(|e| is_face(e) && (e.count > 0 || !has_vertices))
+    }))
 }
 
 /// Reads the vertices of a .ply file as points. `id` becomes 64-bit integers, `active` and `trapped` `bool`; other integers of up to

@@ -8,7 +8,7 @@ use crate::base::arrays::Number;
 use crate::base::points::{Attribute, Column, Points, Values};
 use crate::base::{DVec3, Vec3};
 
-/// The points of one frame. `v` becomes `velocities` (m/s), `id` the prim's `ids`, `pscale` `widths` (twice as much: USD has
+/// The points of one frame. `v`, or `velocity`, `velocities` or `vel`, becomes `velocities` (m/s), `id` the prim's `ids`, `pscale` `widths` (twice as much: USD has
 /// diameters, m); every other attribute is a primvar of its name, with the interpolation `constant` where all points share
 /// one value. Metres, Y up.
 pub fn frame(name: &str, frame: i32, fps: f64, points: &Points) -> String {
@@ -32,11 +32,14 @@ pub fn frame(name: &str, frame: i32, fps: f64, points: &Points) -> String {
     let places: Vec<Vec3> = (0..points.count()).map(|point| points.position(point).cast()).collect();
     sample(&mut out, EXTENT, None, &list(extent(points, pscale).iter(), |out, p| vector(out, *p)));
     sample(&mut out, PLACES, None, &list(places.iter(), |out, p| vector(out, (*p).into())));
+    let velocities = velocities(points);
     for (attribute, (declared, interpolation)) in points.attributes.iter().zip(declarations(points)) {
         let each = 0..points.count();
         let values = match (&attribute.name[..], &attribute.values) {
             // USD has one of each for all points.
-            ("v", Values::Vector(column)) => list(each.map(|point| column.get(point)), vector),
+            (name, Values::Vector(column)) if Some(name) == velocities => {
+                list(each.map(|point| column.get(point)), vector)
+            }
             ("id", Values::Long(column)) => list(each.map(|point| column.get(point)), whole),
             ("id", Values::Int(column)) => list(each.map(|point| column.get(point)), whole),
             ("pscale", Values::Float(column)) => {
@@ -66,15 +69,33 @@ const PLACES: &str = "point3f[] points";
 
 /// Type and name of each attribute, and its interpolation where that is not known from the name; no name is there twice.
 fn declarations(points: &Points) -> Vec<(String, Option<&'static str>)> {
-    let mut taken = Vec::new();
-    points.attributes.iter().map(|attribute| declaration(attribute, &mut taken)).collect()
+    let (mut taken, velocities) = (Vec::new(), velocities(points));
+    points.attributes.iter().map(|attribute| declaration(attribute, velocities, &mut taken)).collect()
 }
 
-fn declaration(attribute: &Attribute, taken: &mut Vec<String>) -> (String, Option<&'static str>) {
+/// Names of velocities, in lower case: of several attributes the first of these.
+pub const VELOCITIES: [&str; 4] = ["v", "velocity", "velocities", "vel"];
+
+/// The name of the attribute that holds the velocities.
+fn velocities(points: &Points) -> Option<&str> {
+    let named = |name: &&str| {
+        let is_it = |attribute: &&Attribute| {
+            matches!(attribute.values, Values::Vector(_)) && attribute.name.to_lowercase() == **name
+        };
+        points.attributes.iter().find(is_it)
+    };
+    VELOCITIES.iter().find_map(named).map(|attribute| &attribute.name[..])
+}
+
+fn declaration(
+    attribute: &Attribute,
+    velocities: Option<&str>,
+    taken: &mut Vec<String>,
+) -> (String, Option<&'static str>) {
     let Attribute { name, values } = attribute;
     let interpolation = Some(if values.is_uniform() { "constant" } else { "vertex" });
     match (&name[..], values) {
-        ("v", Values::Vector(_)) => ("vector3f[] velocities".into(), None),
+        (name, Values::Vector(_)) if Some(name) == velocities => ("vector3f[] velocities".into(), None),
         ("id", Values::Long(_) | Values::Int(_)) => ("int64[] ids".into(), None),
         ("pscale", Values::Float(_)) => ("float[] widths".into(), interpolation),
         _ => {
@@ -121,6 +142,29 @@ fn number(out: &mut String, value: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn velocities_of_any_name_are_those_of_usd() {
+        let names = |names: &[&str]| {
+            let mut points = Points::at(1.0, &[DVec3::zeros()]).unwrap();
+            for name in names {
+                let values = Values::Vector(Column::Each(vec![[1.0, 2.0, 3.0]]));
+                points.attributes.push(Attribute { name: (*name).into(), values });
+            }
+            (frame("drop", 3, 24.0, &points), declared(&points, ""))
+        };
+        for name in ["v", "vel", "Velocity", "velocities"] {
+            let (text, over) = names(&[name]);
+            assert!(text.contains("vector3f[] velocities.timeSamples = { 3: [(1, 2, 3)] }"), "{text}");
+            assert!(!text.contains("primvars") && over.contains("vector3f[] velocities\n"), "{text}");
+        }
+        // One of several.
+        let (text, over) = names(&["vel", "v"]);
+        for text in [text, over] {
+            assert!(text.matches("vector3f[] velocities").count() == 1, "{text}");
+            assert!(text.contains("float3[] primvars:vel"), "{text}");
+        }
+    }
 
     #[test]
     fn attributes_whose_names_become_one_stay_apart_and_numbers_are_those_of_usd() {

@@ -143,6 +143,10 @@ impl Stepping for Objects<'_> {
         Ok(())
     }
 
+    fn writes_alone(&self) -> bool {
+        true
+    }
+
     fn write(&self, _writer: &mut (), step: Option<Poses>, files: Option<&mut FrameFiles>) -> Result<()> {
         let (Some(poses), Some(files)) = (step, files) else { return Ok(()) };
         let drawn: Vec<Drawn> = self.bodies.iter().map(|body| body.motion().drawn()).collect();

@@ -13,6 +13,8 @@ pub fn cell_of(place: &DVec3) -> Coord {
     [0, 1, 2].map(|axis| place[axis].floor() as i32)
 }
 
+/// With this begins what is said of particles too far apart.
+pub const TOO_FAR: &str = "particles reach";
 /// Bits of each axis in a key.
 const BITS: u32 = 21;
 /// Greatest distance of two cells on an axis.
@@ -71,7 +73,7 @@ impl Cells {
             if high[axis] - low[axis] >= FARTHEST as f64 || low[axis] < -limit || high[axis] > limit {
                 let far = (high[axis] - low[axis]).max(-low[axis]).max(high[axis]) * edge;
                 return Err(Error::argument(format!(
-                    "particles reach over {far:.3} m, too far for cells of {edge} m"
+                    "{TOO_FAR} over {far:.3} m, too far for cells of {edge} m"
                 )));
             }
         }

@@ -74,6 +74,12 @@ const DEEP: f64 = 0.25;
 const BORN: [f64; 2] = [1.0, 1.0];
 
 impl Change {
+    /// Of a mesh that goes as a whole.
+    pub(super) fn to_nothing(unfit: &Unfit<'_>) -> Self {
+        let (vertices, triangles, origins, sources) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { vertices, triangles, origins, sources, ..Self::nothing(unfit) }
+    }
+
     /// Of a mesh that stays as it is.
     fn nothing(unfit: &Unfit<'_>) -> Self {
         Self {
@@ -109,6 +115,11 @@ impl Change {
     /// Count of triangles that were made: parts of others among them.
     pub fn made_triangles(&self) -> usize {
         self.sources.iter().filter(|source| !matches!(source, Source::Whole(_))).count()
+    }
+
+    /// Count of triangles that are of no triangle there was.
+    pub(super) fn rebuilt_triangles(&self) -> usize {
+        self.sources.iter().filter(|source| **source == Source::New).count()
     }
 
     /// What two changes did, one after the other.

@@ -30,10 +30,11 @@ impl Drift {
         self.vertices.iter().zip(from.iter().zip(to)).map(moved).collect()
     }
 
-    /// Counts a step, after which vertices are displaced by so much (m): each [`WINDOW`] steps it is the new reference.
+    /// Counts a step, after which vertices are displaced by so much (m): each [`WINDOW`] steps it is the new reference, and always where
+    /// there are no vertices.
     pub fn next(&self, displacements: Vec<[f32; 3]>) -> Self {
         let steps = self.steps + 1;
-        if steps < WINDOW {
+        if steps < WINDOW && !displacements.is_empty() {
             Self { steps, vertices: displacements }
         } else {
             Self::at_reference(displacements.len())

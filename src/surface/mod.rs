@@ -28,6 +28,7 @@
 #![allow(clippy::needless_range_loop)]
 
 mod advect;
+mod agreement;
 mod ahead;
 mod apart;
 mod average;
@@ -41,6 +42,7 @@ mod cubes;
 mod drift;
 mod dry;
 mod easing;
+mod empty;
 mod enclosed;
 mod fade;
 mod fit;
@@ -74,9 +76,11 @@ mod uncrossed;
 mod unfit;
 
 pub use advect::{Weighting, carried};
+pub use agreement::{Mismatch, disagreement};
 pub use apart::Apart;
 pub use average::SUPPORT;
 pub use band::Distances;
+pub use cells::TOO_FAR;
 pub use change::Change;
 #[doc(hidden)]
 pub use cubes::cases as cube_cases;
@@ -121,16 +125,13 @@ pub struct Particles {
 }
 
 impl Particles {
-    /// Checks that there are particles, that arrays have one value for each, that numbers are finite and ids differ.
+    /// Checks that arrays have one value for each particle, that numbers are finite and ids differ. There may be no particles.
     ///
     /// # Errors
     /// Names the first particle at fault, counted from 1.
     pub fn validate(&self) -> Result<()> {
         let count = self.places.len();
         let refuse = |what: String| Err(Error::argument(what));
-        if count == 0 {
-            return refuse("there are no particles".into());
-        }
         for (name, length) in [("velocities", self.velocities.len()), ("ids", self.ids.len())] {
             if length != 0 && length != count {
                 return refuse(format!("there are {count} particles, but {length} {name}"));

@@ -8,6 +8,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::Particles;
+use super::agreement::Mismatch;
 use crate::base::DVec3;
 use crate::error::{Error, Result};
 
@@ -20,6 +21,8 @@ pub struct Paths {
     speeds: Vec<[DVec3; 2]>,
     /// What tells particles at the same place apart.
     ranks: Vec<i64>,
+    /// What velocities say where that is not what places say: they are then left out.
+    pub mismatch: Option<Mismatch>,
     /// Particles of the first frame that end, and of the second that are new.
     pub died: usize,
     /// See `died`.
@@ -30,11 +33,19 @@ pub struct Paths {
 const TRUSTED: f64 = 0.5;
 
 impl Paths {
-    /// From one frame to the next, `dt` (s) later.
+    /// From one frame to the next, `dt` (s) later. Where the second has no particles, those of the first go on with their velocities, if
+    /// they have any.
     ///
     /// # Errors
     /// Neither ids in both frames nor velocities in the first.
     pub fn between(from: &Particles, to: &Particles, dt: f64) -> Result<Self> {
+        let (died, born) = (from.places.len(), to.places.len());
+        if died == 0 || born == 0 && from.velocities.is_empty() {
+            return Ok(Self { died, born, ..Self::default() });
+        }
+        if born == 0 {
+            return Ok(Self { died, ..Self::by_velocity(from, dt)? });
+        }
         if from.ids.is_empty() || to.ids.is_empty() {
             return Self::by_velocity(from, dt);
         }
@@ -65,7 +76,8 @@ impl Paths {
             }
         }
         out.born = to.places.len() - out.from.len();
-        if !out.are_speeds_right() {
+        out.mismatch = out.mismatched();
+        if out.mismatch.is_some() {
             out.speeds.clear();
         }
         Ok(out)
@@ -83,20 +95,26 @@ impl Paths {
         Ok(Self { from: from.places.clone(), to, ranks, ..Self::default() })
     }
 
-    /// Whether velocities are in the unit and at the time that the places say.
-    fn are_speeds_right(&self) -> bool {
-        let mut ways: Vec<[f64; 2]> = (0..self.speeds.len())
-            .map(|n| {
-                let way = self.to[n] - self.from[n];
-                [((self.speeds[n][0] + self.speeds[n][1]) * 0.5 - way).norm(), way.norm()]
-            })
-            .collect();
-        let middle = ways.len() / 2;
-        let mut median = |part: usize| match ways.is_empty() {
-            true => 0.0,
-            false => ways.select_nth_unstable_by(middle, |a, b| a[part].total_cmp(&b[part])).1[part],
+    /// What velocities say where they are not in the unit and at the time that the places say.
+    fn mismatched(&self) -> Option<Mismatch> {
+        let speed = |n: usize| (self.speeds[n][0] + self.speeds[n][1]) * 0.5;
+        let way = |n: usize| self.to[n] - self.from[n];
+        let median = |of: &dyn Fn(usize) -> f64| {
+            let mut all: Vec<f64> = (0..self.speeds.len()).map(of).collect();
+            let middle = all.len() / 2;
+            if all.is_empty() { 0.0 } else { *all.select_nth_unstable_by(middle, f64::total_cmp).1 }
         };
-        median(0) <= TRUSTED * median(1)
+        let apart = median(&|n| (speed(n) - way(n)).norm());
+        let by_ids = median(&|n| way(n).norm());
+        if apart <= TRUSTED * by_ids {
+            return None;
+        }
+        let by_velocities = median(&|n| speed(n).norm());
+        let cosine = median(&|n| {
+            let lengths = speed(n).norm() * way(n).norm();
+            if lengths > 0.0 { speed(n).dot(&way(n)) / lengths } else { 0.0 }
+        });
+        Some(Mismatch { by_ids, by_velocities, apart, cosine })
     }
 
     /// Count of ways.
@@ -144,6 +162,12 @@ impl Paths {
 /// # Errors
 /// Neither ids in both frames nor velocities in the first.
 pub fn interpolate(from: &Particles, to: &Particles, dt: f64, share: f64) -> Result<Particles> {
+    if from.places.is_empty() {
+        return Ok(Particles::default());
+    }
+    if to.places.is_empty() && from.velocities.is_empty() {
+        return Ok(from.clone());
+    }
     if from.ids.is_empty() || to.ids.is_empty() {
         let mut places = Vec::new();
         Paths::by_velocity(from, dt)?.at(share, &mut places);
@@ -194,6 +218,22 @@ mod tests {
         paths.at(0.5, &mut places);
         assert!((places[0].x - 0.5).abs() < 1e-12 && (places[1].x - 2.5).abs() < 1e-12);
         assert_eq!(paths.farthest(), 1.0);
+    }
+
+    #[test]
+    fn a_frame_may_have_no_particles() {
+        let some = frame(&[7, 3], &[0.0, 1.0], 10.0);
+        let none = Particles::default();
+        let away = Paths::between(&some, &none, 0.1).unwrap();
+        assert_eq!((away.count(), away.died, away.born), (2, 2, 0));
+        assert_eq!(away.farthest(), 1.0, "they go on");
+        let back = Paths::between(&none, &some, 0.1).unwrap();
+        assert_eq!((back.count(), back.died, back.born), (0, 0, 2));
+        let still = Particles { velocities: Vec::new(), ..some.clone() };
+        assert_eq!(Paths::between(&still, &none, 0.1).unwrap().count(), 0);
+        assert_eq!(interpolate(&none, &some, 0.1, 0.5).unwrap(), none);
+        assert_eq!(interpolate(&still, &none, 0.1, 0.5).unwrap(), still);
+        assert_eq!(interpolate(&some, &none, 0.1, 0.5).unwrap().places[1].x, 1.5);
     }
 
     #[test]

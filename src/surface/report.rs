@@ -4,6 +4,9 @@ use super::apart::Apart;
 use super::change::Change;
 use crate::context::PhaseTime;
 
+/// What warnings of the mesh have in common.
+pub(super) const OF_MESH: &str = "of the mesh's";
+
 /// What a step did.
 #[derive(Debug, Clone, Default)]
 pub struct StepReport {
@@ -25,6 +28,8 @@ pub struct StepReport {
     pub apart: Vec<Apart>,
     /// What the mesh became where it was rebuilt or improved; none: vertices and triangles are those before.
     pub change: Option<Change>,
+    /// What looks wrong with the particles, and with what became of the mesh, a sentence each.
+    pub warnings: Vec<String>,
     /// Time of each phase.
     pub phases: Vec<PhaseTime>,
 }
@@ -33,6 +38,14 @@ impl StepReport {
     /// How often a change was found: vertices that were not projected, and others beside surface that is not covered.
     pub fn flagged(&self) -> usize {
         self.jumped + self.lost + self.uncovered
+    }
+
+    /// The warnings that are news: what is wrong with the particles is said of the first frame only, of which `is_told` keeps note.
+    pub fn news<'a>(&'a self, is_told: &'a mut bool) -> impl Iterator<Item = &'a String> {
+        self.warnings.iter().filter(|warning| {
+            let is_of_mesh = warning.contains(OF_MESH);
+            is_of_mesh || !std::mem::replace(is_told, true)
+        })
     }
 
     /// What two steps did, one after the other; what is flagged is so after the second.
@@ -55,6 +68,10 @@ impl StepReport {
             change: match (self.change, next.change) {
                 (Some(first), Some(second)) => Some(second.after(&first)),
                 (first, second) => second.or(first),
+            },
+            warnings: {
+                self.warnings.extend(next.warnings);
+                self.warnings
             },
             phases: self.phases,
         }

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::Particles;
 use super::advect::advect;
+use super::agreement::torn_mesh;
 use super::ahead::Ahead;
 use super::apart::{Apart, Lacking, Parts, Wanted};
 use super::band::Distances;
@@ -56,7 +57,7 @@ pub struct Tracker {
 }
 
 /// Least reach of the band, and the greatest that is tried at the first frame (r).
-const REACH: [f64; 2] = [1.5, 8.0];
+pub(super) const REACH: [f64; 2] = [1.5, 8.0];
 /// The band reaches so much farther than vertices did before (thesis 2.3.1).
 const WIDER: f64 = 1.25;
 /// How far a vertex drifts in a frame at most, where nothing merges or splits (r).
@@ -92,6 +93,9 @@ impl Tracker {
         params.validate()?;
         mesh.validate()?;
         particles.validate()?;
+        if particles.places.is_empty() {
+            return Err(Error::argument("there are no particles"));
+        }
         if params.rebuild && !Topology::of(mesh.positions.len(), &mesh.triangles).is_watertight() {
             return Err(Error::argument(
                 "the mesh is not closed and 2-manifold by index, as it must be to be rebuilt",
@@ -235,11 +239,17 @@ impl Tracker {
     /// Follows the particles from one frame to the next, `dt` (s) later. A step that fails or is cancelled leaves the mesh as it
     /// was.
     ///
+    /// Either frame may have no particles. A mesh that is rebuilt then has no vertices, and gets its parts from the particles when these
+    /// come back; one that is not stays where it was, with all of its vertices lost.
+    ///
     /// # Errors
     /// A time that is not positive; particles that are not valid, or have neither ids nor velocities; where the mesh is rebuilt, vertices
     /// too far apart for the grid, or more memory than the context allows; cancel.
     pub fn step(&mut self, ctx: &Context, from: &Particles, to: &Particles, dt: f64) -> Result<StepReport> {
         validate_step(from, to, dt)?;
+        if to.places.is_empty() {
+            return self.dry_up(ctx, from, dt);
+        }
         let (next, phases) = ctx.step(10, || {
             let paths = Paths::between(from, to, dt)?;
             let (carried, parts) = ctx.phase("advect", || self.carried(ctx, &paths))?;
@@ -274,6 +284,11 @@ impl Tracker {
                     born: paths.born,
                     died: paths.died,
                     triangles: surface.1.count(),
+                    warnings: paths
+                        .mismatch
+                        .and_then(|mismatch| mismatch.told(self.params.spacing))
+                        .into_iter()
+                        .collect(),
                     ..StepReport::default()
                 },
                 drifts: self.drift.after(&self.vertices, &vertices),
@@ -288,6 +303,10 @@ impl Tracker {
                 (next.report.change, ahead) = (change, ready);
             }
             next.report.apart = covered.apart;
+            let is_torn = |(flag, delta): &(&Flag, &f32)| **flag == Flag::Lost && !delta.is_nan();
+            let lost = flags.iter().zip(&self.delta).filter(is_torn).count();
+            let torn = torn_mesh(&next.report, (lost, flags.len()), (from, to, dt), self.params.spacing)?;
+            next.report.warnings.extend(torn);
             Ok((next, ahead))
         })?;
         let (next, ahead) = next;
@@ -331,7 +350,7 @@ impl Tracker {
         Crowd { places, spacing: self.params.spacing, least: self.params.min_drop.max(1) }
     }
 
-    fn carried(&self, ctx: &Context, paths: &Paths) -> Result<(Vec<DVec3>, usize)> {
+    pub(super) fn carried(&self, ctx: &Context, paths: &Paths) -> Result<(Vec<DVec3>, usize)> {
         let mut vertices = self.vertices.clone();
         let parts = advect(ctx, &mut vertices, paths, self.params.spacing, self.params.weighting)?;
         Ok((vertices, parts))

@@ -15,7 +15,7 @@ use crate::error::{Error, Result, one_line};
 /// The first argument of a program that is to decode.
 pub(super) const COMMAND: &str = "decode-vdb-for-another-process";
 /// Version of the arguments and of parcels: both sides must have the same.
-pub(super) const PROTOCOL: &str = concat!("3-", env!("CARGO_PKG_VERSION"));
+pub(super) const PROTOCOL: &str = concat!("4-", env!("CARGO_PKG_VERSION"));
 
 /// What to read from a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +26,8 @@ pub(super) enum Wanted<'a> {
     First,
     /// Of floats.
     Named(&'a str),
+    /// Of floats, by its index.
+    Nth(&'a str),
     /// Of floats or vectors.
     FirstAny,
     /// Of floats or vectors.
@@ -42,6 +44,7 @@ impl Wanted<'_> {
             Self::All => ["all", ""],
             Self::First => ["first", ""],
             Self::Named(name) => ["named", name],
+            Self::Nth(index) => ["nth", index],
             Self::FirstAny => ["first-any", ""],
             Self::NamedAny(name) => ["named-any", name],
             Self::FirstPoints => ["first-points", ""],
@@ -79,6 +82,7 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> Option<u8> {
         "all" => Wanted::All,
         "first" => Wanted::First,
         "named" => Wanted::Named(name),
+        "nth" => Wanted::Nth(name),
         "first-any" => Wanted::FirstAny,
         "named-any" => Wanted::NamedAny(name),
         "first-points" => Wanted::FirstPoints,
@@ -128,6 +132,10 @@ fn contents(path: &Path, wanted: Wanted<'_>) -> Result<Contents> {
         Wanted::All => Contents::Grids(decode::read(path)?.into_iter().map(AnyGrid::Floats).collect()),
         Wanted::First => Contents::Grids(vec![AnyGrid::Floats(decode::read_named(path, None)?)]),
         Wanted::Named(name) => Contents::Grids(vec![AnyGrid::Floats(decode::read_named(path, Some(name))?)]),
+        Wanted::Nth(index) => {
+            let index = index.parse().map_err(|_| Error::Bytes("is no index of a grid".into()))?;
+            Contents::Grids(vec![AnyGrid::Floats(decode::read_nth(path, index)?)])
+        }
         Wanted::FirstAny => Contents::Grids(vec![decode::read_any(path, None)?]),
         Wanted::NamedAny(name) => Contents::Grids(vec![decode::read_any(path, Some(name))?]),
     })

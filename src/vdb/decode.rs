@@ -135,8 +135,11 @@ pub(super) fn read(path: &Path) -> Result<Vec<FloatGrid>> {
         if headers.is_empty() {
             return Err("the .vdb file holds no grid".to_string());
         }
-        let load = |chosen| floats(load(&mut source, &chosen, Kinds::Floats)?);
-        headers.into_iter().enumerate().map(load).collect()
+        let load = |at| {
+            let chosen = nth(headers.clone(), at).ok_or(ASTRAY)?;
+            floats(load(&mut source, &chosen, Kinds::Floats)?)
+        };
+        (0..headers.len()).map(load).collect()
     };
     all().map_err(|what| Error::file(path, what))
 }
@@ -145,6 +148,16 @@ pub(super) fn read(path: &Path) -> Result<Vec<FloatGrid>> {
 pub(super) fn read_named(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
     let found = named(source(path)?, name, Kinds::Floats).and_then(floats);
     found.map_err(|what| Error::file(path, what))
+}
+
+/// As [`super::file::read_nth`].
+pub(super) fn read_nth(path: &Path, index: usize) -> Result<FloatGrid> {
+    let read = |mut source: Source<'_>| {
+        let chosen = nth(headers(&source)?, index);
+        let chosen = chosen.ok_or_else(|| format!("the .vdb file holds no {} grids", index + 1))?;
+        floats(load(&mut source, &chosen, Kinds::Floats)?)
+    };
+    read(source(path)?).map_err(|what| Error::file(path, what))
 }
 
 /// As [`super::file::read_any`].
@@ -209,12 +222,28 @@ fn named(mut source: Source<'_>, name: Option<&str>, kinds: Kinds) -> Told<AnyGr
     load(&mut source, &chosen, kinds)
 }
 
-/// A grid of a file: its index and its description.
-type Chosen = (usize, GridInfo);
+/// A grid of a file: its index, its description, and the name that no other grid of the file has.
+type Chosen = (usize, GridInfo, String);
+
+/// The grid of an index. Of several of one name OpenVDB lists the first, and then the others by what it has written behind their names,
+/// in the order of letters: [1], [10], [2]; nameless ones have a number from [0] on.
+fn nth(mut headers: Vec<GridInfo>, at: usize) -> Option<Chosen> {
+    let name = headers.get(at)?.name.clone();
+    let of_name = |headers: &[GridInfo]| headers.iter().filter(|header| header.name == name).count();
+    let (before, all) = (of_name(&headers[..at]), of_name(&headers));
+    let first = usize::from(!name.is_empty());
+    let mut numbers: Vec<String> = (first..all).map(|number| number.to_string()).collect();
+    numbers.sort();
+    let unique = match before.checked_sub(first) {
+        Some(place) if all > 1 => format!("{name}[{}]", numbers.get(place)?),
+        _ => name,
+    };
+    Some((at, headers.swap_remove(at), unique))
+}
 
 /// The grid of that name, or the first of the kinds.
 fn choose(source: &Source<'_>, name: Option<&str>, kinds: Kinds) -> Told<Chosen> {
-    let mut headers = headers(source)?;
+    let headers = headers(source)?;
     let first = |wanted: &dyn Fn(&GridInfo) -> bool| headers.iter().position(wanted);
     let floats = |header: &GridInfo| kinds != Kinds::Points && Kinds::Floats.take(header);
     let found = match name {
@@ -224,7 +253,7 @@ fn choose(source: &Source<'_>, name: Option<&str>, kinds: Kinds) -> Told<Chosen>
             .or_else(|| first(&|header| kinds.take(header))),
     };
     match found {
-        Some(at) => Ok((at, headers.swap_remove(at))),
+        Some(at) => nth(headers, at).ok_or_else(|| ASTRAY.to_string()),
         None => {
             let list: Vec<String> =
                 headers.iter().map(|header| format!("\"{}\" ({})", header.name, kind_of(header))).collect();
@@ -246,13 +275,13 @@ fn load(source: &mut Source<'_>, chosen: &Chosen, kinds: Kinds) -> Told<AnyGrid>
 }
 
 /// A grid of a file, as OpenVDB reads it.
-fn found(source: &mut Source<'_>, (at, header): &Chosen, kinds: Kinds) -> Told<ffi::Found> {
+fn found(source: &mut Source<'_>, (at, header, unique): &Chosen, kinds: Kinds) -> Told<ffi::Found> {
     if !kinds.take(header) {
         let (name, kind, wanted) = (&header.name, kind_of(header), kinds.words());
         return Err(format!("grid \"{name}\" holds {kind}, but {wanted} are needed"));
     }
     let found = match source {
-        Source::File(name) => ffi::read_grid(name, &header.name),
+        Source::File(name) => ffi::read_grid(name, unique),
         Source::Stored(stored) => ffi::take_stored(stored.pin_mut(), *at),
     };
     found.map_err(|error| cannot_read(&error))

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use super::bridge::ffi;
-use super::grid::{FloatGrid, MetaValue, to_meta};
+use super::grid::{FloatGrid, GridClass, MetaValue, to_meta};
 use super::vectors::{AnyGrid, GridRef};
-use super::{decode, guard, layout};
+use super::{decode, distances, guard, layout};
+use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::hash::Hasher;
 
@@ -194,6 +195,42 @@ pub fn read_named(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
         Some(guard) => guard.read_named(path, name),
         None => decode::read_named(path, name),
     }
+}
+
+/// The float grid of that index in what [`describe`] lists: of several of one name each can be read.
+///
+/// # Errors
+/// As [`read_named`].
+pub fn read_nth(path: &Path, index: usize) -> Result<FloatGrid> {
+    match guard::of(path) {
+        Some(guard) => guard.read_nth(path, index),
+        None => decode::read_nth(path, index),
+    }
+}
+
+/// A level set of a file, as [`read_named`] finds it, with distances in metres: see [`distances::mended`]. What is wrong with its values is
+/// logged, and that there are several grids of its name, of which the first is read.
+///
+/// # Errors
+/// As [`read_named`]; a grid that is no level set, or whose cells are no cubes; cancel.
+pub fn read_level_set(ctx: &Context, path: &Path, name: Option<&str>) -> Result<FloatGrid> {
+    let grid = read_named(path, name)?;
+    let name = grid.name();
+    if grid.class() != GridClass::LevelSet {
+        return Err(Error::file(path, format!("grid \"{name}\" is not a level set")));
+    }
+    if !grid.is_uniform() {
+        return Err(Error::file(path, format!("grid \"{name}\" has cells that are not cubes")));
+    }
+    let count = describe(path)?.iter().filter(|grid| grid.name == name).count();
+    if count > 1 {
+        log::warn!("{}: has {count} grids \"{name}\": the first is read", path.display());
+    }
+    let (grid, what) = distances::mended(ctx, grid)?;
+    if let Some(what) = what {
+        log::warn!("{}: grid \"{name}\" {what}", path.display());
+    }
+    Ok(grid)
 }
 
 /// As [`read_named`], always in this process: for files whose content is known by its hash.

@@ -99,6 +99,14 @@ impl Guard {
         floats(path, self.one(path, name.map_or(Wanted::First, Wanted::Named))?)
     }
 
+    /// As [`super::file::read_nth`].
+    ///
+    /// # Errors
+    /// As [`Guard::describe`].
+    pub fn read_nth(&self, path: &Path, index: usize) -> Result<FloatGrid> {
+        floats(path, self.one(path, Wanted::Nth(&index.to_string()))?)
+    }
+
     /// As [`super::file::read_any`].
     ///
     /// # Errors

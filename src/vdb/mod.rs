@@ -6,6 +6,7 @@
 mod bridge;
 mod child;
 mod decode;
+pub mod distances;
 pub mod file;
 mod grid;
 pub mod guard;

@@ -332,7 +332,7 @@ static void refusals(frz_context *ctx, frz_context *alone, const frz_mesh *mesh)
     q = right, q.now = NULL;
     FAILS(ask(q), FRZ_ERROR_ARGUMENT, "frz_particles");
     q = right, q.now = &nothing;
-    FAILS(ask(q), FRZ_ERROR_ARGUMENT, "no particles");
+    FAILS(ask(q), FRZ_ERROR_ARGUMENT, "there are 0 particles");
     q = right, q.dt = 0;
     FAILS(ask(q), FRZ_ERROR_ARGUMENT, "does not go on in time");
     q = right, q.dt = -DT;

@@ -279,7 +279,7 @@ static void refusals(void) {
     FAILS(frz_tracker_step(ctx, tracker, &first, &first, 0, NULL), FRZ_ERROR_ARGUMENT, "0 s");
     FAILS(frz_tracker_step(ctx, tracker, &first, &first, NAN, NULL), FRZ_ERROR_ARGUMENT, "dt");
     first.positions.count = 0;
-    FAILS(frz_tracker_step(ctx, tracker, &first, &then, DT, NULL), FRZ_ERROR_ARGUMENT, "no particles");
+    FAILS(frz_tracker_step(ctx, tracker, &first, &then, DT, NULL), FRZ_ERROR_ARGUMENT, "there are 0 particles");
     first = of(&frames[0], 1, 1);
     first.ids.count -= 1;
     FAILS(frz_tracker_step(ctx, tracker, &first, &then, DT, NULL), FRZ_ERROR_ARGUMENT, "ids");

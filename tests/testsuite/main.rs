@@ -135,6 +135,7 @@ mod shallow {
 mod surface {
     mod command;
     mod easing;
+    mod empty_frames;
     mod from_particles;
     mod implicit;
     mod made_sets;

@@ -8,7 +8,8 @@ use frazil::{Error, Result};
 
 use super::drawing::{Drawing, Look, View};
 use super::in_order::in_order;
-use super::sources::Sources;
+use super::sources::{Part, Sources};
+use crate::cli::each::Each;
 use crate::cli::exit::{Failure, Phase};
 use crate::cli::progress::FrameProgress;
 use crate::cli::session::Session;
@@ -32,10 +33,10 @@ pub struct Flipbook<'a> {
 
 impl<'a> Flipbook<'a> {
     /// Chooses the camera for some frames, ascending, at least one: it sees all of the first, of one in the middle and of
-    /// the last.
+    /// the last, or of those beside them where one cannot be drawn.
     ///
     /// # Errors
-    /// A file that cannot be read; nothing to draw; cancel.
+    /// No frame that can be drawn; nothing to draw; cancel.
     pub fn open(
         session: &'a Session,
         look: &'a Look,
@@ -45,41 +46,88 @@ impl<'a> Flipbook<'a> {
         let mut places = vec![0, frames.len() / 2, frames.len() - 1];
         places.dedup();
         let mut probe = |place: usize| {
-            let parts = sources.read(&session.ctx, Some(f64::from(frames[place])))?;
+            let frame = Some(f64::from(frames[place]));
+            sources.refuse_missing(frame)?;
+            let parts = sources.read(&session.ctx, frame)?;
             look.build(&session.ctx, parts)
         };
-        let probes = places.into_iter().map(&mut probe).collect::<Result<Vec<_>>>().before()?;
+        let (mut probes, mut looked_at, mut first) = (Vec::new(), Vec::new(), None);
+        for wanted in places {
+            // One that cannot be drawn gives way to the next that can.
+            for place in (wanted..frames.len()).chain((0..wanted).rev()) {
+                if looked_at.contains(&place) {
+                    break;
+                }
+                looked_at.push(place);
+                match probe(place) {
+                    Ok(drawing) => {
+                        probes.push(drawing);
+                        break;
+                    }
+                    Err(error @ (Error::Cancelled | Error::Argument(_) | Error::Memory { .. })) => {
+                        return Err(error).before();
+                    }
+                    Err(error) => _ = first.get_or_insert(error),
+                }
+            }
+        }
+        if let Some(error) = first.filter(|_| probes.is_empty()) {
+            return Err(error).before();
+        }
         let view = look.view(&probes)?;
         Ok(Self { session, look, sources, frames, view, probes })
     }
 
-    /// Writes a PNG file of each frame, in their order, each whole or not at all.
+    /// Writes a PNG file of each frame, in their order, each whole or not at all; one that cannot be made does not cost the others.
     ///
     /// # Errors
-    /// A file that cannot be read or written; cancel: the pictures of the frames before it are there.
-    pub fn pictures(mut self, pattern: &Pattern) -> Result<()> {
+    /// Files that cannot be read or written; cancel: the pictures of the frames before it are there.
+    pub fn pictures(mut self, pattern: &Pattern) -> std::result::Result<(), Failure> {
         self.probes.clear();
-        let paths: Vec<_> = self.frames.iter().map(|frame| pattern.path(*frame)).collect();
-        let write = |place: usize, png: Vec<u8>| atomic::write_bytes(&paths[place], &png);
-        self.draw(|picture| picture.png(), write)
+        let (frames, mut each) = (self.frames.clone(), Each::default());
+        self.draw(
+            |picture| picture.png(),
+            |place, png: Result<Vec<u8>>| {
+                let written = png.and_then(|png| atomic::write_bytes(&pattern.path(frames[place]), &png));
+                each.take(frames[place], written)
+            },
+        )?;
+        each.finish()
     }
 
-    /// Writes a GIF file, whole or not at all, that plays `fps` frames of the shot a second.
+    /// Writes a GIF file, whole or not at all, that plays `fps` frames of the shot a second. For a frame that cannot be drawn the one
+    /// before is shown longer.
     ///
     /// # Errors
-    /// A file that cannot be read or written; cancel.
-    pub fn gif(mut self, path: &Path, fps: f64) -> Result<()> {
-        let palette = self.palette()?;
+    /// Frames that cannot be drawn; a file that cannot be written; cancel.
+    pub fn gif(mut self, path: &Path, fps: f64) -> std::result::Result<(), Failure> {
+        let palette = self.palette().during()?;
         self.probes.clear();
-        let (delays, size, ctx) = (delays(&self.frames, fps), self.view.size, &self.session.ctx);
+        let (delays, size) = (delays(&self.frames, fps), self.view.size);
+        let (frames, session, mut each) = (self.frames.clone(), self.session, Each::default());
         // The first error of a frame, kept apart so that it is not reported as one of writing.
         let mut ended = None;
         let written = atomic::write(path, |out| {
             let mut gif = Gif::new(out, size, &palette)?;
-            let add = |place: usize, indices: Vec<u8>| {
-                gif.add(indices, delays[place]).map_err(|error| Error::io(path, "write", error))
+            let (mut shown, mut waiting): (Option<Vec<u8>>, u16) = (None, 0);
+            let add = |place: usize, indices: Result<Vec<u8>>| -> std::result::Result<Option<()>, Failure> {
+                let mut delay = delays[place];
+                match each.take(frames[place], indices)? {
+                    Some(indices) => {
+                        delay = delay.saturating_add(std::mem::take(&mut waiting));
+                        shown = Some(indices);
+                    }
+                    None if shown.is_none() => {
+                        waiting = waiting.saturating_add(delay);
+                        return Ok(None);
+                    }
+                    None => {}
+                }
+                let indices = shown.clone().unwrap_or_default();
+                gif.add(indices, delay).map_err(|error| Failure::failed(Error::io(path, "write", error)))?;
+                Ok(Some(()))
             };
-            match self.draw(|picture| Ok(palette.indices(ctx, &picture)), add) {
+            match self.draw(|picture| Ok(palette.indices(&session.ctx, &picture)), add) {
                 Ok(()) => gif.finish(),
                 Err(error) => {
                     ended = Some(error);
@@ -87,29 +135,48 @@ impl<'a> Flipbook<'a> {
                 }
             }
         });
-        ended.map_or(written, Err)
+        match ended {
+            Some(error) => Err(error),
+            None => written.during().and_then(|()| each.finish()),
+        }
     }
 
-    /// Draws the frames, several at once: `finish` makes of each picture what `take` then gets in the order of the frames.
+    /// Draws the frames, several at once: `finish` makes of each picture what `take` then gets in the order of the frames, or what
+    /// went wrong with it; what `take` fails with ends the work.
     fn draw<T: Send>(
         &mut self,
         finish: impl Fn(Picture) -> Result<T> + Sync,
-        mut take: impl FnMut(usize, T) -> Result<()>,
-    ) -> Result<()> {
+        mut take: impl FnMut(usize, Result<T>) -> std::result::Result<Option<()>, Failure>,
+    ) -> std::result::Result<(), Failure> {
         let Self { session, look, sources, frames, view, .. } = self;
         let ctx = &session.ctx;
-        let read = |place: usize| {
+        let read = |place: usize| -> Result<Result<Vec<Part>>> {
             ctx.check()?;
-            sources.read(ctx, Some(f64::from(frames[place])))
+            // What is wrong with a frame is its own result.
+            let frame = Some(f64::from(frames[place]));
+            Ok(sources.refuse_missing(frame).and_then(|()| sources.read(ctx, frame)))
         };
-        let make = |_, parts| finish(view.draw(ctx, &look.build(ctx, parts)?)?);
+        let make = |_, parts: Result<_>| {
+            Ok(parts.and_then(|parts| finish(view.draw(ctx, &look.build(ctx, parts)?)?)))
+        };
         let mut progress = FrameProgress::new(ctx, frames.len(), 0, session.is_quiet());
         let at_once = ctx.pool().threads().min(MOST_AT_ONCE);
-        in_order(frames.len(), at_once, read, make, |place, made| {
-            take(place, made)?;
-            progress.finished("picture", frames[place]);
-            Ok(())
-        })
+        let mut ended = None;
+        let done = in_order(frames.len(), at_once, read, make, |place, made| match take(place, made) {
+            Ok(Some(())) => {
+                progress.finished("picture", frames[place]);
+                Ok(())
+            }
+            Ok(None) => Ok(()),
+            Err(failure) => {
+                ended = Some(failure);
+                Err(Error::Cancelled)
+            }
+        });
+        match ended {
+            Some(failure) => Err(failure),
+            None => done.during(),
+        }
     }
 
     /// Colours for all frames, from small pictures of some.

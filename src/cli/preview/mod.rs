@@ -128,12 +128,10 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
     job.check(&sources).before()?;
     match job {
         Job::Still(frame, path) => still(session, &look, sources, frame, &path),
-        Job::Pictures(frames, pattern) => {
-            Flipbook::open(session, &look, sources, frames)?.pictures(&pattern).during()
-        }
+        Job::Pictures(frames, pattern) => Flipbook::open(session, &look, sources, frames)?.pictures(&pattern),
         Job::Gif(frames, path) => {
             let fps = sources.fps().before()?;
-            Flipbook::open(session, &look, sources, frames)?.gif(&path, fps).during()
+            Flipbook::open(session, &look, sources, frames)?.gif(&path, fps)
         }
     }
 }
@@ -228,7 +226,7 @@ impl Args {
 }
 
 impl Job {
-    /// Refuses frames that are not there, and a folder that takes no pictures.
+    /// Refuses frames that a shot does not have, to draw where no frame of a sequence is there, and a folder that takes no pictures.
     fn check(&self, sources: &Sources) -> frazil::Result<()> {
         let (first, frames) = match self {
             Self::Still(frame, path) => (path.clone(), vec![*frame]),
@@ -236,7 +234,9 @@ impl Job {
             Self::Gif(frames, path) => (path.clone(), some(frames)),
         };
         output::check_writable(&first)?;
-        frames.into_iter().try_for_each(|frame| sources.refuse_missing(frame))
+        frames.iter().try_for_each(|frame| sources.refuse_beyond(*frame))?;
+        let missing = frames.into_iter().map(|frame| sources.refuse_missing(frame));
+        missing.reduce(|first, next| if next.is_ok() { next } else { first }).unwrap_or(Ok(()))
     }
 }
 

@@ -129,6 +129,15 @@ impl Sources {
         self.all.iter().try_for_each(|source| source.refuse_missing(frame))
     }
 
+    /// As [`Sources::refuse_missing`], of shots alone: a sequence may have gaps.
+    ///
+    /// # Errors
+    /// Which.
+    pub fn refuse_beyond(&self, frame: Option<f64>) -> Result<()> {
+        let shots = self.all.iter().filter(|source| !matches!(source, Source::Sequence(_)));
+        shots.into_iter().try_for_each(|source| source.refuse_missing(frame))
+    }
+
     /// Reads what is drawn at a frame; a shot's frames in ascending order cost one file each.
     ///
     /// # Errors
@@ -233,7 +242,7 @@ fn of_file(path: &Path, clip: Option<&str>, frame: Option<f64>, fps: f64) -> Res
             let play = Play { clip: clip.map(String::from), ..Play::default() };
             bare(Character::posed(path, play, (frame.unwrap_or(1.0) - 1.0) / fps)?)
         }
-        _ => io::mesh::read_detailed(path)?.without_unused(),
+        _ => io::mesh::read_any(path)?.into_detailed().without_unused(),
     };
     Ok(vec![Part::Mesh(mesh)])
 }

@@ -1,9 +1,9 @@
 //! `frazil vdb union`, `difference`, `intersection`.
 
-use super::{VdbOutput, read_level_set};
+use super::VdbOutput;
 use crate::cli::exit::{Failure, Phase};
 use crate::cli::session::Session;
-use frazil::vdb::{FloatGrid, level_set};
+use frazil::vdb::{FloatGrid, file, level_set};
 use frazil::{Context, Result};
 use std::path::PathBuf;
 
@@ -69,8 +69,8 @@ fn combine(
     operation: impl FnOnce(&Context, &mut FloatGrid, FloatGrid) -> Result<()> + Send,
 ) -> std::result::Result<(), Failure> {
     operands.output.check(&[&operands.a, &operands.b])?;
-    let mut a = read_level_set(&operands.a, operands.grid_a.as_deref()).before()?;
-    let b = read_level_set(&operands.b, operands.grid_b.as_deref()).before()?;
+    let mut a = file::read_level_set(&session.ctx, &operands.a, operands.grid_a.as_deref()).before()?;
+    let b = file::read_level_set(&session.ctx, &operands.b, operands.grid_b.as_deref()).before()?;
     session.ctx.phase(phase, || operation(&session.ctx, &mut a, b)).during()?;
     operands.output.write(session, a).during()
 }

@@ -1,10 +1,11 @@
 //! `frazil vdb displace`.
 
-use super::{VdbOutput, read_level_set};
+use super::VdbOutput;
 use crate::cli::exit::{Failure, Phase};
 use crate::cli::session::Session;
 use frazil::snow::NoiseParams;
 use frazil::snow::base_layer::displace;
+use frazil::vdb::file;
 use std::path::PathBuf;
 
 /// Displace a level set's surface outward by noise, never inward
@@ -35,7 +36,7 @@ pub struct Args {
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     args.output.check(&[&args.input])?;
-    let mut grid = read_level_set(&args.input, args.grid.as_deref()).before()?;
+    let mut grid = file::read_level_set(&session.ctx, &args.input, args.grid.as_deref()).before()?;
     let defaults = NoiseParams::for_cell(grid.voxel_size());
     let amplitude = args.amplitude.unwrap_or(defaults.amplitude);
     let size = args.size.unwrap_or(defaults.size);

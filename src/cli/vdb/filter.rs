@@ -1,10 +1,11 @@
 //! `frazil vdb offset` and `smooth`.
 
-use super::{VdbOutput, read_level_set};
+use super::VdbOutput;
 use crate::cli::exit::{Failure, Phase};
 use crate::cli::options::finite;
 use crate::cli::session::Session;
 use clap::ValueEnum;
+use frazil::vdb::file;
 use frazil::vdb::level_set::{self, Scheme};
 use std::path::PathBuf;
 
@@ -79,7 +80,7 @@ enum Filter {
 pub fn offset(args: &OffsetArgs, session: &Session) -> Result<(), Failure> {
     let source = &args.source;
     source.output.check(&[&source.input])?;
-    let mut grid = read_level_set(&source.input, source.grid.as_deref()).before()?;
+    let mut grid = file::read_level_set(&session.ctx, &source.input, source.grid.as_deref()).before()?;
     let cells = args.by.abs() / grid.voxel_size();
     if cells > 1000.0 {
         return Err(Failure::refused(format!(
@@ -109,7 +110,7 @@ pub fn offset(args: &OffsetArgs, session: &Session) -> Result<(), Failure> {
 pub fn smooth(args: &SmoothArgs, session: &Session) -> Result<(), Failure> {
     let source = &args.source;
     source.output.check(&[&source.input])?;
-    let mut grid = read_level_set(&source.input, source.grid.as_deref()).before()?;
+    let mut grid = file::read_level_set(&session.ctx, &source.input, source.grid.as_deref()).before()?;
     let (width, times, scheme) =
         (args.width, args.times, source.scheme.unwrap_or(SchemeName::FirstOrder).into());
     let work = || match args.filter {

@@ -4,16 +4,24 @@ use std::path::Path;
 
 use frazil::Context;
 use frazil::scene::{changes_since, partial};
-use frazil::vdb::{MetaValue, file, level_set, points};
+use frazil::vdb::{MetaValue, distances, file, level_set, points};
 use serde_json::{Map, Value, json};
 
 /// A .vdb file's grids: what they are, and on request the area and volume of level sets.
 pub fn grids(path: &Path, measure: bool, ctx: &Context) -> frazil::Result<Vec<Value>> {
     let mut out = Vec::new();
-    for grid in file::describe(path)? {
+    let grids = file::describe(path)?;
+    for (index, grid) in grids.iter().enumerate() {
+        let same = |other: &&file::GridInfo| other.name == grid.name;
+        let (count, before) = (grids.iter().filter(same).count(), grids[..index].iter().filter(same).count());
         let mut entry = Map::new();
         let mut set = |key: &str, value: Value| entry.insert(key.into(), value);
         set("name", json!(grid.name));
+        if count > 1 {
+            let which =
+                format!("{} of {count} of this name; commands that take a name read the first", before + 1);
+            set("namesakes", json!(which));
+        }
         set("type", json!(grid.value_type));
         set("class", json!(grid.class));
         set("voxel_m", json!(grid.voxel));
@@ -23,7 +31,12 @@ pub fn grids(path: &Path, measure: bool, ctx: &Context) -> frazil::Result<Vec<Va
         set("half", json!(grid.half));
         set("compression", json!(grid.compression));
         if measure && grid.class == "level set" {
-            let size = level_set::measure(ctx, &file::read_named(path, Some(&grid.name))?)?;
+            let (own, what) = distances::mended(ctx, file::read_nth(path, index)?)?;
+            let size = level_set::measure(ctx, &own)?;
+            if let Some(what) = what {
+                log::warn!("{}: grid \"{}\" {what}", path.display(), grid.name);
+            }
+            let mut set = |key: &str, value: Value| entry.insert(key.into(), value);
             set("area_m2", json!(size.area));
             set("volume_m3", json!(size.volume));
         }

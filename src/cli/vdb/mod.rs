@@ -18,8 +18,8 @@ use clap::{Subcommand, ValueEnum};
 use frazil::base::TriMesh;
 use frazil::base::mesh::{BY_OPTION, too_far};
 use frazil::sweep::surface_bytes;
+use frazil::vdb::FloatGrid;
 use frazil::vdb::file::{self, Compression, WriteOptions};
-use frazil::vdb::{FloatGrid, GridClass};
 use frazil::{Error, Result};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -141,18 +141,6 @@ fn check_name(path: &Path, extensions: &[&str]) -> std::result::Result<(), Failu
     }
     let wanted: Vec<String> = extensions.iter().map(|name| format!(".{name}")).collect();
     Err(Failure::refused(format!("{}: the output must be a {} file", path.display(), wanted.join(" or "))))
-}
-
-/// Reads a level set: the grid of that name, else the first one.
-fn read_level_set(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
-    let grid = file::read_named(path, name)?;
-    if grid.class() != GridClass::LevelSet {
-        return Err(Error::file(path, format!("grid \"{}\" is not a level set", grid.name())));
-    }
-    if !grid.is_uniform() {
-        return Err(Error::file(path, format!("grid \"{}\" has cells that are not cubes", grid.name())));
-    }
-    Ok(grid)
 }
 
 /// The message for a mesh so far away (m) that its file's 32-bit positions are coarse compared with a cell (m).

@@ -1,11 +1,11 @@
 //! `frazil vdb to-mesh`.
 
-use super::{check_name, read_level_set};
+use super::check_name;
 use crate::cli::exit::{Failure, Phase};
 use crate::cli::options::finite;
 use crate::cli::output;
 use crate::cli::session::Session;
-use frazil::vdb::level_set;
+use frazil::vdb::{file, level_set};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -37,7 +37,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     check_name(&args.output, &["ply", "obj", "stl"])?;
     output::check_writable(&args.output).before()?;
     output::refuse_input(&args.output, [args.input.as_path()]).before()?;
-    let grid = read_level_set(&args.input, args.grid.as_deref()).before()?;
+    let grid = file::read_level_set(&session.ctx, &args.input, args.grid.as_deref()).before()?;
     if args.iso.abs() >= f64::from(grid.background()) {
         let band = grid.background();
         return Err(Failure::refused(format!("--iso {} lies outside the band of {band} m", args.iso)));

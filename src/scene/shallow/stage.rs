@@ -246,6 +246,10 @@ impl<'a> Stepping for Liquid<'a> {
         Ok(())
     }
 
+    fn writes_alone(&self) -> bool {
+        true
+    }
+
     fn write(&self, _writer: &mut (), step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
         let (Some(Written { drawn, state, volume, terrain }), Some(files)) = (step.0, files) else {
             return Ok(());

@@ -16,6 +16,8 @@ use crate::error::{Error, Result};
 use crate::io::manifest::{Keeps, Manifest};
 use crate::io::{atomic, sealed};
 
+/// So many frames on end that cannot be written are no accident of one name, but a disk that is full or gone.
+const FAILURES: usize = 3;
 /// Steps that wait for the writer at most: a step's changes are a few MB.
 const WAITING: usize = 2;
 /// Exact states that are kept of a stage that no other one reads, where its own files are not enough to resume from.
@@ -204,10 +206,14 @@ struct Files<'a, S> {
 }
 
 impl<S: Stepping> Files<'_, S> {
-    /// Writes until there is no more work or a file fails; gives the records of what was written besides.
+    /// Writes until there is no more work or a file fails, of a stage whose frames are written alone [`FAILURES`] frames on end; gives the
+    /// records of what was written besides.
     fn write_all(&self, waiting: Receiver<Job<S>>, done: Done<'_>) -> (Vec<Manifest>, Result<()>) {
         let mut manifests = Vec::new();
         let mut writer = None;
+        // The first error, and how many frames on end could not be written.
+        let (mut failed, mut on_end): (Option<Error>, usize) = (None, 0);
+        let goes_on = self.stage.writes_alone() && self.stage.needs_every_frame().is_none();
         for job in waiting {
             let frame = match job {
                 Job::Start(start) => {
@@ -219,12 +225,21 @@ impl<S: Stepping> Files<'_, S> {
             let Some(writer) = &mut writer else {
                 return (manifests, Err(Error::Internal("a step came before its start".into())));
             };
+            let number = frame.frame;
             match self.write(writer, *frame, done) {
-                Ok(manifest) => manifests.extend(manifest),
-                Err(error) => return (manifests, Err(error)),
+                Ok(manifest) => {
+                    manifests.extend(manifest);
+                    on_end = 0;
+                }
+                Err(error @ Error::Io { .. }) if goes_on && on_end + 1 < FAILURES => {
+                    log::warn!("frame {number} is not written: {error}");
+                    failed.get_or_insert(error);
+                    on_end += 1;
+                }
+                Err(error) => return (manifests, Err(failed.unwrap_or(error))),
             }
         }
-        (manifests, Ok(()))
+        (manifests, failed.map_or(Ok(()), Err))
     }
 
     /// Writes a frame, or passes through it.

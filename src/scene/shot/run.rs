@@ -274,11 +274,25 @@ impl<'a> Run<'a> {
     /// Makes the frames, and calls `done` with the stage, the frame and its report when the files of one are written; from
     /// several threads where stages do not depend on each other.
     ///
+    /// Where a stage fails, those that need nothing of it are made all the same.
+    ///
     /// # Errors
-    /// What a step or a file reports; whole frames are left behind, from which another run resumes.
+    /// What the first step or file that fails reports; whole frames are left behind, from which another run resumes.
     pub fn make(mut self, ctx: &Context, done: impl Fn(&'static str, i32, &Report) + Sync) -> Result<()> {
+        let mut failed = None;
         while let Some(ready) = self.ready() {
-            self.make_stages(ctx, &ready, &done)?;
+            let results = self.make_stages(ctx, &ready, &done)?;
+            for (place, result) in ready.into_iter().zip(results) {
+                let Err(error) = result else { continue };
+                if matches!(error, Error::Cancelled) {
+                    return Err(error);
+                }
+                self.abandon(place, &error);
+                failed.get_or_insert(error);
+            }
+        }
+        if let Some(error) = failed {
+            return Err(error);
         }
         if self.plan.scene.output.usd {
             let folder = self.own.folder().to_path_buf();
@@ -299,13 +313,25 @@ impl<'a> Run<'a> {
         (!ready.is_empty()).then_some(ready)
     }
 
-    /// Makes the frames of some stages, side by side.
+    /// Gives up the stages downstream of one that failed.
+    fn abandon(&mut self, place: usize, error: &Error) {
+        let gone = self.plan.downstream(&[place]);
+        let goes_on =
+            self.stages.iter().enumerate().any(|(n, run)| !gone.contains(&n) && !run.todo.is_empty());
+        if goes_on {
+            let name = self.stages[place].stage.name();
+            log::warn!("stage {name} ends: {error}; stages that need nothing of it go on");
+        }
+        gone.into_iter().for_each(|n| self.stages[n].todo.clear());
+    }
+
+    /// Makes the frames of some stages, side by side; how each went.
     fn make_stages(
         &mut self,
         ctx: &Context,
         ready: &[usize],
         done: &(dyn Fn(&'static str, i32, &Report) + Sync),
-    ) -> Result<()> {
+    ) -> Result<Vec<Result<()>>> {
         let stop = AtomicBool::new(false);
         let shared = Shared { ctx, first: self.plan.scene.shot.frames.first, stop: &stop, done };
         let folder = self.own.folder().to_path_buf();
@@ -315,7 +341,7 @@ impl<'a> Run<'a> {
             .collect::<Result<_>>()?;
         let plan = self.plan;
         let runs = self.stages.iter_mut().enumerate().filter(|(place, _)| ready.contains(place));
-        let results: Vec<Result<()>> = std::thread::scope(|scope| {
+        Ok(std::thread::scope(|scope| {
             let threads: Vec<_> = runs
                 .zip(&upstream)
                 .map(|((_, run), upstream)| {
@@ -323,7 +349,7 @@ impl<'a> Run<'a> {
                     scope.spawn(move || {
                         let stop = StopOthers(shared.stop);
                         let result = run.make(&shared, upstream, every_state);
-                        if result.is_ok() {
+                        if !matches!(result, Err(Error::Cancelled)) {
                             std::mem::forget(stop);
                         }
                         result
@@ -333,12 +359,11 @@ impl<'a> Run<'a> {
             let joined =
                 |thread: ScopedJoinHandle<'_, _>| thread.join().unwrap_or_else(|why| resume_unwind(why));
             threads.into_iter().map(joined).collect()
-        });
-        results.into_iter().collect()
+        }))
     }
 }
 
-/// Stops the passes beside one that fails, also by a panic, after their frame.
+/// Stops the passes beside one that is cancelled, or ends by a panic, after their frame.
 struct StopOthers<'a>(&'a AtomicBool);
 
 impl Drop for StopOthers<'_> {
@@ -383,9 +408,7 @@ fn lock(folder: &Path) -> Result<File> {
     let file = File::options().create(true).append(true).open(&path);
     let file = file.map_err(|error| Error::io(&path, "write", error))?;
     match file.try_lock() {
-        Err(std::fs::TryLockError::WouldBlock) => {
-            Err(Error::file(folder, "another run writes into this folder: wait for it, or choose another -o"))
-        }
+        Err(std::fs::TryLockError::WouldBlock) => Err(Error::Busy(folder.to_path_buf())),
         // A file system without locks is no reason to stop.
         Err(std::fs::TryLockError::Error(error)) => {
             let why = Error::io(&path, "lock", error);

@@ -150,6 +150,11 @@ pub trait Stepping: Stage {
     /// What copying the state reports.
     fn writer(&self, ctx: &Context, state: &Self::State) -> Result<Self::Writer>;
 
+    /// Whether a frame whose files cannot be written leaves the writer as it was: those after it are then written all the same.
+    fn writes_alone(&self) -> bool {
+        false
+    }
+
     /// Writes what a step made; without `files` the frame is passed through only.
     ///
     /// # Errors

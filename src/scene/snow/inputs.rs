@@ -19,7 +19,7 @@ use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Ri
 use crate::scene::{Ground, Layer, Object, Role, Scene, Snow, text};
 use crate::snow::base_layer::initial::{self, Cover};
 use crate::sweep::{self, Body, REACH};
-use crate::vdb::{FloatGrid, GridClass, VectorGrid, file};
+use crate::vdb::{FloatGrid, GridClass, VectorGrid, distances, file};
 
 /// Half width of the snow's narrow band (cells).
 const HALF_WIDTH: f32 = 3.0;
@@ -363,6 +363,9 @@ fn layer_grid(path: &Path, cell: f64, seen: &Seen) -> Result<FloatGrid> {
     let own = grid.voxel_size();
     if (own - cell).abs() > 1e-6 * cell {
         return Err(Error::file(path, format!("the layer has cells of {own} m, but `cell` is {cell} m")));
+    }
+    if let Some(what) = distances::warning(&grid)? {
+        return Err(Error::file(path, format!("grid \"{}\" {what}", grid.name())));
     }
     if f64::from(grid.background()) < 2.999 * own {
         return Err(Error::file(path, "the layer's narrow band is less than 3 cells wide"));

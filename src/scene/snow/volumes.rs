@@ -326,6 +326,10 @@ impl Stepping for Volumes<'_> {
         Ok(())
     }
 
+    fn writes_alone(&self) -> bool {
+        true
+    }
+
     fn write(&self, _writer: &mut (), step: Files, files: Option<&mut FrameFiles>) -> Result<()> {
         let Some(files) = files else { return Ok(()) };
         step.into_iter().try_for_each(|(kind, extension, bytes)| files.save(kind, extension, &bytes))

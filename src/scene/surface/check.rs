@@ -13,7 +13,7 @@ use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::scene::{Scene, Value};
-use crate::surface::Particles;
+use crate::surface::{Particles, disagreement};
 
 /// What a scene will do.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -24,7 +24,7 @@ pub struct Report {
     pub fps: f64,
     /// Count of files of particles.
     pub files: usize,
-    /// Least and greatest count of particles in a file.
+    /// Least and greatest count of particles in a file; there may be none.
     pub particles: [usize; 2],
     /// Whether they have ids, and velocities, in all files.
     pub has_ids: bool,
@@ -74,24 +74,37 @@ const LONG_EDGE: f64 = 2.0;
 /// Checks a scene whose inputs are open.
 ///
 /// # Errors
-/// A file that cannot be read, or that has no particles; cancel.
+/// A file that cannot be read; cancel.
 pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let (surface, shot) = (scene.surface()?, scene.shot);
     let mut warnings = inputs.warnings.clone();
-    let (mut low, mut high) = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
+    let mut bounds: Option<[DVec3; 2]> = None;
     let (mut least, mut most) = (usize::MAX, 0);
     let (mut has_ids, mut has_velocities) = (true, true);
     let files = all_files(scene, surface);
+    let (mut before, mut is_told): (Option<Particles>, bool) = (None, false);
     let mut most_bytes = Most::default();
     for path in &files {
         ctx.check()?;
         let particles = read(path, surface, &inputs.seen)?;
         ctx.pool().install(|| most_bytes.add(&particles, inputs.spacing, surface.cell));
-        let Particles { places, velocities, ids } = particles;
+        if let Some(before) = before.take().filter(|_| !is_told) {
+            // Where particles go is not known without ids and velocities: that is told below.
+            let compared = || disagreement(&before, &particles, 1.0 / shot.fps, inputs.spacing);
+            if let Ok(Some(what)) = ctx.pool().install(compared) {
+                warnings.push(format!("{}: {what}", path.display()));
+                is_told = true;
+            }
+        }
+        let Particles { places, velocities, ids } = &particles;
         (least, most) = (least.min(places.len()), most.max(places.len()));
-        has_ids &= !ids.is_empty();
-        has_velocities &= !velocities.is_empty();
-        (low, high) = places.iter().fold((low, high), |(low, high), p| (low.inf(p), high.sup(p)));
+        has_ids &= !ids.is_empty() || places.is_empty();
+        has_velocities &= !velocities.is_empty() || places.is_empty();
+        bounds = places.iter().fold(bounds, |bounds, p| {
+            let [low, high] = bounds.unwrap_or([*p; 2]);
+            Some([low.inf(p), high.sup(p)])
+        });
+        before = Some(particles);
     }
     let mesh = &inputs.mesh.mesh;
     let (from, to) = mesh.bounds().unwrap_or_default();
@@ -125,7 +138,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         particles: [least, most],
         has_ids,
         has_velocities,
-        particles_bounds_m: [low.into(), high.into()],
+        particles_bounds_m: bounds.unwrap_or_default().map(Into::into),
         spacing_m: spacing,
         vertices: mesh.positions.len(),
         triangles: mesh.triangles.len(),

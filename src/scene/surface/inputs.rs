@@ -28,13 +28,15 @@ const ODD: f64 = 2.0;
 
 /// What a scene's files hold.
 pub struct Inputs {
-    /// The mesh at the first frame (m), with what it carries.
+    /// The mesh at the first frame that has particles (m), with what it carries.
     pub mesh: Arc<DetailedMesh>,
     /// Share of each vertex' detail that never fades; empty: none.
     pub(super) lasting: Vec<f32>,
     /// Initial distance between particles (m).
     pub spacing: f64,
-    /// The particles at the first frame: how many there are, and how they are told apart.
+    /// The first frame of the shot that has particles; those before it have no mesh.
+    pub begins: i32,
+    /// The particles at that frame: how many there are, and how they are told apart.
     pub particles: Particles,
     /// Frames at which an edited mesh takes the place of the tracked one, ascending.
     pub(super) sculpts: Vec<i32>,
@@ -45,8 +47,8 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// Reads the mesh and the first frame's particles, after checking that no file of any frame is missing; edited meshes of later
-    /// frames are looked at, and read again when their frames come.
+    /// Reads the mesh and the particles of the first frame that has any, and sees whether a file of a later frame is missing, which is
+    /// warned of: frames before it can be made. Edited meshes of later frames are looked at, and read again when their frames come.
     ///
     /// # Errors
     /// What the files or keys have wrong, with file and key; cancel.
@@ -56,20 +58,23 @@ impl Inputs {
             let what = "is one file, which never moves: a shot needs a sequence such as spot.%04d.bgeo";
             return Err(Error::file(&surface.particles, what));
         }
-        for path in all_files(scene, surface) {
-            source::open(&path)?;
-        }
         let sculpts = sculpts::frames(surface, shot.frames)?;
         let seen = Arc::new(Seen::default());
-        let first = surface.files_at(shot.frames, shot.frames.first).swap_remove(0);
-        let time = surface.time(shot.frames, shot.frames.first);
-        let particles = Particles::clone(&*Liquid::new(surface, shot, &seen).at(time)?);
+        let (begins, particles) = first_particles(ctx, scene, surface, &seen)?;
+        let first = surface.files_at(shot.frames, begins).swap_remove(0);
         if particles.ids.is_empty() && particles.velocities.is_empty() && shot.frames.count() > 1 {
             let what =
                 "has neither ids nor velocities (attributes id and v): where its particles go is not known";
             return Err(Error::file(first, what));
         }
-        let mut warnings = Vec::new();
+        let mut warnings: Vec<String> = missing(scene, surface).into_iter().collect();
+        if begins > shot.frames.first {
+            warnings.push(format!(
+                "frames {} to {} have no particles, and get empty meshes: the mesh is that of frame {begins}",
+                shot.frames.first,
+                begins - 1
+            ));
+        }
         if surface.every && !surface.rebuild {
             warnings.push(r#"surface.match = "every" does nothing where surface.rebuild is false"#.into());
         }
@@ -114,6 +119,9 @@ impl Inputs {
                 DetailedMesh { mesh, ..DetailedMesh::default() }
             }
         };
+        if surface.mesh.is_some() {
+            warnings.extend(odd_size(&mesh.mesh, particles.places.len(), spacing));
+        }
         let fades = surface.half_life.is_some() || surface.fade != 0.0;
         let lasting = match &surface.mesh {
             Some(path) if fades => lasting(&mesh).map_err(|what| Error::file(path, what))?,
@@ -122,7 +130,8 @@ impl Inputs {
             _ => Vec::new(),
         };
         mesh.arrays.retain(|array| !REPLACED.contains(&&*array.name));
-        let mut inputs = Self { mesh: Arc::new(mesh), lasting, spacing, particles, sculpts, seen, warnings };
+        let mesh = Arc::new(mesh);
+        let mut inputs = Self { mesh, lasting, spacing, begins, particles, sculpts, seen, warnings };
         let of_sculpts = sculpts::check(ctx, surface, &inputs)?;
         inputs.warnings.extend(of_sculpts);
         inputs.warnings.iter().for_each(|warning| log::warn!("{warning}"));
@@ -174,6 +183,51 @@ pub(super) fn all_files(scene: &Scene, surface: &Surface) -> Vec<PathBuf> {
     let frames = scene.shot.frames;
     let [from, to] = [frames.first, frames.last].map(|frame| surface.time(frames, frame));
     surface.files(from, to)
+}
+
+/// That a closed mesh holds much less, or more, than so many particles of a spacing (m), in a sentence. The particles' own surface lies half
+/// a spacing above the outermost ones: of thin sheets and small drops it holds more than they are.
+fn odd_size(mesh: &TriMesh, particles: usize, spacing: f64) -> Option<String> {
+    let (own, liquid) = (mesh.volume(), particles as f64 * spacing.powi(3));
+    let is_odd = own < liquid / ODD || own > ODD * liquid + mesh.area() * spacing;
+    (mesh.is_closed() && is_odd).then(|| {
+        format!(
+            "the mesh holds {own:.4} m3, and the first frame's {particles} particles {liquid:.4} m3: are both in the same unit?"
+        )
+    })
+}
+
+/// The first frame of the shot that has particles, and these.
+///
+/// # Errors
+/// A file that cannot be read up to there; none of the shot has any; cancel.
+fn first_particles(ctx: &Context, scene: &Scene, surface: &Surface, seen: &Seen) -> Result<(i32, Particles)> {
+    let frames = scene.shot.frames;
+    let mut liquid = Liquid::new(surface, scene.shot, seen);
+    for frame in frames.first..=frames.last {
+        ctx.check()?;
+        let particles = liquid.at(surface.time(frames, frame))?;
+        if !particles.places.is_empty() {
+            return Ok((frame, Particles::clone(&particles)));
+        }
+    }
+    let what = match frames.count() {
+        1 => "holds no particles".into(),
+        _ => format!("holds no particles at any frame of the shot, {frames}"),
+    };
+    Err(Error::file(&surface.particles, what))
+}
+
+/// Which file of the shot is missing, and which frames can therefore not be made, in a sentence.
+fn missing(scene: &Scene, surface: &Surface) -> Option<String> {
+    let frames = scene.shot.frames;
+    let lacks = |frame: i32| {
+        let before = frame.saturating_sub(1).max(frames.first);
+        let files = surface.files(surface.time(frames, before), surface.time(frames, frame));
+        files.into_iter().find_map(|path| Some((frame, source::open(&path).err()?)))
+    };
+    let (frame, error) = (frames.first..=frames.last).find_map(lacks)?;
+    Some(format!("{error}: frame {frame} and those after it cannot be made"))
 }
 
 /// The particles' own surface.

@@ -41,7 +41,7 @@ pub fn read_cloud(path: &Path, seen: &Seen) -> Result<Cloud> {
 /// The particles of a file (m, m/s).
 ///
 /// # Errors
-/// As [`read_cloud`]; no particles, values that are not finite, two particles with one id.
+/// As [`read_cloud`]; values that are not finite, two particles with one id.
 pub(super) fn read(path: &Path, surface: &Surface, seen: &Seen) -> Result<Particles> {
     let cloud = read_cloud(path, seen)?;
     let named = |names: &'static [&str]| {

@@ -19,7 +19,7 @@ pub(super) fn told(report: &StepReport, particles: usize, tracker: &Tracker, is_
         .map(|apart| json!({ "at_m": <[f64; 3]>::from(apart.place), "volume_m3": apart.volume }))
         .collect();
     let changed = |number: fn(&Change) -> usize| report.change.as_ref().map_or(0, number);
-    let serde_json::Value::Object(results) = json!({
+    let serde_json::Value::Object(mut results) = json!({
         "particles": particles,
         "born": report.born,
         "died": report.died,
@@ -47,5 +47,8 @@ pub(super) fn told(report: &StepReport, particles: usize, tracker: &Tracker, is_
     }) else {
         unreachable!("it is written as an object")
     };
+    if !report.warnings.is_empty() {
+        results.insert("warnings".into(), json!(report.warnings));
+    }
     Report { results, phases: report.phases.clone() }
 }

@@ -44,6 +44,21 @@ struct Written {
     state: Vec<u8>,
 }
 
+impl Written {
+    /// Of a frame without particles.
+    fn nothing(carried: &DetailedMesh, state: Vec<u8>) -> Self {
+        Self {
+            places: Vec::new(),
+            triangles: Vec::new(),
+            detail: Some(Arc::new(carried.emptied())),
+            velocities: Vec::new(),
+            delta: Vec::new(),
+            flags: Vec::new(),
+            state,
+        }
+    }
+}
+
 impl<'a> Track<'a> {
     /// The stage for a scene.
     pub fn new(scene: &'a Scene, surface: &'a Surface, inputs: &'a Inputs) -> Self {
@@ -160,22 +175,34 @@ impl<'a> Stepping for Track<'a> {
 
     fn step(&self, ctx: &Context, walk: &mut Walk<'a>, to: &To<'_>) -> Result<Stepped<Step>> {
         walk.go(ctx, to.frame)?;
-        let At { tracker, detail, report, source, .. } = walk.now();
-        let shown = to.made_from.map(|_| walk.shown(ctx)).transpose()?;
-        let step = shown.map(|(places, velocities)| Written {
-            places: usd::to_floats(&places),
-            triangles: tracker.triangles().to_vec(),
-            detail: detail.clone(),
-            velocities,
-            delta: tracker.delta().to_vec(),
-            flags: tracker.flags().to_vec(),
-            state: kept::save(tracker, detail.as_deref().unwrap_or(&self.inputs.mesh), source.sculpted),
-        });
+        let At { tracker, detail, report, source, is_dry, .. } = walk.now();
+        let written = || {
+            let carried = detail.as_deref().unwrap_or(&self.inputs.mesh);
+            let state = kept::save(tracker, carried, source.sculpted);
+            if *is_dry {
+                return Ok(Written::nothing(carried, state));
+            }
+            let (places, velocities) = walk.shown(ctx)?;
+            Ok(Written {
+                places: usd::to_floats(&places),
+                triangles: tracker.triangles().to_vec(),
+                detail: detail.clone(),
+                velocities,
+                delta: tracker.delta().to_vec(),
+                flags: tracker.flags().to_vec(),
+                state,
+            })
+        };
+        let step = to.made_from.map(|_| written()).transpose()?;
         Ok(Stepped { step: Step(step), report: report.clone() })
     }
 
     fn writer(&self, _ctx: &Context, _walk: &Walk<'a>) -> Result<()> {
         Ok(())
+    }
+
+    fn writes_alone(&self) -> bool {
+        true
     }
 
     fn write(&self, _writer: &mut (), step: Step, files: Option<&mut FrameFiles>) -> Result<()> {

@@ -19,8 +19,8 @@ use crate::io::usd;
 use crate::scene::shot::{Reads, Report};
 use crate::scene::{Frames, Scene};
 use crate::surface::{
-    Change, Displaced, Eased, Leads, Params, Particles, Rest, StepReport, Traced, Tracker, carry_attributes,
-    displaced, eased, uncrossed,
+    Change, Displaced, Eased, Leads, Params, Particles, Rest, StepReport, TOO_FAR, Traced, Tracker,
+    carry_attributes, displaced, eased, uncrossed,
 };
 
 /// A scene's liquid, and the mesh that goes along.
@@ -33,8 +33,10 @@ pub struct Walk<'a> {
     frame: i32,
     /// The mesh at a frame, and at those that follow it as far as they are needed; at least one.
     known: VecDeque<At>,
-    /// The first frame beyond the shot's end that could not be made.
+    /// The first frame that could not be made ahead: beyond the shot's end, or one that fails.
     end: Option<i32>,
+    /// Whether what is wrong with the particles was said.
+    is_told: bool,
 }
 
 /// A mesh as an artist made it: that of the first frame, or an edited one.
@@ -57,6 +59,8 @@ pub struct At {
     way: Way,
     leads: Leads,
     pub(super) source: Source,
+    /// Whether the frame has no particles: its files then hold no mesh.
+    pub(super) is_dry: bool,
 }
 
 /// How the vertices of the frame before went to a frame.
@@ -69,20 +73,16 @@ pub(super) struct Way {
 }
 
 impl<'a> Walk<'a> {
-    /// The mesh at the first frame.
+    /// The mesh at the first frame; none where that has no particles.
     ///
     /// # Errors
-    /// A mesh that is not where the particles are, and what a tracker refuses; cancel.
+    /// A mesh that is not where the first particles are, and what a tracker refuses; cancel.
     pub fn begin(ctx: &Context, scene: &'a Scene, surface: &'a Surface, inputs: &'a Inputs) -> Result<Self> {
-        let params = surface.params(inputs.spacing);
-        let begun = ctx.step(4, || Tracker::begin(ctx, params, &inputs.mesh.mesh, &inputs.particles));
-        let ((mut tracker, report), phases) = begun.map_err(|error| of_first(surface, error))?;
-        tracker.set_lasting(inputs.lasting.clone()).map_err(|error| of_first(surface, error))?;
-        let report = StepReport { phases, ..report };
-        let report = told(&report, inputs.particles.places.len(), &tracker, false);
-        let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
-        let at = At { tracker, detail: None, report, way: Way::default(), leads: Leads::default(), source };
-        Ok(Self::at((scene, surface, inputs), scene.shot.frames.first, at))
+        let first = scene.shot.frames.first;
+        // Also where particles come later: a mesh that does not fit them is refused before anything is written.
+        let begun = first_mesh(ctx, surface, inputs)?;
+        let at = if inputs.begins == first { begun } else { without_mesh(surface, inputs)? };
+        Ok(Self::at((scene, surface, inputs), first, at))
     }
 
     /// Goes on from a mesh that was kept at a frame.
@@ -104,7 +104,9 @@ impl<'a> Walk<'a> {
         });
         let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
         let (report, way, leads) = (nothing_told(), Way::default(), Leads::default());
-        let mut walk = Self::at(of, frame, At { tracker, detail, report, way, leads, source });
+        // Nothing of this frame is written again.
+        let at = At { tracker, detail, report, way, leads, source, is_dry: false };
+        let mut walk = Self::at(of, frame, at);
         if let Some(sculpted) = sculpted {
             let source = match read_sculpt(ctx, surface, inputs, sculpted)? {
                 Some(sculpt) => {
@@ -125,7 +127,7 @@ impl<'a> Walk<'a> {
 
     fn at((scene, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs), frame: i32, at: At) -> Self {
         let liquid = Liquid::new(surface, scene.shot, &inputs.seen);
-        Self { scene, surface, inputs, liquid, frame, known: VecDeque::from([at]), end: None }
+        Self { scene, surface, inputs, liquid, frame, known: VecDeque::from([at]), end: None, is_told: false }
     }
 
     /// Goes on to a frame, and as far ahead as that needs.
@@ -205,12 +207,21 @@ impl<'a> Walk<'a> {
     /// The frame after those that are known, where it is there: beyond the shot's end a cache need not have it.
     fn look(&mut self, ctx: &Context, frame: i32) -> Result<Option<At>> {
         let last = self.scene.shot.frames.last;
+        if self.end.is_some_and(|end| frame >= end) {
+            return Ok(None);
+        }
         if frame <= last {
-            return self.next(ctx, frame).map(Some);
+            return match self.next(ctx, frame) {
+                // It ends the shot when its turn comes: the frames before it are there and are written first.
+                Err(error) if !matches!(error, Error::Cancelled) => {
+                    self.end = Some(frame);
+                    Ok(None)
+                }
+                next => next.map(Some),
+            };
         }
         let files = self.surface.between(self.scene.shot.frames, frame - 1, frame);
-        let is_beyond = self.end.is_some_and(|end| frame >= end);
-        if is_beyond || !self.surface.reads_ahead() || !files.iter().all(|path| path.is_file()) {
+        if !self.surface.reads_ahead() || !files.iter().all(|path| path.is_file()) {
             return Ok(None);
         }
         match self.next(ctx, frame) {
@@ -229,6 +240,19 @@ impl<'a> Walk<'a> {
 
     /// The mesh at a frame, from the last that is known, which is the one before.
     fn next(&mut self, ctx: &Context, frame: i32) -> Result<At> {
+        if frame < self.inputs.begins {
+            return without_mesh(self.surface, self.inputs);
+        }
+        if frame == self.inputs.begins {
+            let mut at = first_mesh(ctx, self.surface, self.inputs)?;
+            at.leads = Leads::cut(at.tracker.vertices().len());
+            let particles = Arc::new(self.inputs.particles.clone());
+            let sculpted = self.resculpt(ctx, &mut at, frame, &particles)?;
+            if let Some(report) = sculpted {
+                at.report = told(&report, particles.places.len(), &at.tracker, true);
+            }
+            return Ok(at);
+        }
         let phases = ctx.collect();
         let last = self.known.len() - 1;
         let before = &mut self.known[last];
@@ -262,7 +286,10 @@ impl<'a> Walk<'a> {
                         leads = leads.then(&Leads::of(ctx, change, &triangles, self.inputs.spacing)?);
                     }
                     let own = detail.as_deref().unwrap_or(&self.inputs.mesh);
-                    detail = Some(Arc::new(carried(ctx, own, &source, (&tracker, change), &to)?));
+                    detail = Some(Arc::new(match tracker.vertices() {
+                        [] => own.emptied(),
+                        _ => carried(ctx, own, &source, (&tracker, change), &to)?,
+                    }));
                     trail.change(change);
                 }
                 None => trail.follow(tracker.vertices(), share),
@@ -271,11 +298,13 @@ impl<'a> Walk<'a> {
             from = to;
         }
         let way = trail.way(tracker.vertices(), tracker.triangles(), self.scene.shot.fps);
-        let mut at = At { tracker, detail, report: nothing_told(), way, leads, source };
+        let is_dry = from.places.is_empty();
+        let mut at = At { tracker, detail, report: nothing_told(), way, leads, source, is_dry };
         let sculpted = self.resculpt(ctx, &mut at, frame, &from)?;
         let is_resculpted = sculpted.is_some();
         let report = sculpted.into_iter().fold(report, StepReport::followed_by);
         let report = StepReport { phases: phases.times(), ..report };
+        report.news(&mut self.is_told).for_each(|warning| log::warn!("frame {frame}: {warning}"));
         at.report = told(&report, from.places.len(), &at.tracker, is_resculpted);
         Ok(at)
     }
@@ -289,6 +318,10 @@ impl<'a> Walk<'a> {
         particles: &Particles,
     ) -> Result<Option<StepReport>> {
         let Some(sculpt) = read_sculpt(ctx, self.surface, self.inputs, frame)? else { return Ok(None) };
+        if particles.places.is_empty() {
+            log::warn!("{}: is left out, as frame {frame} has no particles", sculpt.path.display());
+            return Ok(None);
+        }
         let refused = |error| match error {
             Error::Argument(what) => Error::file(&sculpt.path, what),
             other => other,
@@ -316,9 +349,33 @@ impl<'a> Walk<'a> {
     }
 }
 
+/// The mesh at the first frame that has particles.
+fn first_mesh(ctx: &Context, surface: &Surface, inputs: &Inputs) -> Result<At> {
+    let params = surface.params(inputs.spacing);
+    let begun = ctx.step(4, || Tracker::begin(ctx, params, &inputs.mesh.mesh, &inputs.particles));
+    let ((mut tracker, report), phases) = begun.map_err(|error| of_first(surface, error))?;
+    tracker.set_lasting(inputs.lasting.clone()).map_err(|error| of_first(surface, error))?;
+    let report = StepReport { phases, ..report };
+    let report = told(&report, inputs.particles.places.len(), &tracker, false);
+    let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
+    let (way, leads) = (Way::default(), Leads::default());
+    Ok(At { tracker, detail: None, report, way, leads, source, is_dry: false })
+}
+
+/// A frame before the first particles.
+fn without_mesh(surface: &Surface, inputs: &Inputs) -> Result<At> {
+    let tracker = Tracker::without_mesh(surface.params(inputs.spacing))?;
+    let report = told(&StepReport::default(), 0, &tracker, false);
+    let source = Source { sculpted: None, mesh: inputs.mesh.clone(), rest: None };
+    let (way, leads) = (Way::default(), Leads::default());
+    let detail = Some(Arc::new(inputs.mesh.emptied()));
+    Ok(At { tracker, detail, report, way, leads, source, is_dry: true })
+}
+
 /// An error of the first mesh, with its file.
 fn of_first(surface: &Surface, error: Error) -> Error {
     match error {
+        Error::Argument(what) if what.starts_with(TOO_FAR) => Error::file(&surface.particles, what),
         Error::Argument(what) => Error::file(surface.mesh.as_ref().unwrap_or(&surface.particles), what),
         other => other,
     }

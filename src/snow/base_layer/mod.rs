@@ -31,7 +31,7 @@ use crate::snow::NoiseParams;
 use crate::sweep::{
     Band, Body, Face, Lattice, Piece, Scratch, Settings, TOLERANCE, UNITS, Voxeliser, Window,
 };
-use crate::vdb::{FloatGrid, GridClass, MetaValue, Probe};
+use crate::vdb::{FloatGrid, GridClass, MetaValue, Probe, distances};
 use columns::Columns;
 use edit::{Edit, Scale};
 use marks::Mark;
@@ -104,8 +104,12 @@ impl BaseLayer {
     /// A layer whose snow is the inside of a level set.
     ///
     /// # Errors
-    /// When `surface` is not a level set, is empty or not world-fixed, or a parameter is out of range.
+    /// When `surface` is not a level set, is empty or not world-fixed, its values are no distances in metres, or a parameter is out of
+    /// range.
     pub fn new(ctx: &Context, surface: FloatGrid, params: Params) -> Result<Self> {
+        if let Some(what) = distances::warning(&surface)? {
+            return Err(Error::argument(format!("the snow's grid {what}")));
+        }
         Self::with_volume(ctx, surface, params, None)
     }
 

@@ -205,7 +205,7 @@ fn what_cannot_be_drawn_is_said_before_anything_is_written() {
         ("shot/base/base.0001.vdb --fps 12 -o p.png", &["--fps", "none is given"]),
         ("bare -o p.gif", &["bare", "no folder of a shot"]),
         ("shot/base/base.%04d.vdb -o p.png", &["base.0000.vdb", "--frame"]),
-        ("shot/base/base.%04d.vdb --frames 2-5 -o p.gif", &["base.0005.vdb", "not there"]),
+        ("shot/base/base.%04d.vdb --frames 5-6 -o p.gif", &["base.0005.vdb", "not there"]),
         ("shot --frames 1-4 -o none/p.%04d.png", &["none"]),
         ("grains.ply cube.obj --clip walk -o p.png", &["--clip"]),
         ("shot --frame 2 --fps 12 -o p.png", &["--fps", ".gif"]),
@@ -216,6 +216,13 @@ fn what_cannot_be_drawn_is_said_before_anything_is_written() {
     ];
     for (arguments, words) in refused {
         fails(folder, &format!("preview {arguments}"), 2, words);
+    }
+    // A sequence may have gaps: the frames that are there are drawn.
+    let gap = "preview shot/base/base.%04d.vdb --frames 3-5 -o gap";
+    fails(folder, &format!("{gap}.gif {SIZE}"), 1, &["base.0005.vdb", "1 of 3 frames were not made: 5"]);
+    fails(folder, &format!("{gap}.%04d.png {SIZE}"), 1, &["base.0005.vdb", "1 of 3 frames"]);
+    for name in ["gap.gif", "gap.0003.png", "gap.0004.png"] {
+        fs::remove_file(folder.join(name)).unwrap();
     }
     // What a shot has and no picture shows.
     works(folder, "snow shot.toml -o usd -q --frames 1 --set output.objects=[\"usd\"]");

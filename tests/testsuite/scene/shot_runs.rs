@@ -246,7 +246,7 @@ fn two_runs_do_not_write_into_one_folder() {
     while !folder.path().join("out/state/base.0001.json").exists() {
         std::thread::sleep(Duration::from_millis(2));
     }
-    fails(folder.path(), "snow shot.toml -o out", 2, &["another run", "out"]);
+    fails(folder.path(), "snow shot.toml -o out", 75, &["another run", "out"]);
     child.kill().unwrap();
     child.wait().unwrap();
     // A dead run holds nothing.

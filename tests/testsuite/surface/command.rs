@@ -111,10 +111,18 @@ fn what_makes_no_surface_is_refused() {
     fails(folder, "vdb from-particles drop.%04d.xyz --frames 1-2 --mesh out.ply", 2, &["out.ply", "pattern"]);
     let small = "vdb from-particles drop.xyz --mesh out.ply --spacing 0.1 --cell 0.0125 --max-memory 1M";
     fails(folder, small, 2, &["surface", "limit"]);
-    // The second frame is missing: nothing is made of the first.
+    // The second frame is missing: the first is made.
     fs::copy(folder.join("drop.xyz"), folder.join("gap.0001.xyz")).unwrap();
     for work in ["vdb from-particles gap.%04d.xyz --mesh out.%04d.ply", "convert gap.%04d.xyz out.%04d.ply"] {
-        fails(folder, &format!("{work} --frames 1-2"), 2, &["gap.0002.xyz"]);
+        fails(
+            folder,
+            &format!("{work} --frames 1-2"),
+            1,
+            &["gap.0002.xyz", "1 of 2 frames were not made: 2"],
+        );
+        fs::remove_file(folder.join("out.0001.ply")).unwrap();
+        // None is: nothing was begun.
+        fails(folder, &format!("{work} --frames 2-3"), 2, &["gap.0002.xyz"]);
     }
     assert!(!folder.join("out.ply").exists() && !folder.join("out.0001.ply").exists());
     // Ten times too small: each particle would be a drop of its own.

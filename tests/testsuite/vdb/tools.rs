@@ -94,6 +94,23 @@ fn an_offset_ball_is_a_larger_ball_wherever_it_is() {
 }
 
 #[test]
+fn a_level_set_measures_the_same_wherever_it_is_and_nothing_without_voxels() {
+    let ctx = context(2);
+    let size = |centre: [f32; 3]| {
+        let ball = level_set::from_mesh(&ctx, &at(sphere(2.0, 48), centre), 0.125, 3.0).unwrap();
+        level_set::measure(&ctx, &ball).unwrap()
+    };
+    let near_origin = size([0.0; 3]);
+    for centre in [[1e4, 0.0, 0.0], [0.0, -1e4, 2e4]] {
+        let far = size(centre);
+        near(far.volume, near_origin.volume, 1e-3);
+        near(far.area, near_origin.area, 1e-3);
+    }
+    let none = level_set::measure(&ctx, &FloatGrid::level_set(0.1, 3.0).unwrap()).unwrap();
+    assert_eq!((none.area, none.volume), (0.0, 0.0));
+}
+
+#[test]
 fn a_layer_with_faces_on_voxels_has_its_volume_near_the_origin_and_far_from_it() {
     use frazil::snow::base_layer::initial::{Cover, Ground, layer};
     let ctx = context(2);

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use frazil::base::TriMesh;
 use frazil::io::sequence::Pattern;
-use frazil::scene::FrameChoice;
 use frazil::surface::HALF_WIDTH;
 use frazil::sweep::{Settings, voxelise_within};
 use frazil::vdb::level_set::{difference, to_mesh};
@@ -13,7 +12,7 @@ use frazil::{Context, Error, Result};
 
 use super::of_frame;
 use crate::cli::session::Session;
-use crate::cli::vdb::{far_mesh, read_level_set};
+use crate::cli::vdb::far_mesh;
 
 /// How much a length may differ (of itself) and be taken for the same.
 const ROUNDING: f64 = 1e-6;
@@ -25,7 +24,7 @@ const ROOM: i32 = 16;
 struct Collider {
     path: PathBuf,
     is_sequence: bool,
-    /// What the first frame takes instead of reading its file.
+    /// Those of the one file, until the first frame takes them.
     first: Option<Vec<FloatGrid>>,
     /// Those of the frame before, or of all frames.
     solids: Vec<Solid>,
@@ -43,14 +42,11 @@ enum Solid {
 pub struct Colliders(Vec<Collider>);
 
 impl Colliders {
-    /// Reads what the first frame needs, and sees whether the files of all others are there and hold level sets.
-    pub fn open(paths: &[PathBuf], frames: &FrameChoice) -> Result<Self> {
+    /// Reads what all frames need; files of single frames are read when their turn comes.
+    pub fn open(ctx: &Context, paths: &[PathBuf]) -> Result<Self> {
         let open = |path: &PathBuf| {
             let is_sequence = Pattern::parse(path).is_some();
-            if is_sequence {
-                frames.iter().try_for_each(|frame| check(&of_frame(path, frame)))?;
-            }
-            let first = Some(read(&of_frame(path, frames.first()))?);
+            let first = if is_sequence { None } else { Some(read(ctx, path)?) };
             Ok(Collider { path: path.clone(), is_sequence, first, solids: Vec::new() })
         };
         paths.iter().map(open).collect::<Result<_>>().map(Self)
@@ -77,7 +73,7 @@ impl Collider {
         if self.is_sequence || self.solids.is_empty() {
             let grids = match self.first.take() {
                 Some(grids) => grids,
-                None => read(path)?,
+                None => read(ctx, path)?,
             };
             let solid = |grid: FloatGrid| Solid::new(ctx, grid, path, cell);
             self.solids = grids.into_iter().map(solid).collect::<Result<_>>()?;
@@ -165,28 +161,20 @@ fn names(path: &Path) -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// Refuses a file that has no level set, by its description alone.
-fn check(path: &Path) -> Result<()> {
-    if names(path)?.is_empty() {
-        return Err(Error::file(path, "holds no level set"));
-    }
-    Ok(())
-}
-
 /// All level sets of a file.
-fn read(path: &Path) -> Result<Vec<FloatGrid>> {
+fn read(ctx: &Context, path: &Path) -> Result<Vec<FloatGrid>> {
     let names = names(path)?;
     if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
         return Err(Error::file(path, format!("has two level sets \"{}\": give them other names", twice[0])));
     }
     if names.len() < 2 {
-        return Ok(vec![solid(path, None)?]);
+        return Ok(vec![solid(ctx, path, None)?]);
     }
-    names.iter().map(|name| solid(path, Some(name))).collect()
+    names.iter().map(|name| solid(ctx, path, Some(name))).collect()
 }
 
-fn solid(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
-    let grid = read_level_set(path, name)?;
+fn solid(ctx: &Context, path: &Path, name: Option<&str>) -> Result<FloatGrid> {
+    let grid = file::read_level_set(ctx, path, name)?;
     if grid.background() > 0.0 {
         return Ok(grid);
     }

@@ -5,6 +5,7 @@ mod shape;
 
 use super::{Packing, check_name};
 use crate::cli::cloud::points_of_vdb;
+use crate::cli::each::Each;
 use crate::cli::exit::{Failure, Phase};
 use crate::cli::options::{MeshSpace, positive, triple};
 use crate::cli::output;
@@ -18,7 +19,7 @@ use frazil::io::mesh::extension;
 use frazil::io::particles::{self, Cloud};
 use frazil::io::sequence::Pattern;
 use frazil::scene::{FrameChoice, Frames};
-use frazil::surface::{estimate_spacing, rough_spacing, specks, transfer};
+use frazil::surface::{TOO_FAR, estimate_spacing, rough_spacing, specks, transfer};
 use frazil::vdb::file;
 use frazil::vdb::level_set::to_mesh;
 use frazil::{Context, Error, Result};
@@ -117,61 +118,42 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
             output::refuse_input(&of_frame(path, frame), inputs.iter().map(PathBuf::as_path)).before()?;
         }
     }
+    let mut colliders = Colliders::open(&session.ctx, &args.subtract).before()?;
+    let spacing = match args.spacing {
+        Some(spacing) => spacing,
+        None => args.estimated(session, &frames)?,
+    };
+    let (mut each, mut total, mut is_compared) = (Each::default(), Made::default(), args.spacing.is_none());
     for frame in frames.iter() {
-        // A gap in a sequence is known before any work.
-        io::source::open(&of_frame(&args.particles, frame)).before()?;
-    }
-    let mut colliders = Colliders::open(&args.subtract, &frames).before()?;
-    let mut spacing = args.spacing;
-    let (mut particles, mut triangles, mut specks) = (0, 0, 0);
-    for (n, frame) in frames.iter().enumerate() {
         session.ctx.check().during()?;
-        let path = of_frame(&args.particles, frame);
-        let read = args.read(&path);
-        // What the first file is without, no frame can be begun with.
-        let mut cloud = if n == 0 { read.before()? } else { read.during()? };
-        let spacing = match spacing {
-            Some(spacing) => spacing,
-            None => *spacing.insert(estimated(&path, &cloud.places).before()?),
-        };
-        if n == 0 && args.spacing.is_some() {
-            warn_of_spacing(&path, &cloud.places, spacing);
+        let made = args.frame(session, frame, spacing, &mut colliders, &mut is_compared);
+        if let Some(made) = each.take(frame, made)? {
+            total.frames += 1;
+            total.particles += made.particles;
+            total.specks += made.specks;
+            total.triangles += made.triangles;
         }
-        let left_out = args.leave_out(&mut cloud, spacing, &path);
-        specks += if n == 0 { left_out.before()? } else { left_out.during()? };
-        let columns = args.columns(&cloud, &path);
-        let columns = if n == 0 { columns.before()? } else { columns.during()? };
-        let made = args.make(session, (&cloud.places, &columns), spacing, (frame, &mut colliders));
-        let is_refused = matches!(made, Err(Error::Argument(_) | Error::Memory { .. }));
-        let mesh = if n == 0 && is_refused { made.before()? } else { made.during()? };
-        particles += cloud.places.len();
-        triangles += mesh.triangles.len();
     }
-    session.record("frames", json!(frames.count()));
-    session.record("particles", json!(particles));
-    session.record("specks_left_out", json!(specks));
+    session.record("frames", json!(total.frames));
+    session.record("particles", json!(total.particles));
+    session.record("specks_left_out", json!(total.specks));
     session.record("spacing_m", json!(spacing));
-    session.record("triangles", json!(triangles));
-    Ok(())
+    session.record("triangles", json!(total.triangles));
+    each.finish()
+}
+
+/// What was made.
+#[derive(Default)]
+struct Made {
+    frames: usize,
+    particles: usize,
+    specks: usize,
+    triangles: usize,
 }
 
 /// The file of a frame, of one file or of a sequence.
 fn of_frame(path: &Path, frame: i32) -> PathBuf {
     Pattern::parse(path).map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
-}
-
-fn estimated(path: &Path, places: &[DVec3]) -> Result<f64> {
-    let Some(spacing) = estimate_spacing(places) else {
-        return Err(Error::file(
-            path,
-            "has too few particles, or too many at one place, to tell their spacing: give --spacing",
-        ));
-    };
-    log::warn!(
-        "{}: the spacing of the particles is estimated as {spacing:.6} m; --spacing sets it",
-        path.display()
-    );
-    Ok(spacing)
 }
 
 /// How many times as large as the estimate, or as small, a spacing is that looks like a mistake.
@@ -209,12 +191,73 @@ impl Args {
         }
     }
 
-    /// The particles of a file (m) that lie in the box.
+    /// The spacing (m) of the particles of the first frame that tells it.
+    fn estimated(&self, session: &Session, frames: &FrameChoice) -> std::result::Result<f64, Failure> {
+        let mut first: Option<Error> = None;
+        for frame in frames.iter() {
+            session.ctx.check().during()?;
+            let path = of_frame(&self.particles, frame);
+            match self.read(&path) {
+                Ok(cloud) => {
+                    if let Some(spacing) = estimate_spacing(&cloud.places) {
+                        log::warn!(
+                            "{}: the spacing of the particles is estimated as {spacing:.6} m; --spacing sets it",
+                            path.display()
+                        );
+                        return Ok(spacing);
+                    }
+                    let what = "has too few particles, or too many at one place, to tell their spacing: give --spacing";
+                    first.get_or_insert_with(|| Error::file(&path, what));
+                }
+                Err(error) => {
+                    first.get_or_insert(error);
+                }
+            }
+        }
+        Err(first.map_or_else(|| Failure::refused("there are no frames"), Failure::refused))
+    }
+
+    /// Makes the files of a frame.
+    fn frame(
+        &self,
+        session: &Session,
+        frame: i32,
+        spacing: f64,
+        colliders: &mut Colliders,
+        is_compared: &mut bool,
+    ) -> Result<Made> {
+        let path = of_frame(&self.particles, frame);
+        let mut cloud = self.read(&path)?;
+        if !cloud.places.is_empty() && !std::mem::replace(is_compared, true) {
+            warn_of_spacing(&path, &cloud.places, spacing);
+        }
+        let specks = self.leave_out(&mut cloud, spacing, &path)?;
+        // A file without particles need not say what they would carry.
+        let columns = if cloud.places.is_empty() { Vec::new() } else { self.columns(&cloud, &path)? };
+        let made = self.make(session, (&cloud.places, &columns), spacing, (frame, colliders));
+        let mesh = made.map_err(|error| match error {
+            Error::Argument(what) if what.starts_with(TOO_FAR) => Error::file(&path, what),
+            other => other,
+        })?;
+        Ok(Made { frames: 1, particles: cloud.places.len(), specks, triangles: mesh.triangles.len() })
+    }
+
+    /// What options leave nothing of: one file is refused, and a frame of a sequence, which may well have no liquid there, is warned of.
+    fn refuse_nothing(&self, path: &Path, what: &str) -> Result<()> {
+        if Pattern::parse(&self.particles).is_none() {
+            return Err(Error::file(path, what));
+        }
+        log::warn!("{}: {what}: its surface is empty", path.display());
+        Ok(())
+    }
+
+    /// The particles of a file (m) that lie in the box; where there are none, it is warned of.
     fn read(&self, path: &Path) -> Result<Cloud> {
         let mut cloud: Cloud =
             if extension(path) == "vdb" { points_of_vdb(path)?.into() } else { particles::read(path)? };
         if cloud.places.is_empty() {
-            return Err(Error::file(path, "holds no particles"));
+            log::warn!("{}: holds no particles: its surface is empty", path.display());
+            return Ok(cloud);
         }
         self.space.space().bring(&mut cloud);
         if let (Some(low), Some(high)) = (self.box_min, self.box_max) {
@@ -222,7 +265,7 @@ impl Args {
             let kept: Vec<bool> = cloud.places.iter().map(is_inside).collect();
             cloud.retain(&kept);
             if cloud.places.is_empty() {
-                return Err(Error::file(path, "has no particles in the box"));
+                self.refuse_nothing(path, "has no particles in the box")?;
             }
         }
         Ok(cloud)
@@ -233,8 +276,8 @@ impl Args {
         let Some(least) = self.min_drop else { return Ok(0) };
         let specks = specks(&cloud.places, spacing, least as usize)?;
         let count = specks.iter().filter(|is| **is).count();
-        if count == cloud.places.len() {
-            return Err(Error::file(path, format!("has no group of {least} particles")));
+        if count > 0 && count == cloud.places.len() {
+            self.refuse_nothing(path, &format!("has no group of {least} particles"))?;
         }
         if count > 0 {
             log::info!("{}: {count} particles in groups of fewer than {least} are left out", path.display());
@@ -319,7 +362,7 @@ impl Args {
             colliders.cut(session, liquid, frame)?;
             let cut = &*liquid;
             mesh = ctx.phase("mesh", || to_mesh(ctx, cut, 0.0, 0.0))?;
-            if mesh.triangles.is_empty() {
+            if mesh.triangles.is_empty() && !places.is_empty() {
                 let particles = of_frame(&self.particles, frame);
                 log::warn!("{}: nothing is left of the liquid", particles.display());
             }

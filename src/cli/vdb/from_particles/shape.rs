@@ -37,13 +37,17 @@ pub struct Recipe {
 }
 
 impl Recipe {
-    /// The surface of particles at places (m), with its level set where that is wanted.
+    /// The surface of particles at places (m), with its level set where that is wanted; both are empty without particles.
     pub fn surface(
         &self,
         session: &Session,
         places: &[DVec3],
         wants_grid: bool,
     ) -> Result<(TriMesh, Option<FloatGrid>)> {
+        if places.is_empty() {
+            let grid = if wants_grid { Some(FloatGrid::level_set(self.cell, HALF_WIDTH)?) } else { None };
+            return Ok((TriMesh::default(), grid));
+        }
         let (mut mesh, grid) = match self.method {
             Method::Solenthaler => self.solenthaler(session, places, wants_grid && self.passes == 0)?,
             // Inside of a union the spheres' own values are no distances.

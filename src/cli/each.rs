@@ -1,0 +1,68 @@
+//! Frames that are made one by one: one that cannot be made does not cost the others.
+
+use frazil::{Error, Result};
+
+use super::exit::Failure;
+
+/// Failed frames that are named one by one, and those that are listed in the end.
+const MAX_NAMED: usize = 20;
+
+/// How the frames of a run went so far.
+#[derive(Default)]
+pub struct Each {
+    made: usize,
+    failed: Vec<i32>,
+    /// What the first of them says, and whether that was known before its work began.
+    first: Option<(String, bool)>,
+}
+
+impl Each {
+    /// Takes note of a frame; its result, none where it could not be made.
+    ///
+    /// # Errors
+    /// What no other frame can do without either: cancel; an argument or a limit of memory that is refused before any frame is made.
+    pub fn take<T>(&mut self, frame: i32, result: Result<T>) -> std::result::Result<Option<T>, Failure> {
+        match result {
+            Ok(done) => {
+                self.made += 1;
+                Ok(Some(done))
+            }
+            Err(error @ Error::Cancelled) => Err(Failure::failed(error)),
+            Err(error @ (Error::Argument(_) | Error::Memory { .. })) if self.made == 0 => {
+                Err(Failure::refused(error))
+            }
+            Err(error) => {
+                self.lose(frame, &error);
+                Ok(None)
+            }
+        }
+    }
+
+    /// Takes note of a frame that could not be made.
+    pub fn lose(&mut self, frame: i32, error: &Error) {
+        if self.first.is_some() && self.failed.len() < MAX_NAMED {
+            log::warn!("frame {frame} is not made: {error}");
+        }
+        let is_before = !matches!(error, Error::Io { action, .. } if *action != "read");
+        self.first.get_or_insert_with(|| (error.to_string(), is_before));
+        self.failed.push(frame);
+    }
+
+    /// Ends the run.
+    ///
+    /// # Errors
+    /// Names the first frame that could not be made, and lists the others: exit code 1, or 2 where none was begun.
+    pub fn finish(self) -> std::result::Result<(), Failure> {
+        let Some((first, is_before)) = self.first else { return Ok(()) };
+        if self.made == 0 {
+            return Err(if is_before { Failure::refused(first) } else { Failure::failed(first) });
+        }
+        let all = self.made + self.failed.len();
+        let mut listed: Vec<String> = self.failed.iter().take(MAX_NAMED).map(i32::to_string).collect();
+        if self.failed.len() > MAX_NAMED {
+            listed.push("...".into());
+        }
+        let (count, listed) = (self.failed.len(), listed.join(", "));
+        Err(Failure::failed(format!("{first}; {count} of {all} frames were not made: {listed}")))
+    }
+}
