@@ -104,6 +104,10 @@ mod rebuilt_speed;
 mod rebuilt_topology;
 #[path = "gates/reliability/guard_page.rs"]
 mod reliability_guard_page;
+#[path = "gates/reliability/step_calls.rs"]
+mod reliability_step_calls;
+#[path = "gates/reliability/step_meshes.rs"]
+mod reliability_step_meshes;
 #[path = "gates/repair.rs"]
 mod repair;
 #[path = "gates/rest.rs"]
@@ -232,6 +236,7 @@ fn main() {
     capi::run(&mut h);
     cancel::run(&mut h);
     reliability_guard_page::run(&mut h);
+    reliability_step_calls::run(&mut h);
     flip::run(&mut h);
     far::run(&mut h);
     band::run(&mut h);

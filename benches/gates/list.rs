@@ -489,4 +489,6 @@ pub const GATES: &[Gate] = &[
     gate("shallow.surface_jump", "cells", Most(0.05), Most(0.01)),
     // Structs of callers: functions that write them x sizes that they are told, with something written outside.
     none("reliability.guard_page", "writes"),
+    // Steps of every step function with random settings, 10,000 each, that take over 20 times the median and do not end within 0.2 s of a cancel.
+    none("reliability.step_calls", "steps"),
 ];
