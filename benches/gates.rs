@@ -120,6 +120,10 @@ mod reliability_gltf_valid;
 mod reliability_guard_page;
 #[path = "gates/reliability/soup.rs"]
 mod reliability_soup;
+#[path = "gates/reliability/step_calls.rs"]
+mod reliability_step_calls;
+#[path = "gates/reliability/step_meshes.rs"]
+mod reliability_step_meshes;
 #[path = "gates/repair.rs"]
 mod repair;
 #[path = "gates/rest.rs"]
@@ -251,6 +255,7 @@ fn main() {
     capi::run(&mut h);
     cancel::run(&mut h);
     reliability_guard_page::run(&mut h);
+    reliability_step_calls::run(&mut h);
     flip::run(&mut h);
     far::run(&mut h);
     band::run(&mut h);

@@ -512,4 +512,6 @@ pub const GATES: &[Gate] = &[
     // Triangle soup with corners that are off by rounding, through every door: volumes off by over 1 % without a warning; warnings.
     none("reliability.soup_silent", "runs"),
     none("reliability.soup_warned", "runs"),
+    // Steps of every step function with random settings, 10,000 each, that take over 20 times the median and do not end within 0.2 s of a cancel.
+    none("reliability.step_calls", "steps"),
 ];

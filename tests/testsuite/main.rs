@@ -115,6 +115,7 @@ mod shallow {
     mod falls_threads;
     mod flooded;
     mod flow;
+    mod frames;
     mod loads;
     mod moving;
     mod probe;

@@ -1,0 +1,498 @@
+//! Every step function of the C interface with random settings that it accepts: one that takes far longer than others ends when it is cancelled.
+
+use std::mem::zeroed;
+use std::ptr::{null, null_mut};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
+
+use frazil::capi::context::*;
+use frazil::capi::frz_status::{self, *};
+use frazil::capi::{grains::*, grains_params::*, grains_points::*, mist::*, mist_params::*};
+use frazil::capi::{shallow::*, shallow_detail::*, shallow_flows::*, shallow_params::*, shallow_terrain::*};
+use rustix::time::{ClockId, clock_gettime};
+
+use crate::grains::Random;
+use crate::harness::Harness;
+use crate::host::{Threads, view};
+use crate::reliability_step_meshes as meshes;
+
+/// Steps of each function.
+const STEPS: usize = 10_000;
+/// A step is cancelled after so many times the median of those before, but not earlier than this (s); and may then take so long (s).
+const TIMES: f64 = 20.0;
+const EARLIEST: f64 = 0.005;
+const LONGEST: f64 = 0.2;
+/// A step that takes so long has no end (s).
+const ENDLESS: f64 = 60.0;
+
+/// Cancels a context when a step has taken too long.
+struct Watch {
+    threads: Threads,
+    /// When it is to cancel (microseconds of a clock); never, where it is the greatest number.
+    due: Arc<AtomicU64>,
+    ends: Arc<AtomicBool>,
+    watcher: Option<std::thread::JoinHandle<()>>,
+}
+
+/// What became of the steps of a function.
+pub struct Tried<'a> {
+    watch: &'a Watch,
+    pub random: Random,
+    name: &'static str,
+    /// CPU time of each (s).
+    times: Vec<f64>,
+    median: f64,
+    cancelled: usize,
+    slow: usize,
+    slowest: f64,
+}
+
+/// Microseconds of the clock on the wall.
+fn wall() -> u64 {
+    static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+    START.get_or_init(std::time::Instant::now).elapsed().as_micros() as u64
+}
+
+/// CPU time of this thread, which does all the work (s): what else the machine does is no step's fault.
+fn cpu() -> f64 {
+    let time = clock_gettime(ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+}
+
+impl Watch {
+    fn new() -> Self {
+        let threads = Threads::new(0);
+        let (due, ends) = (Arc::new(AtomicU64::new(u64::MAX)), Arc::new(AtomicBool::new(false)));
+        let (ctx, other_due, other_ends) = (threads.ctx as usize, due.clone(), ends.clone());
+        let watcher = std::thread::spawn(move || {
+            let mut cancelled = None;
+            while !other_ends.load(Ordering::SeqCst) {
+                std::thread::sleep(Duration::from_millis(1));
+                let (now, due) = (wall(), other_due.load(Ordering::SeqCst));
+                if due == u64::MAX {
+                    cancelled = None;
+                } else if cancelled.is_some_and(|at| now > at + (ENDLESS * 1e6) as u64) {
+                    eprintln!("reliability.step_calls: a step does not end: cancelled {ENDLESS} s ago");
+                    std::process::exit(1);
+                } else if now >= due && cancelled.is_none() {
+                    // SAFETY: the context is there until this thread was joined.
+                    unsafe { frz_context_cancel(ctx as *mut frz_context) };
+                    cancelled = Some(now);
+                }
+            }
+        });
+        Self { threads, due, ends, watcher: Some(watcher) }
+    }
+}
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        self.ends.store(true, Ordering::SeqCst);
+        self.watcher.take().into_iter().for_each(|watcher| watcher.join().expect("the watcher"));
+    }
+}
+
+impl Tried<'_> {
+    /// The context that steps are made with.
+    pub fn ctx(&self) -> *mut frz_context {
+        self.watch.threads.ctx
+    }
+
+    /// Whether there were enough.
+    pub fn is_done(&self) -> bool {
+        self.times.len() >= STEPS
+    }
+
+    /// One step; whether it was made to its end.
+    pub fn step(&mut self, step: impl FnOnce(*mut frz_context) -> frz_status) -> bool {
+        let limit = (TIMES * self.median).max(EARLIEST);
+        let (before, began) = (cpu(), wall());
+        self.watch.due.store(began + (limit * 1e6) as u64, Ordering::SeqCst);
+        let status = step(self.ctx());
+        self.watch.due.store(u64::MAX, Ordering::SeqCst);
+        let took = cpu() - before;
+        // A cancel that came too late is of this step, too.
+        if (wall() - began) as f64 > 0.5e6 * limit {
+            std::thread::sleep(Duration::from_millis(3));
+        }
+        self.watch.threads.reset();
+        match status {
+            // Settings that it refuses are none.
+            FRZ_ERROR_ARGUMENT | FRZ_ERROR_MEMORY => return false,
+            FRZ_OK | FRZ_CANCELLED => {}
+            other => panic!("{}: {other:?}", self.name),
+        }
+        self.cancelled += usize::from(status == FRZ_CANCELLED);
+        // CPU time from the cancel on, at least.
+        let after = took - limit;
+        self.slow += usize::from(after > LONGEST && took > TIMES * self.median);
+        self.slowest = self.slowest.max(after);
+        self.times.push(took);
+        if self.times.len() % 100 == 0 {
+            let mut sorted = self.times.clone();
+            sorted.sort_unstable_by(f64::total_cmp);
+            self.median = sorted[sorted.len() / 2];
+        }
+        status == FRZ_OK
+    }
+
+    /// A number from one to another.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.random.next()
+    }
+
+    /// A number of any magnitude between.
+    pub fn any(&mut self, low: f64, high: f64) -> f64 {
+        libm::pow(10.0, self.between(libm::log10(low), libm::log10(high)))
+    }
+
+    /// A whole number below.
+    pub fn below(&mut self, count: usize) -> usize {
+        (self.random.next() * count as f64) as usize
+    }
+
+    /// With a probability.
+    pub fn chance(&mut self, probability: f64) -> bool {
+        self.random.next() < probability
+    }
+}
+
+/// A struct of zeroes that begins with its size.
+pub fn sized<T>() -> T {
+    // SAFETY: structs of the interface are numbers and pointers, of which zero is a value.
+    let mut out: T = unsafe { zeroed() };
+    // SAFETY: they begin with their size.
+    unsafe { (&raw mut out).cast::<u32>().write(size_of::<T>() as u32) };
+    out
+}
+
+/// The gate.
+pub fn run(h: &mut Harness) {
+    if !h.wants("reliability.step_calls") {
+        return;
+    }
+    let watch = Watch::new();
+    let functions: [(&'static str, fn(&mut Tried)); 10] = [
+        ("frz_shallow_step", shallow),
+        ("frz_shallow_replay", replay),
+        ("frz_shallow_detail_step", detail),
+        ("frz_grains_step", grains),
+        ("frz_mist_step_points", mist),
+        ("frz_base_step", meshes::base),
+        ("frz_grains_step_grids", meshes::grids),
+        ("frz_mist_step", meshes::mist),
+        ("frz_tracker_step", meshes::tracker),
+        ("frz_tracker_read_eased", meshes::eased),
+    ];
+    let (mut slow, mut notes) = (0, Vec::new());
+    for (name, scenes) in functions {
+        let random = Random(0x9e37_79b9_7f4a_7c15 ^ name.len() as u64);
+        let times = Vec::with_capacity(STEPS);
+        let mut tried =
+            Tried { watch: &watch, random, name, times, median: 0.0, cancelled: 0, slow: 0, slowest: 0.0 };
+        while !tried.is_done() {
+            scenes(&mut tried);
+        }
+        let Tried { median, cancelled, slowest, slow: own, .. } = tried;
+        let slowest = slowest.max(0.0);
+        notes.push(format!("{name} {:.2} ms, {cancelled} cancelled, {slowest:.3} s", 1e3 * median));
+        println!("# {}, {own} too slow", notes.last().expect("a note"));
+        slow += own;
+    }
+    let note = format!("{STEPS} each; medians, and the longest after a cancel: {}", notes.join("; "));
+    h.gate("reliability.step_calls", slow as f64, &note);
+}
+
+/// Domains, grounds and parameters of shallow liquids.
+fn liquid(tried: &mut Tried) -> (frz_shallow_params, frz_shallow_domain, Vec<f32>) {
+    let mut params: frz_shallow_params = sized();
+    let mut domain: frz_shallow_domain = sized();
+    // SAFETY: the struct is there.
+    unsafe { frz_shallow_params_init(&mut params, size_of::<frz_shallow_params>()) };
+    domain.cell = tried.any(1e-4, 1e-1);
+    domain.cells = [2 * (2 + tried.below(14)) as u32, 2 * (2 + tried.below(14)) as u32];
+    let range = domain.cell * tried.any(1.0, 300.0);
+    (domain.low, domain.high) = (-range, range);
+    let [rough, lean] = [tried.any(1e-3, 0.5) * range, tried.between(-0.4, 0.4) * range];
+    let count = (domain.cells[0] * domain.cells[1]) as usize;
+    let across = domain.cells[0] as usize;
+    let height = |tried: &mut Tried, at: usize| {
+        (lean * (at % across) as f64 / across as f64 + rough * tried.between(-1.0, 1.0)) as f32
+    };
+    let heights = (0..count).map(|at| height(tried, at)).collect();
+    vary(tried, &mut params);
+    params.border = tried.below(3) as u32;
+    params.friction = u32::from(tried.chance(0.2));
+    (params.falls_most, params.section) =
+        (if tried.chance(0.2) { 64 } else { 0 }, u32::from(tried.chance(0.1)));
+    (params, domain, heights)
+}
+
+/// Changes what may change between frames.
+fn vary(tried: &mut Tried, params: &mut frz_shallow_params) {
+    params.viscosity = if tried.chance(0.1) { 0.0 } else { tried.any(1e-8, 1e-1) };
+    (params.thinnest, params.thinning_time) = (0.0, 0.0);
+    params.kept = tried.between(0.0, 1.0);
+    params.gravity = [tried.between(-1.0, 1.0), -tried.any(1.1, 100.0), tried.between(-1.0, 1.0)];
+    params.pace = tried.below(2) as u32;
+    params.longest_step = tried.any(1e-6, 0.1);
+    params.rest = if tried.chance(0.5) { 0.0 } else { tried.any(1e-7, 1e-2) };
+}
+
+/// Solids that lie over the ground, some of which it closes off.
+fn bodies(tried: &mut Tried, domain: &frz_shallow_domain) -> Vec<frz_shallow_body> {
+    let sides = domain.cells.map(|count| f64::from(count) * domain.cell);
+    let mut one = || {
+        let mut body: frz_shallow_body = sized();
+        body.shape = 2 * u32::from(tried.chance(0.7));
+        body.at = [
+            tried.between(0.0, sides[0]),
+            tried.between(domain.low, domain.high),
+            tried.between(0.0, sides[1]),
+        ];
+        body.radius = tried.any(0.5, 5.0) * domain.cell;
+        body.half = [sides[0], domain.high, sides[1]].map(|side| tried.between(0.02, 0.7) * side);
+        body.half[1] *= 0.1;
+        body
+    };
+    (0..6).map(|_| one()).collect()
+}
+
+fn flows(tried: &mut Tried, domain: &frz_shallow_domain) -> Vec<frz_shallow_flow> {
+    let sides = domain.cells.map(|count| f64::from(count) * domain.cell);
+    let mut one = || {
+        let mut flow: frz_shallow_flow = sized();
+        flow.kind = tried.below(2) as u32;
+        flow.at = [
+            tried.between(0.1, 0.9) * sides[0],
+            tried.between(domain.low, domain.high),
+            tried.between(0.1, 0.9) * sides[1],
+        ];
+        flow.radius = tried.any(0.5, 4.0) * domain.cell;
+        flow.rate = tried.any(1e-3, 1e3) * domain.cell.powi(3);
+        flow
+    };
+    (0..3).map(|_| one()).collect()
+}
+
+/// The length of a frame (s), mostly one of games.
+fn length(tried: &mut Tried) -> f64 {
+    if tried.chance(0.8) { tried.any(1e-3, 0.1) } else { tried.any(1e-12, 1e6) }
+}
+
+/// Liquids of random grounds, each for some frames.
+fn each_liquid(tried: &mut Tried, frame: impl Fn(&mut Tried, *mut frz_shallow)) {
+    let (mut params, domain, heights) = liquid(tried);
+    let mut shallow = null_mut();
+    // SAFETY: the pointers are valid, and handles are destroyed once.
+    unsafe {
+        if frz_shallow_create_heights(tried.ctx(), &params, &domain, view(&heights), &mut shallow) != FRZ_OK {
+            return;
+        }
+        for _ in 0..8 {
+            if tried.chance(0.4) {
+                let solids = bodies(tried, &domain);
+                let count = tried.below(solids.len() + 1);
+                frz_shallow_set_bodies(tried.ctx(), shallow, solids.as_ptr(), count, null_mut());
+            }
+            if tried.chance(0.4) {
+                frz_shallow_fill(shallow, tried.between(domain.low, domain.high));
+            }
+            if tried.chance(0.4) {
+                let points = flows(tried, &domain);
+                frz_shallow_set_flows(shallow, points.as_ptr(), points.len());
+            }
+            vary(tried, &mut params);
+            frz_shallow_set_params(shallow, &params);
+            for _ in 0..4 {
+                frame(tried, shallow);
+            }
+        }
+        frz_shallow_destroy(shallow);
+    }
+}
+
+fn shallow(tried: &mut Tried) {
+    each_liquid(tried, |tried, shallow| {
+        let dt = length(tried);
+        let budget = if tried.chance(0.7) { 0.0 } else { tried.any(1e-5, 1e-2) };
+        // SAFETY: the handle is there.
+        tried.step(|ctx| unsafe { frz_shallow_step(ctx, shallow, dt, budget, null_mut()) });
+    });
+}
+
+fn replay(tried: &mut Tried) {
+    each_liquid(tried, |tried, shallow| {
+        let [count, longest] = [tried.any(1.0, 2e3), tried.any(1e-5, 1.0)];
+        let steps: Vec<f64> = (0..count as usize).map(|_| longest * tried.between(0.1, 1.0)).collect();
+        // SAFETY: the handle is there.
+        tried.step(|ctx| unsafe { frz_shallow_replay(ctx, shallow, view(&steps), null_mut()) });
+    });
+}
+
+fn detail(tried: &mut Tried) {
+    let (mut params, domain, heights) = liquid(tried);
+    params.falls_most = 0;
+    let [x, z] = domain.cells.map(|count| f64::from(count) * domain.cell);
+    let near = [
+        tried.between(0.0, 0.4) * x,
+        tried.between(0.0, 0.4) * z,
+        tried.between(0.5, 0.9) * x,
+        tried.between(0.5, 0.9) * z,
+    ];
+    let mut detail = null_mut();
+    // SAFETY: the pointers are valid, and handles are destroyed once.
+    unsafe {
+        let heights = view(&heights);
+        if frz_shallow_detail_create_heights(
+            tried.ctx(),
+            &params,
+            &domain,
+            heights,
+            near.as_ptr(),
+            &mut detail,
+        ) != FRZ_OK
+        {
+            return;
+        }
+        for _ in 0..8 {
+            if tried.chance(0.3) {
+                let solids = bodies(tried, &domain);
+                let count = tried.below(solids.len() + 1);
+                frz_shallow_detail_set_bodies(tried.ctx(), detail, solids.as_ptr(), count, null_mut());
+            }
+            if tried.chance(0.2) {
+                frz_shallow_detail_fill(detail, tried.between(domain.low, domain.high));
+            }
+            // In one of the two only.
+            let at = [tried.between(0.0, x), 0.0, tried.between(0.0, z)];
+            let volume = tried.any(1e-2, 1e3) * domain.cell.powi(3);
+            frz_shallow_detail_pour(detail, at.as_ptr(), 2.0 * domain.cell, volume, null_mut());
+            if tried.chance(0.3) {
+                let points = flows(tried, &domain);
+                frz_shallow_detail_set_flows(detail, points.as_ptr(), points.len());
+            }
+            vary(tried, &mut params);
+            frz_shallow_detail_set_params(detail, &params);
+            for _ in 0..4 {
+                let dt = length(tried);
+                tried.step(|ctx| frz_shallow_detail_step(ctx, detail, dt, null_mut()));
+            }
+        }
+        frz_shallow_detail_destroy(detail);
+    }
+}
+
+/// Parameters of grains.
+pub fn grain_params(tried: &mut Tried, radius: f64) -> frz_grains_params {
+    let mut params: frz_grains_params = sized();
+    // SAFETY: the struct is there.
+    unsafe { frz_grains_params_init(&mut params, size_of::<frz_grains_params>()) };
+    params.radius = radius;
+    params.flags = FRZ_GRAINS_FLOOR * u32::from(tried.chance(0.7));
+    params.flags |= FRZ_GRAINS_RESTLESS * u32::from(tried.chance(0.3));
+    params.flags |= FRZ_GRAINS_AIR_BY_DENSITY * u32::from(tried.chance(0.3));
+    (params.friction, params.restitution, params.air) =
+        (tried.between(0.0, 1.0), tried.between(0.0, 1.0), tried.between(0.0, 1.0));
+    params.attraction = if tried.chance(0.6) { 0.0 } else { tried.any(0.1, 1000.0) };
+    params.gravity = tried.between(-20.0, 0.0);
+    params.sub_steps = if tried.chance(0.8) { 0 } else { tried.below(1000) as u32 };
+    params.lowest = -10.0;
+    params
+}
+
+/// Places (m) in a box, and velocities (m/s).
+pub fn points(tried: &mut Tried, count: usize, side: f64, fastest: f64) -> [Vec<[f32; 3]>; 2] {
+    let mut triples = |low: f64, high: f64| {
+        (0..count).map(|_| [0; 3].map(|_| tried.between(low, high) as f32)).collect::<Vec<[f32; 3]>>()
+    };
+    [triples(0.0, side), triples(-fastest, fastest)]
+}
+
+/// The length of a step of grains and mist (s).
+pub fn step_length(tried: &mut Tried) -> f64 {
+    if tried.chance(0.9) { tried.any(1e-3, 0.1) } else { tried.any(1e-6, 3600.0) }
+}
+
+fn grains(tried: &mut Tried) {
+    let radius = tried.any(1e-4, 0.1);
+    let params = grain_params(tried, radius);
+    let mut grains = null_mut();
+    // SAFETY: the pointers are valid, and handles are destroyed once.
+    unsafe {
+        if frz_grains_create(tried.ctx(), &params, null(), 0, &mut grains) != FRZ_OK {
+            return;
+        }
+        for frame in 1..=8 {
+            let (count, side, fastest) =
+                (tried.any(1.0, 200.0) as usize, radius * tried.any(1.0, 60.0), tried.any(1e-3, 100.0));
+            let [places, speeds] = points(tried, count, side, fastest);
+            frz_grains_emit(tried.ctx(), grains, view(&places), view(&speeds), frame, null_mut());
+            let params = grain_params(tried, radius);
+            frz_grains_set_params(grains, &params);
+            for _ in 0..4 {
+                let dt = step_length(tried);
+                tried.step(|ctx| frz_grains_step(ctx, grains, null(), null(), 0, dt, frame, null_mut()));
+            }
+        }
+        frz_grains_destroy(grains);
+    }
+}
+
+/// Parameters of mist.
+pub fn mist_params(tried: &mut Tried, cell: f64) -> frz_mist_params {
+    let mut params: frz_mist_params = sized();
+    // SAFETY: the struct is there.
+    unsafe { frz_mist_params_init(&mut params, size_of::<frz_mist_params>()) };
+    params.cell = cell;
+    (params.turbulence_size, params.noise_size) = (cell * tried.any(8.0, 100.0), cell * tried.any(1.0, 20.0));
+    params.from_speed = tried.any(1e-2, 10.0);
+    params.half_life = tried.any(1e-2, 100.0);
+    params.gravity = tried.between(-10.0, 10.0);
+    params.turbulence = if tried.chance(0.5) { 0.0 } else { tried.any(0.1, 100.0) };
+    params.confinement = if tried.chance(0.5) { 0.0 } else { tried.any(0.01, 100.0) };
+    params.flags =
+        FRZ_MIST_FLOOR * u32::from(tried.chance(0.4)) | FRZ_MIST_FALLING * u32::from(tried.chance(0.5));
+    params
+}
+
+fn mist(tried: &mut Tried) {
+    let cell = tried.any(5e-3, 0.2);
+    let params = mist_params(tried, cell);
+    let mut mist = null_mut();
+    // SAFETY: the pointers are valid, and handles are destroyed once.
+    unsafe {
+        if frz_mist_create(tried.ctx(), &params, null(), 0, &mut mist) != FRZ_OK {
+            return;
+        }
+        for frame in 0..8 {
+            let (count, side, fastest) =
+                (tried.any(1.0, 50.0) as usize, cell * tried.any(0.1, 8.0), tried.any(0.1, 50.0));
+            let [places, speeds] = points(tried, count, side, fastest);
+            let places: Vec<[f64; 3]> = places.iter().map(|place| place.map(f64::from)).collect();
+            let params = mist_params(tried, cell);
+            frz_mist_set_params(mist, &params);
+            let dt = step_length(tried);
+            let (radius, time) = (cell * tried.any(0.05, 2.0), f64::from(frame));
+            tried.step(|ctx| {
+                let [places, speeds] = [view(&places), view(&speeds)];
+                frz_mist_step_points(
+                    ctx,
+                    mist,
+                    places,
+                    speeds,
+                    radius,
+                    null(),
+                    null(),
+                    null(),
+                    0,
+                    time,
+                    dt,
+                    null_mut(),
+                )
+            });
+        }
+        frz_mist_destroy(mist);
+    }
+}
