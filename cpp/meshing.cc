@@ -1,10 +1,15 @@
 // Between meshes and level sets.
 #include "impl.h"
 
+#include <openvdb/math/Stencils.h>
 #include <openvdb/tools/LevelSetMeasure.h>
 #include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tools/VolumeToMesh.h>
+#include <openvdb/tree/LeafManager.h>
 
+#include <tbb/parallel_for.h>
+
+#include <array>
 #include <vector>
 
 #ifdef FRAZIL_TREES_OF_LIBRARY
@@ -33,6 +38,12 @@ struct IndexMesh {
         at = openvdb::Vec3d(points[3 * p], points[3 * p + 1], points[3 * p + 2]) * scale;
     }
 };
+
+/// The voxel in the middle of the active ones.
+openvdb::Coord middle_of(const openvdb::FloatGrid& grid) {
+    const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+    return box.empty() ? openvdb::Coord() : openvdb::Coord::round(box.getCenter());
+}
 
 constexpr int32_t LEAF = 8;
 
@@ -143,18 +154,38 @@ Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptiv
     });
 }
 
+// OpenVDB's LevelSetMeasure multiplies gradients by voxels' own indices, whose rounding and discretisation a grid far from the origin
+// multiplies too, and refuses grids without voxels. Here indices count from the grid's middle.
 void measure(const Grid& grid, const Call& call, double& area, double& volume) {
     run(call, [&] {
+        using Gradient = openvdb::math::GradStencil<openvdb::FloatGrid, false>;
+        const openvdb::FloatGrid& level_set = *grid.impl->grid;
+        const openvdb::Coord middle = level_set.tree().empty() ? openvdb::Coord() : middle_of(level_set);
+        const double cell = level_set.voxelSize()[0];
+        const openvdb::tools::DiracDelta<double> delta(1.5);
+        const openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(level_set.tree());
+        std::vector<std::array<double, 2>> sums(leaves.leafCount());
         Interrupter interrupter(call);
-        // The tool sums about the world's origin in single precision: the grid is brought there first.
-        const openvdb::FloatGrid::Ptr near = grid.impl->grid->copy();
-        const openvdb::Vec3d centre = near->evalActiveVoxelBoundingBox().getCenter();
-        near->setTransform(near->transform().copy());
-        near->transform().postTranslate(-near->indexToWorld(centre));
-        openvdb::tools::LevelSetMeasure<openvdb::FloatGrid, openvdb::util::NullInterrupter> tool(*near, &interrupter);
-        area = tool.area(true);
-        volume = tool.volume(true);
-        interrupter.check();
+        tbb::parallel_for(leaves.leafRange(), [&](const auto& range) {
+            interrupter.check();
+            Gradient gradient(level_set);
+            for (auto leaf = range.begin(); leaf; ++leaf) {
+                auto& [leaf_area, leaf_volume] = sums[leaf.pos()];
+                for (auto voxel = leaf->cbeginValueOn(); voxel; ++voxel) {
+                    const double share = delta(*voxel / cell);
+                    if (share <= 0.0) continue;
+                    gradient.moveTo(voxel);
+                    const openvdb::Vec3d slope(gradient.gradient());
+                    leaf_area += share * slope.length();
+                    leaf_volume += share * slope.dot((voxel.getCoord() - middle).asVec3d()) / 3.0;
+                }
+            }
+        });
+        area = volume = 0.0;
+        for (const auto& [leaf_area, leaf_volume] : sums) {
+            area += leaf_area * cell * cell;
+            volume += leaf_volume * cell * cell * cell;
+        }
     });
 }
 
