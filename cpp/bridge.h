@@ -147,6 +147,7 @@ void sample_vectors(const VectorGrid& grid, const Call& call, rust::Slice<const 
                     rust::Slice<float> out);
 void prune(Grid& grid, const Call& call, bool level_set, float tolerance);
 void flood_fill(Grid& grid, const Call& call);
+void dilate(Grid& grid, const Call& call);
 rust::Vec<uint64_t> components(const Grid& grid, const Call& call);
 
 bool fits_half(size_t grid, bool vectors);

@@ -2,6 +2,7 @@
 #include "impl.h"
 
 #include <openvdb/tools/LevelSetUtil.h>
+#include <openvdb/tools/Morphology.h>
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tools/SignedFloodFill.h>
 #include <tbb/blocked_range.h>
@@ -315,6 +316,13 @@ void prune(Grid& grid, const Call& call, bool level_set, float tolerance) {
 
 void flood_fill(Grid& grid, const Call& call) {
     run(call, [&] { openvdb::tools::signedFloodFill(grid.impl->grid->tree()); });
+}
+
+void dilate(Grid& grid, const Call& call) {
+    run(call, [&] {
+        openvdb::tools::dilateActiveValues(grid.impl->grid->tree(), 1, openvdb::tools::NN_FACE,
+                                           openvdb::tools::IGNORE_TILES);
+    });
 }
 
 rust::Vec<uint64_t> components(const Grid& grid, const Call& call) {

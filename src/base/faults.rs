@@ -208,7 +208,7 @@ impl<'a> Part<'a> {
             let [a, b, c] = mesh.corners(triangle).map(|p| p - low);
             a.dot(&b.cross(&c))
         };
-        let volume = triangles.iter().map(six).sum::<f64>() / 6.0;
+        let volume = triangles.iter().map(six).sum::<f64>() / 6.0 + 0.0;
         let none = ROUNDING * (high - low).norm().powi(3);
         Self { triangles, volume: if volume.abs() > none { volume } else { 0.0 } }
     }

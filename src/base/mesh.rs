@@ -73,7 +73,7 @@ impl TriMesh {
             let [a, b, c] = self.corners(triangle).map(|p| p - origin);
             a.dot(&b.cross(&c))
         };
-        (0..self.triangles.len()).map(six).sum::<f64>() / 6.0
+        (0..self.triangles.len()).map(six).sum::<f64>() / 6.0 + 0.0
     }
 
     /// Surface area (m2).
@@ -82,7 +82,7 @@ impl TriMesh {
             let [a, b, c] = self.corners(triangle);
             (b - a).cross(&(c - a)).norm()
         };
-        (0..self.triangles.len()).map(twice).sum::<f64>() / 2.0
+        (0..self.triangles.len()).map(twice).sum::<f64>() / 2.0 + 0.0
     }
 
     /// Edges, as (lesser vertex, greater vertex), with how often the triangles run along them each way.

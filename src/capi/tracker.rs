@@ -354,7 +354,7 @@ pub unsafe extern "C" fn frz_tracker_step(
                 None => follower.tracker.step(call.ctx(), &from, &to, dt)?,
             };
             follower.saved.take();
-            done.news(&mut follower.is_told).for_each(|warning| call.ctx().warn(&warning));
+            done.news(&mut follower.is_told).for_each(|warning| call.ctx().warn(warning));
             let drops = done.apart.iter().filter(|apart| apart.volume >= 0.0).count();
             let of_change = |count: fn(&Change) -> usize| done.change.as_ref().map_or(0, count);
             let told = frz_tracker_report {

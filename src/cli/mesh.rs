@@ -341,7 +341,11 @@ fn in_words(mesh: &Value) -> String {
         out += &format!("\n  {} m, ", size.join(" x "));
     }
     let number = |key: &str| mesh[key].as_f64().unwrap_or(0.0);
-    out += &format!("area {:.6} m2, volume {:.6} m3\n", number("area_m2"), number("volume_m3"));
+    let (area, volume) = (number("area_m2"), number("volume_m3"));
+    // What the parts' volumes leave where they cancel is rounding.
+    let is_rounding = volume.abs() < 1e-9 * area.powf(1.5);
+    let volume = if is_rounding { 0.0 } else { volume };
+    out += &format!("area {area:.6} m2, volume {volume:.6} m3\n");
     out += &bodies_in_words(mesh["bodies"].as_array().map_or(&[][..], Vec::as_slice));
     for (key, forms) in PARTS.into_iter().chain(JOINTS).chain(TRIANGLES).filter(|(key, _)| count(key) > 0) {
         out += &format!("  {:>8} {}\n", count(key), form(count(key), forms));
@@ -350,7 +354,7 @@ fn in_words(mesh: &Value) -> String {
     for (key, forms) in JOINTS.into_iter().filter(|(key, _)| ![0, count(key)].contains(&as_it_is(key))) {
         out += &format!("  {:>8} {}, by the vertices' indices\n", as_it_is(key), form(as_it_is(key), forms));
     }
-    if number("volume_m3") < 0.0 {
+    if volume < 0.0 {
         out += "           inside out: turned outward where it is used\n";
     }
     out

@@ -25,6 +25,8 @@ pub(super) struct Kept {
 
 /// Columns times steps of a frame that may take long: some 20 ms.
 const LONG: f64 = (1 << 21) as f64;
+/// A step of a few columns takes as long as so many.
+const EACH: f64 = 1024.0;
 /// A column that may be full counts as so many: its head is found in rounds.
 const FULL: f64 = 16.0;
 
@@ -143,7 +145,9 @@ impl Shallow {
             (None, Pace::Realtime(longest)) => (dt / longest).max(1.0),
         };
         let [wet, full] = self.flow.work(&self.columns).map(|count| count as f64);
-        steps * (wet + FULL * full) > LONG
+        // Given steps may be so long that columns fill in their course.
+        let full = if count.is_some() { wet } else { full };
+        steps * (EACH + wet + FULL * full) > LONG
     }
 
     fn keep(&mut self) {

@@ -155,6 +155,7 @@ pub(super) mod ffi {
         fn sample(grid: &Grid, call: &Call, world: &[f64], linear: bool, out: &mut [f32]) -> Result<()>;
         fn prune(grid: Pin<&mut Grid>, call: &Call, level_set: bool, tolerance: f32) -> Result<()>;
         fn flood_fill(grid: Pin<&mut Grid>, call: &Call) -> Result<()>;
+        fn dilate(grid: Pin<&mut Grid>, call: &Call) -> Result<()>;
         fn components(grid: &Grid, call: &Call) -> Result<Vec<u64>>;
 
         /// Whether every value of the grid at an address is finite in 16 bits.

@@ -2,6 +2,7 @@
 
 use super::level_set::{from_mesh, to_mesh};
 use super::{FloatGrid, Leaf};
+use crate::base::TriMesh;
 use crate::base::blocks::VOXELS;
 use crate::context::Context;
 use crate::error::Result;
@@ -69,7 +70,14 @@ pub fn mended(ctx: &Context, grid: FloatGrid) -> Result<(FloatGrid, Option<Strin
         return Ok((grid, Some(what)));
     }
     let voxel = grid.voxel_size();
-    let mesh = if grid.is_world_fixed() { to_mesh(ctx, &grid, 0.0, 0.0)? } else { Default::default() };
+    let mesh = if grid.is_world_fixed() {
+        // Of a surface through a voxel itself, a band of one cell has that voxel alone, and no mesh both of its sides.
+        let mut wider = grid.deep_copy()?;
+        wider.dilate()?;
+        to_mesh(ctx, &wider, 0.0, 0.0)?
+    } else {
+        TriMesh::default()
+    };
     if mesh.triangles.is_empty() || !mesh.is_closed() {
         return Ok((grid, Some(format!("{what}: offsets, combinations and volumes of it are wrong"))));
     }

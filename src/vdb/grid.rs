@@ -393,6 +393,14 @@ impl FloatGrid {
     pub fn flood_fill(&mut self) -> Result<()> {
         ffi::flood_fill(self.inner.pin_mut(), &alone()).map_err(fail)
     }
+
+    /// Makes the voxels that share a face with an active one active too, with the values that they have.
+    ///
+    /// # Errors
+    /// What OpenVDB reports.
+    pub(super) fn dilate(&mut self) -> Result<()> {
+        ffi::dilate(self.inner.pin_mut(), &alone()).map_err(fail)
+    }
 }
 
 /// Whether a map from index space maps voxel (i, j, k) to (i, j, k) times the voxel size.

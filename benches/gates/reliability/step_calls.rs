@@ -9,7 +9,8 @@ use std::time::Duration;
 use frazil::capi::context::*;
 use frazil::capi::frz_status::{self, *};
 use frazil::capi::{grains::*, grains_params::*, grains_points::*, mist::*, mist_params::*};
-use frazil::capi::{shallow::*, shallow_detail::*, shallow_flows::*, shallow_params::*, shallow_terrain::*};
+use frazil::capi::{shallow::*, shallow_detail::*, shallow_detail_ground::*, shallow_flows::*};
+use frazil::capi::{shallow_params::*, shallow_terrain::*};
 use rustix::time::{ClockId, clock_gettime};
 
 use crate::grains::Random;
@@ -44,7 +45,8 @@ pub struct Tried<'a> {
     times: Vec<f64>,
     median: f64,
     cancelled: usize,
-    slow: usize,
+    /// CPU times of those that went on for too long (s).
+    late: Vec<f64>,
     slowest: f64,
 }
 
@@ -66,19 +68,21 @@ impl Watch {
         let (due, ends) = (Arc::new(AtomicU64::new(u64::MAX)), Arc::new(AtomicBool::new(false)));
         let (ctx, other_due, other_ends) = (threads.ctx as usize, due.clone(), ends.clone());
         let watcher = std::thread::spawn(move || {
-            let mut cancelled = None;
+            // The due time that was cancelled, and when.
+            let mut cancelled = (u64::MAX, 0);
             while !other_ends.load(Ordering::SeqCst) {
                 std::thread::sleep(Duration::from_millis(1));
                 let (now, due) = (wall(), other_due.load(Ordering::SeqCst));
                 if due == u64::MAX {
-                    cancelled = None;
-                } else if cancelled.is_some_and(|at| now > at + (ENDLESS * 1e6) as u64) {
+                    continue;
+                }
+                if cancelled.0 == due && now > cancelled.1 + (ENDLESS * 1e6) as u64 {
                     eprintln!("reliability.step_calls: a step does not end: cancelled {ENDLESS} s ago");
                     std::process::exit(1);
-                } else if now >= due && cancelled.is_none() {
+                } else if now >= due && cancelled.0 != due {
                     // SAFETY: the context is there until this thread was joined.
                     unsafe { frz_context_cancel(ctx as *mut frz_context) };
-                    cancelled = Some(now);
+                    cancelled = (due, now);
                 }
             }
         });
@@ -126,10 +130,12 @@ impl Tried<'_> {
         self.cancelled += usize::from(status == FRZ_CANCELLED);
         // CPU time from the cancel on, at least.
         let after = took - limit;
-        self.slow += usize::from(after > LONGEST && took > TIMES * self.median);
+        if after > LONGEST {
+            self.late.push(took);
+        }
         self.slowest = self.slowest.max(after);
         self.times.push(took);
-        if self.times.len() % 100 == 0 {
+        if self.times.len().is_multiple_of(100) {
             let mut sorted = self.times.clone();
             sorted.sort_unstable_by(f64::total_cmp);
             self.median = sorted[sorted.len() / 2];
@@ -173,7 +179,8 @@ pub fn run(h: &mut Harness) {
         return;
     }
     let watch = Watch::new();
-    let functions: [(&'static str, fn(&mut Tried)); 10] = [
+    type Scenes = fn(&mut Tried);
+    let functions: [(&'static str, Scenes); 10] = [
         ("frz_shallow_step", shallow),
         ("frz_shallow_replay", replay),
         ("frz_shallow_detail_step", detail),
@@ -189,12 +196,21 @@ pub fn run(h: &mut Harness) {
     for (name, scenes) in functions {
         let random = Random(0x9e37_79b9_7f4a_7c15 ^ name.len() as u64);
         let times = Vec::with_capacity(STEPS);
-        let mut tried =
-            Tried { watch: &watch, random, name, times, median: 0.0, cancelled: 0, slow: 0, slowest: 0.0 };
+        let mut tried = Tried {
+            watch: &watch,
+            random,
+            name,
+            times,
+            median: 0.0,
+            cancelled: 0,
+            late: Vec::new(),
+            slowest: 0.0,
+        };
         while !tried.is_done() {
             scenes(&mut tried);
         }
-        let Tried { median, cancelled, slowest, slow: own, .. } = tried;
+        let Tried { median, cancelled, slowest, late, .. } = tried;
+        let own = late.iter().filter(|took| **took > TIMES * median).count();
         let slowest = slowest.max(0.0);
         notes.push(format!("{name} {:.2} ms, {cancelled} cancelled, {slowest:.3} s", 1e3 * median));
         println!("# {}, {own} too slow", notes.last().expect("a note"));
@@ -453,7 +469,7 @@ pub fn mist_params(tried: &mut Tried, cell: f64) -> frz_mist_params {
     params.turbulence = if tried.chance(0.5) { 0.0 } else { tried.any(0.1, 100.0) };
     params.confinement = if tried.chance(0.5) { 0.0 } else { tried.any(0.01, 100.0) };
     params.flags =
-        FRZ_MIST_FLOOR * u32::from(tried.chance(0.4)) | FRZ_MIST_FALLING * u32::from(tried.chance(0.5));
+        (FRZ_MIST_FLOOR * u32::from(tried.chance(0.4))) | (FRZ_MIST_FALLING * u32::from(tried.chance(0.5)));
     params
 }
 

@@ -6,7 +6,7 @@ use std::ptr::{null, null_mut};
 use frazil::capi::frz_span;
 use frazil::capi::frz_status::*;
 use frazil::capi::{base::*, body::*, grains::*, grid::*, mesh::*, mist::*, snow::*};
-use frazil::capi::{tracker::*, tracker_eased::*, tracker_params::*};
+use frazil::capi::{tracker::*, tracker_eased::*};
 
 use crate::host::{view, works};
 use crate::reliability_step_calls::{Tried, grain_params, mist_params, sized, step_length};

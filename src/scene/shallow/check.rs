@@ -167,7 +167,8 @@ fn comes(scene: &Scene, of: &Shallow) -> f64 {
         let to = point.until.unwrap_or(frames.last).min(frames.last);
         point.point.rate * f64::from((to - from + 1).max(0)) / scene.shot.fps
     });
-    poured.sum::<f64>() + sourced.sum::<f64>()
+    // A sum of nothing is -0.
+    poured.sum::<f64>() + sourced.sum::<f64>() + 0.0
 }
 
 /// What looks like a mistake.

@@ -330,7 +330,7 @@ impl Grains {
         for place in &places {
             self.add(*place, [0.0; 3], frame)?;
         }
-        Ok((places.len(), removals.iter().map(|removal| removal.volume).sum()))
+        Ok((places.len(), removals.iter().map(|removal| removal.volume).sum::<f64>() + 0.0))
     }
 
     /// The colliders of the step; wakes all grains if a mesh has jumped since the last step.

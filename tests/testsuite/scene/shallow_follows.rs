@@ -211,6 +211,15 @@ fn what_leaves_the_area_rests_until_it_comes_back() {
 }
 
 #[test]
+fn what_never_comes_has_no_sign() {
+    let folder = tempfile::tempdir().unwrap();
+    write_ground(folder.path(), 8, |_| sheet(0.0, 0.0));
+    write_scene(folder.path(), "", "");
+    let said = works(folder.path(), "check spill.toml");
+    assert!(said.contains(" 0.0000 ml come later") && !said.contains("-0.0000"), "{said}");
+}
+
+#[test]
 fn what_an_obstacle_covers_rests_and_the_shot_resumes() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

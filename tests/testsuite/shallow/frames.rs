@@ -81,7 +81,7 @@ fn a_frame_that_takes_long_is_cancelled_within_and_was_never_begun() {
             liquid.step(&ctx, FRAME).unwrap();
             other.step(&ctx, FRAME).unwrap();
         }
-        assert_eq!(liquid.save() == other.save(), true);
+        assert!(liquid.save() == other.save());
     }
 }
 
@@ -178,10 +178,14 @@ fn a_source_in_a_cavity_that_is_full_owes_nothing() {
     }
     // A rate that is turned off has nothing left to give, either.
     liquid.update_terrain(&cavity(true)).unwrap();
-    (0..60).for_each(|_| drop(liquid.step(&ctx, FRAME).unwrap()));
+    for _ in 0..60 {
+        liquid.step(&ctx, FRAME).unwrap();
+    }
     liquid.set_rate(0, 0.0).unwrap();
     liquid.update_terrain(&cavity(false)).unwrap();
     let before = liquid.moved(0);
-    (0..6).for_each(|_| drop(liquid.step(&ctx, FRAME).unwrap()));
+    for _ in 0..6 {
+        liquid.step(&ctx, FRAME).unwrap();
+    }
     assert!(liquid.moved(0) - before < 1e-13, "{}", liquid.moved(0) - before);
 }

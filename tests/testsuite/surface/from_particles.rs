@@ -207,7 +207,7 @@ fn what_cannot_be_cut_out_is_refused_before_any_work() {
     }
     let frames = "vdb from-particles drop.%04d.bgeo --frames 1-2 --spacing 0.1 --mesh out.%04d.ply";
     fails(folder, &format!("{frames} --subtract gap.%04d.vdb"), 1, &["gap.0002.vdb", "1 of 2 frames"]);
-    fails(folder, &format!("{frames} --subtract fog.%04d.vdb"), 1, &["fog.0002.vdb", "no level set"]);
+    fails(folder, &format!("{frames} --subtract fog.%04d.vdb"), 1, &["fog.0002.vdb", "not a level set"]);
     fs::remove_file(folder.join("out.0001.ply")).unwrap();
     for (options, words) in [
         ("--radius 0.1", "--method spheres"),
