@@ -4,11 +4,13 @@
 //! higher they lie, so that less does ([`grains`](crate::snow::grains)).
 
 /// Angles of poured piles (degrees) and the friction that gives them, on snow: what lies between the slopes of piles of 10,000 and of
-/// 30,000 grains, as `make gates ONLY=snow.grains.pile` pours them. Larger piles are steeper. On snow, which holds the lowest grains,
-/// none is flatter than about 21 degrees, however little friction there is: each grain lies in a hollow between others.
-const LOOSE: [(f64, f64); 9] = [
+/// 30,000 grains, as `make gates ONLY=snow.grains.pile` pours them. Larger piles are steeper. From a friction of 0.03 on, each grain
+/// lies in a hollow between others; with less, piles flatten.
+const LOOSE: [(f64, f64); 11] = [
     (0.0, 0.0),
-    (18.0, 0.03),
+    (12.1, 0.02),
+    (20.2, 0.03),
+    (22.0, 0.045),
     (24.2, 0.07),
     (27.0, 0.095),
     (29.7, 0.12),

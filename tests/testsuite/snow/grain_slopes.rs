@@ -81,7 +81,7 @@ fn a_grain_lies_on_a_base_up_to_its_angle_of_repose() {
     }
 }
 
-/// A heap of grains of a diameter of 5 mm on a floor.
+/// Lets a heap move for some frames on a floor that leans by so many degrees toward greater x.
 fn step_on_floor(heap: &mut Heap, params: &Params, floor: f32, degrees: f64, frames: usize) {
     let ctx = context();
     let division = Division { dt: 1.0 / 24.0, sub_steps: params.sub_steps(1.0 / 24.0, 0.0) };
