@@ -79,6 +79,11 @@ impl Experiment {
         Self { ctx, params, heap, division, colliders, random, visits_all: false, turn: 0.0 }
     }
 
+    /// Gives the floor the friction of the base layer.
+    pub fn stand_on_snow(&mut self) {
+        self.colliders.floor = Some(Floor { height: 0.0, friction: self.params.friction_of_base() as f32 });
+    }
+
     pub fn diameter(&self) -> f64 {
         2.0 * self.params.radius
     }

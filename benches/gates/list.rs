@@ -20,6 +20,7 @@ const fn yes(name: &'static str) -> Gate {
 
 pub const GATES: &[Gate] = &[
     // Poured piles: error of the angle asked for, its spread over sizes, what becomes of it in 240 frames.
+    gate("snow.grains.pile_asked", "deg", Most(1.5), Most(0.7)),
     gate("snow.grains.pile_10k", "deg", Most(3.0), Most(1.5)),
     gate("snow.grains.pile_100k", "deg", Most(3.0), Most(1.5)),
     gate("snow.grains.pile_size", "deg", Most(1.5), Most(0.7)),

@@ -1,4 +1,4 @@
-//! Gates of poured piles: the requested slope, for any size and count of grains.
+//! Gates of poured piles: the requested slope, for any size and count of grains, on snow as in a scene.
 
 use frazil::base::DVec3;
 use frazil::snow::grain_friction::of_repose;
@@ -90,6 +90,7 @@ fn piles(h: &mut Harness) {
         for &asked in angles {
             for seed in 1..=seeds {
                 let mut pile = Experiment::new(2, 0.005, of_repose(asked, false), seed);
+                pile.stand_on_snow();
                 pile.pour(count, frames, 30);
                 let slope = pile.slope();
                 println!("# asked {asked} degrees, seed {seed}: {slope:.2}");
@@ -98,6 +99,9 @@ fn piles(h: &mut Harness) {
         }
         worst
     };
+    if h.wants("snow.grains.pile_asked") {
+        h.gate("snow.grains.pile_asked", worst(&[25.0, 30.0, 35.0], 2, 10_000, 220), "");
+    }
     if h.wants("snow.grains.pile_10k") {
         h.gate("snow.grains.pile_10k", worst(&[18.0, 25.0, 32.0, 38.0], 3, 10_000, 220), "");
     }
@@ -116,6 +120,7 @@ fn sizes(h: &mut Harness) {
     for diameter in [0.0015, 0.005, 0.02] {
         let frames = (220.0 * f64::sqrt(diameter / 0.005)).ceil() as usize;
         let mut pile = Experiment::new(2, diameter, of_repose(32.0, false), 1);
+        pile.stand_on_snow();
         pile.pour(10_000, frames, frames / 6);
         let slope = pile.slope();
         (0..240).for_each(|_| pile.step());

@@ -3,20 +3,21 @@
 //! Grains do not turn, so that a little friction holds steep piles; and those that do not attract each other are lighter the
 //! higher they lie, so that less does ([`grains`](crate::snow::grains)).
 
-/// Angles of poured piles (degrees) and the friction that gives them: what lies between the slopes of piles of 10,000, 30,000
-/// and 100,000 grains, as `make gates ONLY=snow.grains.pile` pours them, and of deep beds (`snow.grains.turned_bed`). Larger piles
-/// are steeper, most at a friction of 0.09, which holds 23, 25 and 28 degrees; beds slide a little before piles of 10,000 do.
-const LOOSE: [(f64, f64); 10] = [
+/// Angles of poured piles (degrees) and the friction that gives them, on snow: what lies between the slopes of piles of 10,000 and of
+/// 30,000 grains, as `make gates ONLY=snow.grains.pile` pours them. Larger piles are steeper. From a friction of 0.03 on, each grain
+/// lies in a hollow between others; with less, piles flatten.
+const LOOSE: [(f64, f64); 11] = [
     (0.0, 0.0),
-    (5.4, 0.03),
-    (14.6, 0.06),
-    (18.0, 0.07),
-    (24.75, 0.09),
-    (28.7, 0.12),
-    (32.8, 0.15),
-    (37.0, 0.18),
-    (40.9, 0.21),
-    (STEEPEST, 0.22),
+    (12.1, 0.02),
+    (20.2, 0.03),
+    (22.0, 0.045),
+    (24.2, 0.07),
+    (27.0, 0.095),
+    (29.7, 0.12),
+    (33.0, 0.15),
+    (36.4, 0.18),
+    (39.5, 0.21),
+    (STEEPEST, 0.235),
 ];
 
 /// The same of grains that attract each other, as little as they can.

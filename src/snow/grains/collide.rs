@@ -163,7 +163,9 @@ pub fn collide(a: Eight, b: Eight, batch: &mut Batch, c: &Coefficients) -> (Eigh
     let total = (before_along + (wanted - along) * inverse).max(least);
     let sliding = sub8(relative, scaled8(normal, along));
     let across = sub8(sub8(before, scaled8(normal, before_along)), scaled8(sliding, inverse));
-    let most = Lanes::all(c.friction) * (total - least);
+    let slides = Lanes::all(c.slides).is_less(dot8(sliding, sliding));
+    let friction = slides.choose(Lanes::all(c.friction_of_sliding), Lanes::all(c.friction));
+    let most = friction * (total - least);
     let square = dot8(across, across);
     let exceeds = (most * most).is_less(square);
     let share = exceeds.choose(most / square.sqrt().max(Lanes::all(1.0e-30)), one);

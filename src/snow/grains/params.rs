@@ -135,6 +135,7 @@ impl Params {
     pub fn coefficients(&self, division: &Division) -> Coefficients {
         let dt = division.dt / division.sub_steps as f64;
         let up = if self.gravity == 0.0 { 0.0 } else { -self.gravity.signum() as f32 };
+        let friction_of_sliding = if self.attraction > 0.0 { 1.0 } else { SLIDING } * self.friction;
         Coefficients {
             dt: dt as f32,
             diameter: (2.0 * self.radius) as f32,
@@ -143,6 +144,8 @@ impl Params {
             air: (1.0 - libm::pow(self.air, dt)) as f32,
             air_by_neighbours: self.air_by_density.then(|| density::air_by_neighbours(self.air, dt)),
             friction: self.friction as f32,
+            friction_of_sliding: friction_of_sliding as f32,
+            slides: (SLIDES * self.gravity.abs() * 2.0 * self.radius) as f32,
             attraction: (self.attraction * self.gravity.abs() * dt) as f32,
             weight: (self.gravity.abs() * dt) as f32,
             restitution: self.restitution as f32,
@@ -154,6 +157,11 @@ impl Params {
     }
 }
 
+/// Friction between loose grains that slide over each other, as a share of that between grains that do not yet.
+const SLIDING: f64 = 0.8;
+/// Square of the speed above which a grain slides, in diameters times gravity: a tenth of the speed at which it could rise by half a
+/// diameter.
+const SLIDES: f64 = 0.01;
 /// Least speed that bounces, in sub-steps of gravity.
 const BOUNCING: f64 = 4.0;
 /// Largest gap (diameters) at which grains attract each other.

@@ -42,8 +42,12 @@ pub struct Coefficients {
     pub air: f32,
     /// The same by the count of neighbours that shelter a grain; none: they do not.
     pub air_by_neighbours: Option<[f32; SURROUNDED + 1]>,
-    /// Friction between grains.
+    /// Friction between grains that do not slide over each other yet.
     pub friction: f32,
+    /// Friction between grains that slide.
+    pub friction_of_sliding: f32,
+    /// Square of the speed (m2/s2) above which a grain slides over another, or over a collider.
+    pub slides: f32,
     /// Largest impulse of attraction in a sub-step (m/s).
     pub attraction: f32,
     /// Speed that gravity adds in a sub-step (m/s).
@@ -159,6 +163,7 @@ fn accelerate(rows: &mut [Row], layout: &mut Layout, c: &Coefficients) {
 /// Applies the impulse of a touch from the last sub-step, none after a bounce; a fast approach starts a bounce.
 fn begin_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients) {
     touch.forget_bounce();
+    touch.friction_now = friction(row, touch, c);
     if c.restitution > 0.0 && !row.rests() {
         let approach = -dot(sub(row.velocity, touch.velocity), touch.normal);
         let gap = dot(touch.normal, row.place) - touch.offset;
@@ -167,6 +172,24 @@ fn begin_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients) {
         }
     }
     row.velocity = add(row.velocity, scaled(touch.total(), row.weight()));
+}
+
+/// Friction of a touch in this sub-step.
+///
+/// A collider holds a grain with its own friction until the grain slides: what lies stays, up to the angle whose tangent that is.
+/// A grain that slides would roll, which these cannot. It meets the friction between grains, which is less for the same reason, and
+/// the slope of the surface more, so that it stops wherever a grain can lie, and slides by Coulomb's law where none can. With the
+/// whole friction, columns that collapse run out a third less far than in experiments, where the ground does not matter (Lube et al.
+/// 2004): their lowest layer never moves.
+fn friction(row: &Row, touch: &Touch, c: &Coefficients) -> f32 {
+    let velocity = sub(sub(row.velocity, scaled(c.gravity, c.dt)), touch.velocity);
+    let sliding = sub(velocity, scaled(touch.normal, dot(velocity, touch.normal)));
+    let cosine = dot(touch.normal, c.up);
+    if dot(sliding, sliding) <= c.slides || cosine < STEEP {
+        return touch.friction;
+    }
+    let slope = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
+    touch.friction.min(c.friction + slope)
 }
 
 /// Moves the grains, after a last correction of touches. Returns the largest speed (m/s).
@@ -248,7 +271,7 @@ fn resist(row: &mut Row, touch: &mut Touch, c: &Coefficients, last: bool) {
     let wanted = if touch.bounce > 0.0 { touch.bounce } else { closing };
     let total = (touch.impulse + wanted - along).max(least);
     let sliding = sub(relative, scaled(normal, along));
-    let across = bounded(sub(touch.across, sliding), touch.friction * (total - least));
+    let across = bounded(sub(touch.across, sliding), touch.friction_now * (total - least));
     let impulse = add(scaled(normal, total - touch.impulse), sub(across, touch.across));
     (touch.impulse, touch.across) = (total, across);
     row.velocity = add(row.velocity, impulse);

@@ -18,8 +18,10 @@ pub struct Touch {
     pub offset: f32,
     /// Velocity of the surface (m/s).
     pub velocity: V,
-    /// Friction against it.
+    /// Friction against it of a grain that does not slide.
     pub friction: f32,
+    /// Friction in this sub-step.
+    pub friction_now: f32,
     /// Acceleration up to which the collider holds the grain (weights of the grain).
     pub stick: f32,
     /// Whether no grain may be behind the plane at the end of a sub-step: ground.
