@@ -30,6 +30,8 @@ mod crowd;
 mod damage;
 #[path = "gates/dense.rs"]
 mod dense;
+#[path = "gates/detail_kept.rs"]
+mod detail_kept;
 #[path = "gates/distance.rs"]
 mod distance;
 #[path = "gates/early.rs"]
@@ -311,6 +313,7 @@ fn main() {
     reliability_gltf_valid::run(&mut h);
     orientation::run(&mut h);
     rest_kept::run(&mut h);
+    detail_kept::run(&mut h);
     house::run(&mut h);
     h.finish();
 }

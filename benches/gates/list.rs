@@ -354,6 +354,12 @@ pub const GATES: &[Gate] = &[
     none("surface.rest_kept_made", "triangles"),
     // Pairs of triangles that meet in a frame as it is shown, less those without easing.
     none("surface.rest_kept_crossings", "pairs"),
+    // Detail where the liquid has neither broken nor stretched, over all frames and with default settings: correlation with that of the
+    // first frame, what is gone counting as flat, and by how much its size is off. A solver's cache, and a rippled ball that turns.
+    gate("surface.detail_kept_cache", "1", Least(0.95), Least(0.98)),
+    gate("surface.detail_kept_cache_gain", "1", Most(0.1), Most(0.05)),
+    gate("surface.detail_kept_turned", "1", Least(0.98), Least(0.995)),
+    gate("surface.detail_kept_turned_gain", "1", Most(0.05), Most(0.02)),
     // Topology matched near the flags against the whole grid: signs and differences, and the volume of a neck.
     yes("surface.match_near"),
     gate("surface.match_neck", "%", Most(1.0), Open),

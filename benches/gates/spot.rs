@@ -276,7 +276,7 @@ pub fn parts(mesh: &TriMesh) -> usize {
 }
 
 /// Vertices that share an edge with each.
-fn neighbours(mesh: &TriMesh) -> Vec<Vec<u32>> {
+pub fn neighbours(mesh: &TriMesh) -> Vec<Vec<u32>> {
     let mut around = vec![Vec::new(); mesh.positions.len()];
     for [a, b, c] in &mesh.triangles {
         for (from, to) in [(a, b), (b, c), (c, a), (b, a), (c, b), (a, c)] {
@@ -291,7 +291,7 @@ fn neighbours(mesh: &TriMesh) -> Vec<Vec<u32>> {
 }
 
 /// What smoothing takes away at each vertex, along the smooth mesh's normal (m).
-fn detail(mesh: &TriMesh, around: &[Vec<u32>]) -> Vec<f64> {
+pub fn detail(mesh: &TriMesh, around: &[Vec<u32>]) -> Vec<f64> {
     let mut places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
     for _ in 0..ROUNDS {
         let mean = |vertex: usize| {
@@ -311,7 +311,7 @@ fn detail(mesh: &TriMesh, around: &[Vec<u32>]) -> Vec<f64> {
 }
 
 /// Correlation of pairs, and the slope of the second over the first.
-fn regression(pairs: &[[f64; 2]]) -> [f64; 2] {
+pub fn regression(pairs: &[[f64; 2]]) -> [f64; 2] {
     let count = pairs.len() as f64;
     let mean = [0, 1].map(|n| pairs.iter().map(|pair| pair[n]).sum::<f64>() / count);
     let sum =

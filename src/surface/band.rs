@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::cells::Coord;
+use super::deep::reach_in;
 use super::implicit::{Implicit, SIDE};
 use super::isosurface::Isosurface;
 use crate::base::blocks::{DIM, VOXELS, Values, offset};
@@ -21,6 +22,8 @@ pub struct Distances {
     cell: f64,
     /// How far from the surface they are known (cells); beyond, they have that size.
     reach: f32,
+    /// Blocks in which they are known farther.
+    deep: Vec<(Coord, f32)>,
     /// Coordinates of blocks, ascending.
     coords: Vec<Coord>,
     /// Distances (cells), negative inside.
@@ -48,19 +51,45 @@ impl Distances {
     /// # Errors
     /// More memory than the context allows; cancel.
     pub fn new(ctx: &Context, phi: &Implicit, surface: &Isosurface, reach: f32) -> Result<Self> {
+        Self::deeper(ctx, phi, surface, reach, Vec::new())
+    }
+
+    /// Distances up to `reach` (cells) from a surface, and farther in some blocks, ascending, with how far (cells) in each.
+    ///
+    /// # Errors
+    /// As [`Distances::new`].
+    pub fn deeper(
+        ctx: &Context,
+        phi: &Implicit,
+        surface: &Isosurface,
+        reach: f32,
+        deep: Vec<(Coord, f32)>,
+    ) -> Result<Self> {
         let runs: Vec<(Coord, &[[u32; 3]])> = surface.runs().collect();
         // The blocks whose nodes triangles of a run may be near to.
-        let mut pairs: Vec<(Coord, u32)> = runs
-            .iter()
-            .zip(0..)
-            .flat_map(|((patch, _), run)| {
-                let margin = reach.ceil() as i32;
-                let low = patch.map(|at| (at * SIDE - margin).div_euclid(DIM as i32));
-                let high = patch.map(|at| (at * SIDE + SIDE + margin).div_euclid(DIM as i32));
-                let on = move |axis: usize| low[axis]..=high[axis];
-                on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| ([x, y, z], run))))
-            })
-            .collect();
+        let around = |patch: &Coord, reach: f32| {
+            let margin = reach.ceil() as i32;
+            let low = patch.map(|at| (at * SIDE - margin).div_euclid(DIM as i32));
+            let high = patch.map(|at| (at * SIDE + SIDE + margin).div_euclid(DIM as i32));
+            [low, high]
+        };
+        let deepest = deep.iter().map(|(_, reach)| *reach).fold(reach, f32::max);
+        let blocks = |((patch, _), run): (&(Coord, &[[u32; 3]]), u32)| {
+            let ([low, high], [from, to]) = (around(patch, reach), around(patch, deepest));
+            let on = move |axis: usize| from[axis]..=to[axis];
+            let all = on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])));
+            let is_in = |block: &Coord, [low, high]: [Coord; 2]| {
+                (0..3).all(|axis| (low[axis]..=high[axis]).contains(&block[axis]))
+            };
+            let is_wanted = |block: &Coord| {
+                is_in(block, [low, high])
+                    || reach_in(&deep, *block).is_some_and(|reach| is_in(block, around(patch, reach)))
+            };
+            all.filter(is_wanted).map(|block| (block, run)).collect::<Vec<(Coord, u32)>>()
+        };
+        let pairs: Vec<Vec<(Coord, u32)>> =
+            runs.par_iter().zip(0..runs.len() as u32).with_min_len(64).map(blocks).collect();
+        let mut pairs = pairs.concat();
         pairs.par_sort_unstable();
         let groups: Vec<&[(Coord, u32)]> = pairs.chunk_by(|a, b| a.0 == b.0).collect();
         ctx.allow(WHAT, (groups.len() * BYTES) as u64)?;
@@ -78,6 +107,7 @@ impl Distances {
         let fill = |(search, triangles): &mut (Search, Vec<Triangle>), group: &&[(Coord, u32)]| {
             ctx.check()?;
             let block = group[0].0;
+            let reach = reach_in(&deep, block).map_or(reach, |own| own.max(reach));
             triangles.clear();
             for (_, run) in *group {
                 let shift =
@@ -106,7 +136,7 @@ impl Distances {
                 })
             })
             .collect();
-        Ok(Self { cell: phi.cell(), reach, coords, values, slots, around })
+        Ok(Self { cell: phi.cell(), reach, deep, coords, values, slots, around })
     }
 
     /// Edge of a cell (m).
@@ -114,9 +144,14 @@ impl Distances {
         self.cell
     }
 
-    /// How far from the surface distances are known (cells).
+    /// How far from the surface distances are known everywhere (cells).
     pub fn reach(&self) -> f32 {
         self.reach
+    }
+
+    /// How far from the surface distances are known in a block (cells).
+    pub fn reach_in(&self, block: Coord) -> f32 {
+        reach_in(&self.deep, block).map_or(self.reach, |own| own.max(self.reach))
     }
 
     /// Coordinates of the blocks, ascending: block (i, j, k) begins at node 8 (i, j, k).

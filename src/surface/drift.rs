@@ -1,5 +1,6 @@
-//! Whether the mesh strains or rests: the displacement of each vertex over the last steps, of which edges know by how much their lengths
-//! have changed. Without that, lengths near a limit of improvement would be remade for ever by particles that only tremble.
+//! Whether the mesh strains or rests: by how much the liquid has displaced each vertex over the last steps, of which edges know by how much
+//! their lengths have changed. Without that, lengths near a limit of improvement would be remade for ever by particles that only tremble.
+//! Projection does not count: where the surface depends on few particles, as on thin sheets, it moves ten times as far as they tremble.
 
 use crate::base::DVec3;
 
@@ -21,7 +22,7 @@ impl Drift {
         Self { steps: 0, vertices: vec![[0.0; 3]; vertices] }
     }
 
-    /// That after a step that moved the vertices from some places (m) to others; it is not yet a new reference.
+    /// That after a step in which the particles carried the vertices from some positions (m) to others; it is not yet a new reference.
     pub fn after(&self, from: &[DVec3], to: &[DVec3]) -> Vec<[f32; 3]> {
         let moved = |(drift, (from, to)): (&[f32; 3], (&DVec3, &DVec3))| {
             let by = to - from;

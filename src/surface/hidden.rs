@@ -145,11 +145,11 @@ impl Compared<'_> {
         let near = around.filter_map(|block| passed.keeps.get(&block).copied());
         let large = passed.large.iter().filter(|large| large.is_near(block, 1)).map(|large| large.keeps);
         let allowed = self.slack + near.chain(large).fold(0.0, f32::max);
-        let reach = self.distances.reach();
+        let there = plus(block, self.origin.map(|at| at >> 3));
+        let reach = self.distances.reach_in(there);
         if allowed >= reach {
             return Vec::new();
         }
-        let there = plus(block, self.origin.map(|at| at >> 3));
         let known = self.distances.find(there).map(|slot| self.distances.values(slot));
         let is_passed =
             passed.keeps.contains_key(&block) || passed.large.iter().any(|large| large.is_near(block, 0));

@@ -39,6 +39,7 @@ mod cells;
 mod change;
 mod coverage;
 mod cubes;
+mod deep;
 mod drift;
 mod dry;
 mod easing;

@@ -80,7 +80,7 @@ impl<'a> Sampler<'a> {
         // Where there is no block, distances go on with the sign of the cell's own first node.
         let own = self.distances.values(slot)
             [((self.cell[0] & 7) << 6 | (self.cell[1] & 7) << 3 | (self.cell[2] & 7)) as usize];
-        let far = self.distances.reach().copysign(own);
+        let far = self.distances.reach_in(self.block.0).copysign(own);
         for x in 0..4 {
             for y in 0..4 {
                 for z in 0..4 {

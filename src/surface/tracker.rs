@@ -12,6 +12,7 @@ use super::apart::{Apart, Lacking, Parts, Wanted};
 use super::band::Distances;
 use super::cells::cell_of;
 use super::coverage::Cover;
+use super::deep::{Deep, covers, sorted};
 use super::drift::Drift;
 use super::enclosed::Crowd;
 use super::fade::fade;
@@ -58,12 +59,17 @@ pub struct Tracker {
 
 /// Least reach of the band, and the greatest that is tried at the first frame (r).
 pub(super) const REACH: [f64; 2] = [1.5, 8.0];
+/// How far the band reaches around vertices that do not find the surface at the first frame, in one try after the other (r).
+const TRIES: [f64; 2] = [5.0, REACH[1]];
 /// The band reaches so much farther than vertices did before (thesis 2.3.1).
-const WIDER: f64 = 1.25;
+pub(super) const WIDER: f64 = 1.25;
 /// How far a vertex drifts in a frame at most, where nothing merges or splits (r).
-const DRIFT: f64 = 0.25;
+pub(super) const DRIFT: f64 = 0.25;
 /// Share of the vertices that set the reach: a spike does not widen the band everywhere.
 const MOST: f64 = 0.999;
+/// Where the band would reach farther than this (r) only a larger share of the vertices sets its reach; around the others it is wider.
+const WIDE: f64 = 2.5;
+const OFTEN: f64 = 0.95;
 /// Projection moves no vertex by less than this (r): what it would correct is rounding.
 const STILL: f64 = 1e-5;
 /// Share of vertices that must lie near the particles' surface at the first frame.
@@ -124,13 +130,16 @@ impl Tracker {
             ahead,
         };
         let surface = ctx.phase("phi", || tracker.surface_of(ctx, particles))?;
+        let (mut deep, mut tries) = (Deep::new(), TRIES.into_iter());
         loop {
-            let distances = ctx.phase("distance", || tracker.distances(ctx, &surface))?;
+            let distances = ctx.phase("distance", || tracker.distances(ctx, &surface, deep.clone()))?;
             let (delta, feet) = ctx.phase("measure", || Ok(tracker.measure(&distances)))?;
             tracker.delta = delta;
             let known = feet.iter().flatten().count();
-            let wanted = if known == tracker.delta.len() { tracker.wanted_reach() } else { REACH[1] };
-            if wanted <= tracker.reach {
+            let wanted = tracker.wanted_reach();
+            let farther = if known < tracker.delta.len() { tries.next() } else { None };
+            let wider = tracker.deep(&tracker.vertices, farther.unwrap_or_default());
+            if wanted <= tracker.reach && covers(&deep, &wider) {
                 tracker.check_overlap(known)?;
                 let Covered { apart, bare, .. } =
                     ctx.phase("cover", || tracker.cover(ctx, &surface, &feet, (&particles.places, true)))?;
@@ -139,7 +148,10 @@ impl Tracker {
                 return Ok((tracker, StepReport { lost, triangles, apart, ..StepReport::default() }));
             }
             // Measured again: what a step finds must be what was measured.
-            tracker.reach = wanted.max(1.25 * tracker.reach).min(REACH[1]);
+            if wanted > tracker.reach {
+                tracker.reach = wanted.max(1.25 * tracker.reach).min(REACH[1]);
+            }
+            deep = sorted([deep, wider].concat());
         }
     }
 
@@ -257,8 +269,13 @@ impl Tracker {
                 Some(surface) => surface,
                 None => Arc::new(ctx.phase("phi", || self.surface_of(ctx, to))?),
             };
-            let distances = ctx.phase("distance", || self.distances(ctx, &surface))?;
+            let distances = ctx.phase("distance", || {
+                let deep = self.deep(&carried, 0.0);
+                self.distances(ctx, &surface, deep)
+            })?;
             let delta = fade(self, &carried, dt);
+            // Strain is the liquid's own: on a thin sheet projection moves vertices much farther than the particles tremble.
+            let drifts = self.drift.after(&self.vertices, &carried);
             let (mut vertices, flags) =
                 ctx.phase("project", || self.projected(ctx, carried, &delta, &distances))?;
             if self.params.rebuild {
@@ -291,7 +308,7 @@ impl Tracker {
                         .collect(),
                     ..StepReport::default()
                 },
-                drifts: self.drift.after(&self.vertices, &vertices),
+                drifts,
                 vertices,
                 delta,
             };
@@ -363,21 +380,24 @@ impl Tracker {
         Ok((phi, surface))
     }
 
-    fn distances(&self, ctx: &Context, surface: &(Implicit, Isosurface)) -> Result<Distances> {
-        Distances::new(ctx, &surface.0, &surface.1, (self.reach / self.params.cell) as f32)
+    fn distances(&self, ctx: &Context, surface: &(Implicit, Isosurface), deep: Deep) -> Result<Distances> {
+        Distances::deeper(ctx, &surface.0, &surface.1, (self.reach / self.params.cell) as f32, deep)
     }
 
-    /// How far the band must reach (r): a little farther than vertices lie from the surface, and as far as they may jump.
+    /// How far the band must reach everywhere (r): a little farther than most vertices lie from the surface, and as far as they may jump.
     fn wanted_reach(&self) -> f64 {
         let mut far: Vec<f32> =
             self.delta.iter().filter(|delta| !delta.is_nan()).map(|delta| delta.abs()).collect();
         if far.is_empty() {
             return REACH[0];
         }
-        let place = ((far.len() - 1) as f64 * MOST) as usize;
-        let most = f64::from(*far.select_nth_unstable_by(place, f32::total_cmp).1) / self.params.spacing;
-        // Splines read two nodes farther; a vertex drifts less than this before it is moved back.
-        (WIDER * most + DRIFT + 2.0 * self.params.cell).clamp(REACH[0], REACH[1])
+        let mut of = |share: f64| {
+            let place = ((far.len() - 1) as f64 * share) as usize;
+            let far = *far.select_nth_unstable_by(place, f32::total_cmp).1;
+            self.reach_for(f64::from(far) / self.params.spacing)
+        };
+        let reach = of(MOST);
+        if reach <= WIDE { reach } else { of(OFTEN).max(WIDE) }
     }
 
     /// The distance of each vertex from the surface (m), and its foot (cells).

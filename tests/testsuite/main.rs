@@ -140,11 +140,13 @@ mod surface {
     mod from_particles;
     mod implicit;
     mod made_sets;
+    mod passing;
     mod rebuilt;
     mod repair;
     mod resculpt;
     mod shot;
     mod small;
+    mod thin_sheets;
     mod tracking;
     mod usd;
 }

@@ -7,7 +7,10 @@ use crate::base::DVec3;
 /// Change of a length since the reference from which on an edge is not at rest (targets, and [`Improvable::tremble`]). Particles at
 /// rest that tremble by 0.02 spacings change lengths by up to 0.02 targets, and by 0.01 spacings.
 const STRAIN: f64 = 0.04;
-/// Of a liquid that creeps, an edge that changes more slowly is looked at as well when it is so many times out of range, and so many
+/// Displacement since the reference up to which a vertex is at rest ([`Improvable::tremble`]): 0.3 spacings. On a sheet half a spacing
+/// thick, beyond whose particles fits reach far, particles that tremble by 0.02 spacings displace vertices by up to 0.26.
+const STILL: f64 = 30.0;
+/// Of a liquid that creeps, an edge that changes more slowly is looked at as well when it gets so many times out of range, and so many
 /// times farther each time.
 const BEYOND: [f64; 2] = [4.0 / 3.0, 1.5];
 /// Limits that are told apart.
@@ -27,8 +30,10 @@ impl Improvable<'_> {
         let [shortest, longest] = self.target(ends);
         let target = if now > longest { longest } else { shortest };
         let change = (now - before).abs();
-        let rests = change <= (STRAIN * target).max(self.tremble);
-        !rests || limits(now / target) != limits(before / target)
+        // Particles that are where they were strain nothing, however much a fit through few of them says so.
+        let is_still = |at: usize| drift(at).norm() <= STILL * self.tremble;
+        let rests = change <= (STRAIN * target).max(self.tremble) || is_still(a) && is_still(b);
+        !rests || limits(now / target) > limits(before / target)
     }
 }
 
@@ -69,5 +74,23 @@ mod tests {
         assert!(is_strained(1.6, 0.05, 0.0) && is_strained(1.6, -0.05, 0.0) && !is_strained(1.6, 0.05, 0.1));
         assert!(is_strained(2.01, 0.02, 0.1) && !is_strained(2.05, 0.02, 0.1));
         assert!(is_strained(1.6, f32::NAN, 0.0));
+        // It is back from beyond a limit: that is no reason.
+        assert!(!is_strained(1.99, -0.02, 0.1));
+    }
+
+    #[test]
+    fn ends_that_are_where_they_were_do_not_strain_an_edge_before_it_creeps_far_out() {
+        let is_strained = |length: f64, by: f32| {
+            let places = vec![DVec3::zeros(), DVec3::x() * length, DVec3::y()];
+            let mut body = Body::of(places, vec![[0, 1, 2]]);
+            body.sizes = vec![[1.0; 2]; 3];
+            body.drifts = vec![[0.0; 3], [by, 0.0, 0.0], [0.0; 3]];
+            body.tremble = 0.01;
+            body.improvable().is_strained([0, 1])
+        };
+        assert!(!is_strained(1.6, 0.29) && !is_strained(1.6, -0.29));
+        assert!(is_strained(1.6, 0.31) && is_strained(1.6, -0.31));
+        assert!(is_strained(2.05, 0.29) && !is_strained(2.35, 0.29));
+        assert!(is_strained(1.6, f32::NAN));
     }
 }
