@@ -72,6 +72,8 @@ mod mist_cancel;
 mod mist_eddies;
 #[path = "gates/mist_passes.rs"]
 mod mist_passes;
+#[path = "gates/mist_rates.rs"]
+mod mist_rates;
 #[path = "gates/mist_walls.rs"]
 mod mist_walls;
 #[path = "gates/oracle.rs"]
@@ -86,6 +88,8 @@ mod passes;
 mod piles;
 #[path = "gates/planes.rs"]
 mod planes;
+#[path = "gates/plates.rs"]
+mod plates;
 #[path = "gates/plot.rs"]
 mod plot;
 #[path = "gates/plot_font.rs"]
@@ -239,7 +243,9 @@ fn main() {
     bytes::run(&mut h);
     readers::run(&mut h);
     grains::run(&mut h);
+    plates::run(&mut h);
     mist::run(&mut h);
+    mist_rates::run(&mut h);
     mist_eddies::run(&mut h);
     mist_walls::run(&mut h);
     mist_passes::run(&mut h);

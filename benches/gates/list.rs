@@ -119,6 +119,8 @@ pub const GATES: &[Gate] = &[
     gate("snow.base.volume_told_frame", "%", Most(2.0), Most(1.5)),
     gate("snow.base.volume_told_walk", "%", Most(0.5), Most(0.35)),
     none("snow.base.monotone_grown", "voxels"),
+    // What the step reports of a plate of 3 to 8 cells, against what it cuts out: the worst of a hundred.
+    gate("snow.base.plates", "%", Most(1.0), Most(0.3)),
     // Parts of the snow that the noise cuts off.
     none("snow.base.islands", "parts"),
     // Time and memory; how many times as fast as stock OpenVDB.
@@ -239,7 +241,8 @@ pub const GATES: &[Gate] = &[
     gate("snow.mist.mass_drift", "%", Most(5.0), Most(1.0)),
     gate("snow.mist.padding", "%", Most(1.0), Most(0.2)),
     gate("snow.mist.dashes", "1", Most(0.0), Open),
-    // Eddies that change, and do not only move.
+    // The same at 24, 48 and 96 frames a second: mass, density and momentum; and eddies that change, not only move.
+    gate("snow.mist.frame_rate", "%", Most(3.0), Open),
     yes("snow.mist.turbulence_decorrelates"),
     // Solids that move through mist, and a pocket that they close.
     gate("snow.mist.flux", "1", Most(1.0e-3), Open),
