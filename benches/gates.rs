@@ -90,6 +90,8 @@ mod passes;
 mod piles;
 #[path = "gates/planes.rs"]
 mod planes;
+#[path = "gates/plates.rs"]
+mod plates;
 #[path = "gates/plot.rs"]
 mod plot;
 #[path = "gates/plot_font.rs"]
@@ -247,6 +249,7 @@ fn main() {
     bytes::run(&mut h);
     readers::run(&mut h);
     grains::run(&mut h);
+    plates::run(&mut h);
     mist::run(&mut h);
     mist_eddies::run(&mut h);
     mist_walls::run(&mut h);

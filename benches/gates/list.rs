@@ -120,6 +120,8 @@ pub const GATES: &[Gate] = &[
     gate("snow.base.volume_told_frame", "%", Most(2.0), Most(1.5)),
     gate("snow.base.volume_told_walk", "%", Most(0.5), Most(0.35)),
     none("snow.base.monotone_grown", "voxels"),
+    // What the step reports of a plate of 3 to 8 cells, against what it cuts out: the worst of a hundred.
+    gate("snow.base.plates", "%", Most(1.0), Most(0.3)),
     // Parts of the snow that the noise cuts off.
     none("snow.base.islands", "parts"),
     // Time and memory; how many times as fast as stock OpenVDB.

@@ -7,8 +7,9 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::columns::{CELLS, cell_of, filled};
+use super::columns::{CELLS, add_by_cell};
 use super::edit::{self, Edit, Scale};
+use super::filling;
 use crate::base::blocks::{BlockEdit, Mask, Origin, VOXELS, Values, offset};
 use crate::context::Context;
 use crate::error::Result;
@@ -245,13 +246,15 @@ fn clear(edit: &mut Edit, cleared: &BTreeMap<usize, f32>, scale: Scale) {
     let origin = edit.surface.origin();
     let mut after = values_of(Some(&edit.surface), scale);
     let mut removed = values_of(edit.removed.as_ref(), scale);
+    let were = filling::parts(&after, scale.cell);
     for (&index, &value) in cleared {
         let before = after[index];
         removed[index] = removed[index].min(before);
         after[index] = value;
         edit.changed[index >> 6] |= 1 << (index & 63);
-        edit.heights[cell_of(index)] += filled(before, scale.cell) - filled(value, scale.cell);
     }
+    let are = filling::parts(&after, scale.cell);
+    add_by_cell(&mut edit.heights, |index| were[index] - are[index]);
     edit.surface = edit::pack(origin, after, scale);
     let removed = edit::pack(origin, removed, scale);
     edit.removed = (!matches!(removed, BlockEdit::Constant(_, value) if value > 0.0)).then_some(removed);

@@ -4,6 +4,7 @@
 //! surface of no thickness wherever nothing moved.
 
 use super::columns::{CELLS, add_by_cell, filled};
+use super::filling;
 use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::sweep::Piece;
 use crate::vdb::Probe;
@@ -66,7 +67,8 @@ fn remove_all(origin: Origin, before: &Values, mask: Mask, snow: &Probe<'_>, sca
         Probe::Tile { .. } => BlockEdit::Constant(origin, -scale.background),
     };
     let mut heights = [0.0; CELLS];
-    add_by_cell(&mut heights, |index| filled(before[index], scale.cell));
+    let were = filling::parts(before, scale.cell);
+    add_by_cell(&mut heights, |index| were[index]);
     Edit {
         surface: BlockEdit::Constant(origin, scale.background),
         removed: Some(removed),
@@ -82,7 +84,14 @@ fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) ->
     let mut heights = [0.0; CELLS];
     for index in 0..VOXELS {
         let (snow, sweep) = (before[index], cells[index] * scale.cell);
-        let left = if -sweep > snow { (-sweep).min(scale.background) } else { snow };
+        let mut left = if -sweep > snow { (-sweep).min(scale.background) } else { snow };
+        // Faces that coincide, as a sole's and the ground's under it, leave a shell of no thickness that the distances beside it
+        // show as snow: at least as far outside as what is really left.
+        let is_thin = (0.0..0.5 * scale.cell).contains(&left) && sweep < 0.5 * scale.cell;
+        if is_thin && is_along(before, cells, index) {
+            let rest = (filled(snow, scale.cell) - filled(sweep, scale.cell)).max(0.0);
+            left = left.max((0.5 - rest) * scale.cell);
+        }
         let taken = if sweep > snow { sweep } else { snow };
         after[index] = left;
         removed[index] = taken.clamp(-scale.background, scale.background);
@@ -91,7 +100,8 @@ fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) ->
     if changed == [0; 8] {
         return None;
     }
-    add_by_cell(&mut heights, |index| filled(before[index], scale.cell) - filled(after[index], scale.cell));
+    let (were, are) = (filling::parts(before, scale.cell), filling::parts(&after, scale.cell));
+    add_by_cell(&mut heights, |index| were[index] - are[index]);
     let removed = pack(origin, removed, scale);
     let outside = matches!(removed, BlockEdit::Constant(_, value) if value > 0.0);
     Some(Edit {
@@ -100,6 +110,15 @@ fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) ->
         changed,
         heights,
     })
+}
+
+/// Least cosine of the angle between surfaces that face the same way.
+const ALONG: f32 = 0.9;
+
+/// Whether the snow and a sweep face the same way at a voxel.
+fn is_along(snow: &Values, sweep: &Values, index: usize) -> bool {
+    let (one, other) = (filling::direction(snow, index), filling::direction(sweep, index));
+    one.zip(other).is_some_and(|([a, b, c], [d, e, f])| a * d + b * e + c * f > ALONG)
 }
 
 /// A block of a level set from distances in cells.

@@ -5,6 +5,7 @@
 mod columns;
 mod crumbs;
 mod edit;
+pub(in crate::snow) mod filling;
 mod grids;
 pub mod initial;
 mod marks;

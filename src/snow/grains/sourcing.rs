@@ -12,7 +12,7 @@ use crate::base::DVec3;
 use crate::base::blocks::{BlockEdit, DIM, Origin, VOXELS};
 use crate::context::Context;
 use crate::error::Result;
-use crate::snow::base_layer::filled;
+use crate::snow::base_layer::{filled, filling};
 use crate::vdb::{FloatGrid, Probe};
 
 use super::claims::Claims;
@@ -143,18 +143,13 @@ fn volumes(before: &FloatGrid, after: &FloatGrid, origins: &[Origin]) -> Result<
 
 /// Volume (cells) that a block lost.
 fn lost(old: &Probe<'_>, new: &Probe<'_>, cell: f32) -> f64 {
-    let value = |probe: &Probe<'_>, index: usize| match probe {
-        Probe::Leaf(leaf) => leaf.values[index],
-        Probe::Tile { value, .. } => *value,
+    let volume = |probe: &Probe<'_>| match probe {
+        Probe::Leaf(leaf) => filling::volume(leaf.values, cell),
+        Probe::Tile { value, .. } => f64::from(filled(*value, cell)) * VOXELS as f64,
     };
     match (old, new) {
-        (Probe::Tile { value: old, .. }, Probe::Tile { value: new, .. }) => {
-            f64::from(filled(*old, cell) - filled(*new, cell)) * VOXELS as f64
-        }
         (Probe::Leaf(old), Probe::Leaf(new)) if old.values == new.values => 0.0,
-        _ => (0..VOXELS)
-            .map(|index| f64::from(filled(value(old, index), cell) - filled(value(new, index), cell)))
-            .sum(),
+        _ => volume(old) - volume(new),
     }
 }
 

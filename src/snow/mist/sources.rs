@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::Params;
+use super::{LEAST, Params};
 use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -107,7 +107,9 @@ pub fn seeds(ctx: &Context, ways: &[Way], params: &Params) -> Result<Vec<Seed>> 
     touched.par_sort_unstable();
     let groups: Vec<&[(Coord, u32)]> = touched.chunk_by(|a, b| a.0 == b.0).collect();
     ctx.allow(WHAT, groups.len() as u64 * SEED_BYTES)?;
-    Ok(groups.into_par_iter().map(|group| seed(group, ways, params)).collect())
+    let seeds = groups.into_par_iter().map(|group| seed(group, ways, params));
+    // Tubes pass by many tiles that they may touch, and of some they cover next to nothing.
+    Ok(seeds.filter(|seed| seed.density.iter().any(|density| *density > LEAST)).collect())
 }
 
 /// Bytes of a seed.

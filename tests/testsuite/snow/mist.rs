@@ -340,3 +340,14 @@ fn only_fast_grains_that_rise_raise_mist() {
     assert_eq!(raised(falling, false), (0, false));
     assert_eq!(raised(falling, true), (1, true));
 }
+
+#[test]
+fn a_few_grains_open_few_tiles() {
+    let ctx = context(1);
+    let mut mist = Mist::new(Params::for_cell(CELL)).unwrap();
+    // In the middle of a tile: its path stays in it.
+    let middle = [3.5 * CELL, 4.5 * CELL, 4.5 * CELL];
+    let report = mist.step(&ctx, &around(&[grain(middle, [0.0, 2.1, 0.0])], &open), [0.0, 0.001]).unwrap();
+    // One tile that holds mist, and those that share a face or an edge with it.
+    assert_eq!(report.cells, 19 * 512, "{report:?}");
+}
