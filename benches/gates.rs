@@ -128,6 +128,8 @@ mod reliability_soup;
 mod reliability_step_calls;
 #[path = "gates/reliability/step_meshes.rs"]
 mod reliability_step_meshes;
+#[path = "gates/reliability/watch.rs"]
+mod reliability_watch;
 #[path = "gates/repair.rs"]
 mod repair;
 #[path = "gates/rest.rs"]

@@ -154,8 +154,8 @@ Triangles to_mesh(const Grid& grid, const Call& call, double iso, double adaptiv
     });
 }
 
-// OpenVDB's LevelSetMeasure multiplies gradients by voxels' own indices, whose rounding and discretisation a grid far from the origin
-// multiplies too, and refuses grids without voxels. Here indices count from the grid's middle.
+// OpenVDB's LevelSetMeasure multiplies gradients by voxels' own indices, whose rounding and discretisation a grid far
+// from the origin multiplies too, and refuses grids without voxels. Here indices count from the grid's middle.
 void measure(const Grid& grid, const Call& call, double& area, double& volume) {
     run(call, [&] {
         using Gradient = openvdb::math::GradStencil<openvdb::FloatGrid, false>;

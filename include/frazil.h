@@ -4154,6 +4154,10 @@ frz_status frz_tracker_ahead(frz_tracker *tracker,
  * Moves the mesh with its particles from one time to another. After a failure or a cancel it is as it was before. With
  * frz_tracker_params.rebuild it may have other vertices and triangles afterwards.
  *
+ * Either of both may have no particles: the mesh then loses its vertices, and gets others from the particles' surface when there are some
+ * again; without rebuild it waits where it was. The context's log hears once of ids and velocities that contradict each other, and of
+ * steps in which over half of the mesh is lost or made anew.
+ *
  * from: the particles as they were at the last step's end.
  * to: the particles at this step's end. Those of the same id are the same; where one of the two has no ids, from must have
  *     velocities.

@@ -2,167 +2,16 @@
 
 use std::mem::zeroed;
 use std::ptr::{null, null_mut};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::Duration;
 
-use frazil::capi::context::*;
-use frazil::capi::frz_status::{self, *};
+use frazil::capi::frz_status::*;
 use frazil::capi::{grains::*, grains_params::*, grains_points::*, mist::*, mist_params::*};
 use frazil::capi::{shallow::*, shallow_detail::*, shallow_detail_ground::*, shallow_flows::*};
 use frazil::capi::{shallow_params::*, shallow_terrain::*};
-use rustix::time::{ClockId, clock_gettime};
 
-use crate::grains::Random;
 use crate::harness::Harness;
-use crate::host::{Threads, view};
+use crate::host::view;
 use crate::reliability_step_meshes as meshes;
-
-/// Steps of each function.
-const STEPS: usize = 10_000;
-/// A step is cancelled after so many times the median of those before, but not earlier than this (s); and may then take so long (s).
-const TIMES: f64 = 20.0;
-const EARLIEST: f64 = 0.005;
-const LONGEST: f64 = 0.2;
-/// A step that takes so long has no end (s).
-const ENDLESS: f64 = 60.0;
-
-/// Cancels a context when a step has taken too long.
-struct Watch {
-    threads: Threads,
-    /// When it is to cancel (microseconds of a clock); never, where it is the greatest number.
-    due: Arc<AtomicU64>,
-    ends: Arc<AtomicBool>,
-    watcher: Option<std::thread::JoinHandle<()>>,
-}
-
-/// What became of the steps of a function.
-pub struct Tried<'a> {
-    watch: &'a Watch,
-    pub random: Random,
-    name: &'static str,
-    /// CPU time of each (s).
-    times: Vec<f64>,
-    median: f64,
-    cancelled: usize,
-    /// CPU times of those that went on for too long (s).
-    late: Vec<f64>,
-    slowest: f64,
-}
-
-/// Microseconds of the clock on the wall.
-fn wall() -> u64 {
-    static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-    START.get_or_init(std::time::Instant::now).elapsed().as_micros() as u64
-}
-
-/// CPU time of this thread, which does all the work (s): what else the machine does is no step's fault.
-fn cpu() -> f64 {
-    let time = clock_gettime(ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
-}
-
-impl Watch {
-    fn new() -> Self {
-        let threads = Threads::new(0);
-        let (due, ends) = (Arc::new(AtomicU64::new(u64::MAX)), Arc::new(AtomicBool::new(false)));
-        let (ctx, other_due, other_ends) = (threads.ctx as usize, due.clone(), ends.clone());
-        let watcher = std::thread::spawn(move || {
-            // The due time that was cancelled, and when.
-            let mut cancelled = (u64::MAX, 0);
-            while !other_ends.load(Ordering::SeqCst) {
-                std::thread::sleep(Duration::from_millis(1));
-                let (now, due) = (wall(), other_due.load(Ordering::SeqCst));
-                if due == u64::MAX {
-                    continue;
-                }
-                if cancelled.0 == due && now > cancelled.1 + (ENDLESS * 1e6) as u64 {
-                    eprintln!("reliability.step_calls: a step does not end: cancelled {ENDLESS} s ago");
-                    std::process::exit(1);
-                } else if now >= due && cancelled.0 != due {
-                    // SAFETY: the context is there until this thread was joined.
-                    unsafe { frz_context_cancel(ctx as *mut frz_context) };
-                    cancelled = (due, now);
-                }
-            }
-        });
-        Self { threads, due, ends, watcher: Some(watcher) }
-    }
-}
-
-impl Drop for Watch {
-    fn drop(&mut self) {
-        self.ends.store(true, Ordering::SeqCst);
-        self.watcher.take().into_iter().for_each(|watcher| watcher.join().expect("the watcher"));
-    }
-}
-
-impl Tried<'_> {
-    /// The context that steps are made with.
-    pub fn ctx(&self) -> *mut frz_context {
-        self.watch.threads.ctx
-    }
-
-    /// Whether there were enough.
-    pub fn is_done(&self) -> bool {
-        self.times.len() >= STEPS
-    }
-
-    /// One step; whether it was made to its end.
-    pub fn step(&mut self, step: impl FnOnce(*mut frz_context) -> frz_status) -> bool {
-        let limit = (TIMES * self.median).max(EARLIEST);
-        let (before, began) = (cpu(), wall());
-        self.watch.due.store(began + (limit * 1e6) as u64, Ordering::SeqCst);
-        let status = step(self.ctx());
-        self.watch.due.store(u64::MAX, Ordering::SeqCst);
-        let took = cpu() - before;
-        // A cancel that came too late is of this step, too.
-        if (wall() - began) as f64 > 0.5e6 * limit {
-            std::thread::sleep(Duration::from_millis(3));
-        }
-        self.watch.threads.reset();
-        match status {
-            // Settings that it refuses are none.
-            FRZ_ERROR_ARGUMENT | FRZ_ERROR_MEMORY => return false,
-            FRZ_OK | FRZ_CANCELLED => {}
-            other => panic!("{}: {other:?}", self.name),
-        }
-        self.cancelled += usize::from(status == FRZ_CANCELLED);
-        // CPU time from the cancel on, at least.
-        let after = took - limit;
-        if after > LONGEST {
-            self.late.push(took);
-        }
-        self.slowest = self.slowest.max(after);
-        self.times.push(took);
-        if self.times.len().is_multiple_of(100) {
-            let mut sorted = self.times.clone();
-            sorted.sort_unstable_by(f64::total_cmp);
-            self.median = sorted[sorted.len() / 2];
-        }
-        status == FRZ_OK
-    }
-
-    /// A number from one to another.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.random.next()
-    }
-
-    /// A number of any magnitude between.
-    pub fn any(&mut self, low: f64, high: f64) -> f64 {
-        libm::pow(10.0, self.between(libm::log10(low), libm::log10(high)))
-    }
-
-    /// A whole number below.
-    pub fn below(&mut self, count: usize) -> usize {
-        (self.random.next() * count as f64) as usize
-    }
-
-    /// With a probability.
-    pub fn chance(&mut self, probability: f64) -> bool {
-        self.random.next() < probability
-    }
-}
+use crate::reliability_watch::{STEPS, Tried, Watch};
 
 /// A struct of zeroes that begins with its size.
 pub fn sized<T>() -> T {
@@ -194,26 +43,13 @@ pub fn run(h: &mut Harness) {
     ];
     let (mut slow, mut notes) = (0, Vec::new());
     for (name, scenes) in functions {
-        let random = Random(0x9e37_79b9_7f4a_7c15 ^ name.len() as u64);
-        let times = Vec::with_capacity(STEPS);
-        let mut tried = Tried {
-            watch: &watch,
-            random,
-            name,
-            times,
-            median: 0.0,
-            cancelled: 0,
-            late: Vec::new(),
-            slowest: 0.0,
-        };
+        let mut tried = Tried::new(&watch, name);
         while !tried.is_done() {
             scenes(&mut tried);
         }
-        let Tried { median, cancelled, slowest, late, .. } = tried;
-        let own = late.iter().filter(|took| **took > TIMES * median).count();
-        let slowest = slowest.max(0.0);
-        notes.push(format!("{name} {:.2} ms, {cancelled} cancelled, {slowest:.3} s", 1e3 * median));
-        println!("# {}, {own} too slow", notes.last().expect("a note"));
+        let (own, note) = tried.judged();
+        println!("# {note}, {own} too slow");
+        notes.push(note);
         slow += own;
     }
     let note = format!("{STEPS} each; medians, and the longest after a cancel: {}", notes.join("; "));

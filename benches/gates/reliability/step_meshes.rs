@@ -9,7 +9,8 @@ use frazil::capi::{base::*, body::*, grains::*, grid::*, mesh::*, mist::*, snow:
 use frazil::capi::{tracker::*, tracker_eased::*};
 
 use crate::host::{view, works};
-use crate::reliability_step_calls::{Tried, grain_params, mist_params, sized, step_length};
+use crate::reliability_step_calls::{grain_params, mist_params, sized, step_length};
+use crate::reliability_watch::Tried;
 
 /// Corners of a cube of half an edge of 1, and its faces.
 const CORNERS: [[f32; 3]; 8] = [
