@@ -343,7 +343,7 @@ fn in_words(mesh: &Value) -> String {
     let number = |key: &str| mesh[key].as_f64().unwrap_or(0.0);
     let (area, volume) = (number("area_m2"), number("volume_m3"));
     // What the parts' volumes leave where they cancel is rounding.
-    let is_rounding = volume.abs() < 1e-9 * area.powf(1.5);
+    let is_rounding = volume.abs() < 1e-9 * area * area.sqrt();
     let volume = if is_rounding { 0.0 } else { volume };
     out += &format!("area {area:.6} m2, volume {volume:.6} m3\n");
     out += &bodies_in_words(mesh["bodies"].as_array().map_or(&[][..], Vec::as_slice));
