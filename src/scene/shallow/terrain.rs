@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::{ImagePlace, Shallow};
 use crate::base::orientation::Orientation;
+use crate::base::weld::Weld;
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -141,12 +142,19 @@ impl Terrain {
     }
 }
 
-/// A mesh (m, Y up).
+/// A mesh (m, Y up), whose vertices that are one corner but for rounding ([`Weld`]) have one position: a column between two triangles that
+/// should share an edge would have neither.
 ///
 /// # Errors
 /// A file that cannot be read, or that has changed since it was read.
 pub(super) fn read_mesh(path: &Path, space: Space, seen: &Seen) -> Result<TriMesh> {
     let mut mesh = parse_polygons_from(path, &seen.read(path)?, space.origin)?.into_triangles();
+    let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
+    let weld = Weld::of(&positions, &mesh.triangles);
+    weld.unify(&mut mesh.positions);
+    if let Some(what) = weld.warning() {
+        log::warn!("{}: {what}", path.display());
+    }
     if !space.keeps_vectors() {
         mesh.positions.iter_mut().for_each(|place| *place = space.vector(place.cast()).cast());
     }

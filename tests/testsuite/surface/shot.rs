@@ -246,7 +246,8 @@ fn what_a_mesh_cannot_follow_is_refused_with_the_file() {
     fs::write(folder.join("ball.0002.bgeo"), &bytes[..bytes.len() / 2]).unwrap();
     fails(folder, &format!("{SHOT} -o cut"), 1, &["ball.0002.bgeo"]);
     fs::remove_file(folder.join("ball.0002.bgeo")).unwrap();
-    refused(SHOT, &["ball.0002.bgeo"]);
+    fails(folder, &format!("{SHOT} -o gap"), 1, &["ball.0002.bgeo"]);
+    assert!(folder.join("gap/surface/surface.0001.ply").exists());
     // Scenes of one system are not for the command of another.
     fs::write(
         folder.join("shot.toml"),
