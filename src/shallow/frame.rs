@@ -139,14 +139,11 @@ impl Shallow {
     /// Whether a frame, of so many steps where that is known, may take so long that a cancel should end it.
     pub(super) fn may_take_long(&mut self, dt: f64, count: Option<usize>) -> bool {
         let steps = match (count, self.params.pace) {
-            (Some(count), _) => count as f64,
-            // How long exact steps are only shows in their course.
-            (None, Pace::Exact) => return true,
+            // Given steps may be so long that columns fill in their course, and how long exact ones are only shows in theirs.
+            (Some(_), _) | (None, Pace::Exact) => return true,
             (None, Pace::Realtime(longest)) => (dt / longest).max(1.0),
         };
         let [wet, full] = self.flow.work(&self.columns).map(|count| count as f64);
-        // Given steps may be so long that columns fill in their course.
-        let full = if count.is_some() { wet } else { full };
         steps * (EACH + wet + FULL * full) > LONG
     }
 
