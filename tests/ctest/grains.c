@@ -120,7 +120,7 @@ static void measured(void) {
     frz_grains_params params = params_of(0.005);
     double friction;
     WORKS(frz_grains_params_of_snow(&params, 25, 0));
-    CHECK(params.friction > 0.08 && params.friction < 0.12 && params.attraction == 0);
+    CHECK(params.friction > 0.07 && params.friction < 0.1 && params.attraction == 0);
     friction = params.friction;
     WORKS(frz_grains_params_of_snow(&params, 35, 0.3));
     CHECK(params.friction > friction && params.attraction > 5 && params.attraction < 20);

@@ -262,7 +262,7 @@ static void refusals(frz_context *ctx, const frz_mesh *mesh) {
     whole.detail[3] = 1.5f, painted = mesh_of(ctx, &whole, whole.triangles), whole.detail[3] = 1;
     for (v = 0; v < whole.vertices; ++v) whole.positions[v][0] += 10;
     far = mesh_of(ctx, &whole, whole.triangles);
-    nothing.positions.count = 0;
+    nothing.positions.count = nothing.ids.count = nothing.velocities.count = 0;
     FAILS(frz_tracker_resculpt(NULL, tracker, sculpt, &present), FRZ_ERROR_ARGUMENT, "context is NULL");
     FAILS(frz_tracker_resculpt(ctx, NULL, sculpt, &present), FRZ_ERROR_ARGUMENT, "tracker is NULL");
     FAILS(frz_tracker_resculpt(ctx, tracker, NULL, &present), FRZ_ERROR_ARGUMENT, "mesh is NULL");
