@@ -275,8 +275,7 @@ static void bodies(frz_context *ctx) {
         WORKS(frz_grains_step(ctx, grains, NULL, &body, 1, DT, 1, NULL));
         WORKS(frz_grains_read(grains, FRZ_GRAINS_POSITION_DOUBLE, SPAN(place, 1)));
         CHECK(place[1] > 0.0245 && fabs(place[2]) < 1e-6);
-        /* Such a plate is too fast to carry it along: it slides, and then meets the friction between grains. */
-        CHECK(round == 0 ? fabs(place[0]) < 1e-4 : place[0] > 0.003 && place[0] < 0.05);
+        CHECK(round == 0 ? fabs(place[0]) < 1e-4 : place[0] > 0.03);
         frz_grains_destroy(grains);
     }
     {

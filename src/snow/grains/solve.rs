@@ -180,9 +180,10 @@ fn begin_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients) {
 /// A grain that slides would roll, which these cannot. It meets the friction between grains, which is less for the same reason, and
 /// the slope of the surface more, so that it stops wherever a grain can lie, and slides by Coulomb's law where none can. With the
 /// whole friction, columns that collapse run out a third less far than in experiments, where the ground does not matter (Lube et al.
-/// 2004): their lowest layer never moves. Grains that attract each other hold together, and do not roll: they keep the whole friction.
+/// 2004): their lowest layer never moves. Two keep the whole friction: grains that attract each other, which hold together and do not
+/// roll, and those on a collider that moves, which carries them along with the friction that it was given.
 fn friction(row: &Row, touch: &Touch, c: &Coefficients) -> f32 {
-    if c.attraction > 0.0 {
+    if c.attraction > 0.0 || touch.velocity != [0.0; 3] {
         return touch.friction;
     }
     let velocity = sub(sub(row.velocity, scaled(c.gravity, c.dt)), touch.velocity);
