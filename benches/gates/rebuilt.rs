@@ -6,10 +6,10 @@ use frazil::base::topology::Topology;
 use frazil::base::{DVec3, TriMesh};
 use frazil::surface::{Change, Distances, Implicit, Isosurface, Sampler, Source};
 
-use crate::common::liquids::context;
+use crate::common::liquids::{context, own_surface};
 use crate::edit_history::History;
 use crate::harness::Harness;
-use crate::rebuilt_sequences::{CELL, Frame, Sequence, dambreak, made, own_surface, spot_drop, walk};
+use crate::rebuilt_sequences::{CELL, Frame, Sequence, dambreak, made, spot_drop, walk};
 use crate::windings::{depth_and_share, empty_parts, inside};
 use crate::worst::Worst;
 

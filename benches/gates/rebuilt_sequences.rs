@@ -4,12 +4,12 @@ use std::path::Path;
 
 use frazil::Context;
 use frazil::base::points::Values;
-use frazil::base::{DVec3, TriMesh};
+use frazil::base::TriMesh;
 use frazil::io::particles;
-use frazil::surface::{Implicit, Isosurface, Params, Particles, StepReport, Tracker};
+use frazil::surface::{Params, Particles, StepReport, Tracker};
 
 use crate::common::character::data;
-use crate::common::liquids::numbered;
+use crate::common::liquids::{numbered, own_surface};
 use crate::common::made_sets::{Set, sets};
 use crate::common::spot;
 
@@ -151,12 +151,6 @@ fn cached(path: &Path) -> Particles {
         _ => panic!("the particles have no ids"),
     };
     Particles { ids, places: cloud.places, velocities: Vec::new() }
-}
-
-/// The surface of particles at places (m), whose spacing is `spacing` (m), on cells of half of it.
-pub fn own_surface(ctx: &Context, places: &[DVec3], spacing: f64) -> TriMesh {
-    let phi = Implicit::new(ctx, places, spacing, CELL * spacing).expect("a surface");
-    Isosurface::new(&phi).mesh(&phi)
 }
 
 /// A frame of a mesh that follows a liquid.

@@ -6,11 +6,11 @@ use frazil::base::topology::bodies;
 use frazil::base::{DetailedMesh, MeshArray, TriMesh};
 use frazil::surface::{Change, carry_attributes};
 
-use crate::common::liquids::context;
+use crate::common::liquids::{context, own_surface};
 use crate::edit_history::History;
 use crate::harness::Harness;
 use crate::rebuilt::unsound;
-use crate::rebuilt_sequences::{Frame, made, own_surface, walk};
+use crate::rebuilt_sequences::{Frame, made, walk};
 use crate::windings::part_volume;
 
 const NAMES: [&str; 3] = ["surface.rebuilt_topology", "surface.rebuilt_late", "surface.rebuilt_edits"];

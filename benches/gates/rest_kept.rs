@@ -6,11 +6,11 @@ use frazil::base::faults::meeting_pairs;
 use frazil::base::{DVec3, TriMesh};
 use frazil::surface::{Outlook, Params, Particles, Tracker};
 
-use crate::common::liquids::{Random, ball, context, filled, numbered};
+use crate::common::liquids::{Random, ball, context, filled, numbered, own_surface};
 use crate::common::made_sets::{Set, sets};
 use crate::common::shapes::welded;
 use crate::harness::Harness;
-use crate::rebuilt_sequences::{Sequence, made, own_surface, spot_drop};
+use crate::rebuilt_sequences::{Sequence, made, spot_drop};
 use crate::worst::Worst;
 
 const NAMES: [&str; 2] = ["surface.rest_kept_made", "surface.rest_kept_crossings"];

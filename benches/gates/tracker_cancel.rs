@@ -12,11 +12,10 @@ use frazil::capi::tracker_eased::frz_tracker_read_eased;
 use frazil::capi::{frz_span, frz_status, frz_view};
 
 use crate::cancel_latency::{Steps, measure};
-use crate::common::liquids::{ball, context, filled, turned};
+use crate::common::liquids::{ball, context, filled, own_surface, turned};
 use crate::grains::Random;
 use crate::harness::Harness;
 use crate::host::{Threads, view, works, written};
-use crate::rebuilt_sequences::own_surface;
 
 const NO_VIEW: frz_view = frz_view { data: null(), count: 0, stride: 0 };
 /// Initial distance between particles (m), and time between frames (s).

@@ -10,10 +10,10 @@ use frazil::base::topology::bodies;
 use frazil::error::Result;
 use frazil::surface::{Params, Particles, Tracker};
 
-use crate::common::liquids::context;
+use crate::common::liquids::{context, own_surface};
 use crate::common::nearest::distances;
 use crate::edit_history::History;
-use crate::rebuilt_sequences::{CELL, Sequence, dambreak, made, own_surface, spot_drop};
+use crate::rebuilt_sequences::{CELL, Sequence, dambreak, made, spot_drop};
 use crate::surface::{EXAMPLES, spread, text, title};
 use crate::surface_gates::time;
 

@@ -123,8 +123,8 @@ pub(super) struct Follower {
     /// Steps that were made ahead.
     pub outlook: Outlook,
     pub saved: Saved,
-    /// Whether what is wrong with the particles was logged.
-    pub is_told: bool,
+    /// Whether a warning of the particles was logged.
+    pub has_warned: bool,
 }
 
 /// Refuses to rebuild a mesh of a state that is not closed, as [`Tracker::new`] does one at the first frame.
@@ -247,7 +247,7 @@ pub unsafe extern "C" fn frz_tracker_create(
                 edits: None,
                 outlook: Outlook::default(),
                 saved: Saved::default(),
-                is_told: false,
+                has_warned: false,
             })
         })
     }
@@ -354,7 +354,7 @@ pub unsafe extern "C" fn frz_tracker_step(
                 None => follower.tracker.step(call.ctx(), &from, &to, dt)?,
             };
             follower.saved.take();
-            done.news(&mut follower.is_told).for_each(|warning| call.ctx().warn(warning));
+            done.new_warnings(&mut follower.has_warned).for_each(|warning| call.ctx().warn(warning));
             let drops = done.apart.iter().filter(|apart| apart.volume >= 0.0).count();
             let of_change = |count: fn(&Change) -> usize| done.change.as_ref().map_or(0, count);
             let told = frz_tracker_report {

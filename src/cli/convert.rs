@@ -85,11 +85,11 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let inputs = [read(frame), read(frame.saturating_add(1))];
         output::refuse_input(&path, inputs.iter().map(PathBuf::as_path)).before()?;
     }
-    let (mut each, mut made, mut triangles, mut is_told) = (Each::default(), 0, 0, false);
+    let (mut each, mut made, mut triangles, mut has_warned) = (Each::default(), 0, 0, false);
     for frame in frames.iter() {
         session.ctx.check().during()?;
         let path = pattern.as_ref().map_or_else(|| args.output.clone(), |pattern| pattern.path(frame));
-        let done = source.write(args, &path, frame, &mut is_told);
+        let done = source.write(args, &path, frame, &mut has_warned);
         if let Some(count) = each.take(frame, done)? {
             (made, triangles) = (made + 1, count);
         }
@@ -102,7 +102,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 /// Arrays of the vertices that are their velocities (m/s).
 pub const VELOCITY: [&str; 3] = ["vx", "vy", "vz"];
 
-/// Gives velocities of another name, as other programs write them, their usual one.
+/// Renames velocities, which other programs call by other names, to ours ([`VELOCITY`]).
 pub fn name_velocities(arrays: &mut [MeshArray]) {
     for stem in VELOCITIES {
         let named = |axis: &str| {
@@ -226,26 +226,38 @@ struct Sequence {
     pattern: Pattern,
     /// Last frame that is wanted.
     last: i32,
-    /// The frames from one on that are there and have the same faces, as far as is known.
+    /// The frames that follow without a gap, as long as their faces do not change.
     run: Option<Box<dyn Motion>>,
 }
 
 impl Source {
     /// Writes the mesh of a frame; the count of its triangles.
-    fn write(&mut self, args: &Args, path: &Path, frame: i32, is_told: &mut bool) -> frazil::Result<usize> {
+    fn write(
+        &mut self,
+        args: &Args,
+        path: &Path,
+        frame: i32,
+        has_warned: &mut bool,
+    ) -> frazil::Result<usize> {
         match self {
             Self::One(motion) => {
-                args.warn_once(&args.input, &**motion, frame, is_told)?;
+                args.warn_once(&args.input, &**motion, frame, has_warned)?;
                 args.write(path, &**motion, frame, false)?;
                 Ok(motion.triangles().len())
             }
-            Self::Sequence(sequence) => sequence.write(args, path, frame, is_told),
+            Self::Sequence(sequence) => sequence.write(args, path, frame, has_warned),
         }
     }
 }
 
 impl Sequence {
-    fn write(&mut self, args: &Args, path: &Path, frame: i32, is_told: &mut bool) -> frazil::Result<usize> {
+    fn write(
+        &mut self,
+        args: &Args,
+        path: &Path,
+        frame: i32,
+        has_warned: &mut bool,
+    ) -> frazil::Result<usize> {
         let own = self.pattern.path(frame);
         io::source::open(&own).inspect_err(|_| self.run = None)?;
         if self.run.is_none() {
@@ -256,7 +268,7 @@ impl Sequence {
             self.run = run.ok().map(|run| args.placed(Box::new(run)));
         }
         if let Some(motion) = self.run.as_deref() {
-            args.warn_once(&own, motion, frame, is_told)?;
+            args.warn_once(&own, motion, frame, has_warned)?;
             match args.write(path, motion, frame, true) {
                 Ok(()) => return Ok(motion.triangles().len()),
                 Err(error @ (frazil::Error::Cancelled | frazil::Error::Io { .. })) => return Err(error),
@@ -265,9 +277,12 @@ impl Sequence {
             }
         }
         let motion = args.still(&own)?;
-        args.warn_once(&own, &*motion, frame, is_told)?;
+        args.warn_once(&own, &*motion, frame, has_warned)?;
         args.write(path, &*motion, frame, false)?;
-        log::info!("{}: is converted by itself: it or the next frame has other faces", own.display());
+        log::info!(
+            "{}: converted without velocities: its faces, or those of the next frame, differ",
+            own.display()
+        );
         Ok(motion.triangles().len())
     }
 }
@@ -297,9 +312,9 @@ impl Args {
         one: &Path,
         motion: &dyn Motion,
         frame: i32,
-        is_told: &mut bool,
+        has_warned: &mut bool,
     ) -> frazil::Result<()> {
-        if std::mem::replace(is_told, true) {
+        if std::mem::replace(has_warned, true) {
             return Ok(());
         }
         let is_sequence = Pattern::parse(&self.input).is_some();

@@ -12,15 +12,15 @@ const MAX_NAMED: usize = 20;
 pub struct Each {
     made: usize,
     failed: Vec<i32>,
-    /// What the first of them says, and whether that was known before its work began.
+    /// The error of the first of them, and whether it came before its work began.
     first: Option<(String, bool)>,
 }
 
 impl Each {
-    /// Takes note of a frame; its result, none where it could not be made.
+    /// Counts a frame; its result, none where it failed.
     ///
     /// # Errors
-    /// What no other frame can do without either: cancel; an argument or a limit of memory that is refused before any frame is made.
+    /// What every other frame would fail with too: cancel; an argument or a limit of memory that is refused before any frame is made.
     pub fn take<T>(&mut self, frame: i32, result: Result<T>) -> std::result::Result<Option<T>, Failure> {
         match result {
             Ok(done) => {
@@ -38,7 +38,7 @@ impl Each {
         }
     }
 
-    /// Takes note of a frame that could not be made.
+    /// Counts a frame that failed.
     pub fn lose(&mut self, frame: i32, error: &Error) {
         if self.first.is_some() && self.failed.len() < MAX_NAMED {
             log::warn!("frame {frame} is not made: {error}");

@@ -1,4 +1,4 @@
-//! Whether ids, velocities and places of two frames of particles fit together: ids may be row numbers, which name other particles in
+//! Whether ids, velocities and positions of two frames of particles agree: ids may be row numbers, which name other particles in
 //! every frame, and velocities may be in another unit.
 
 use std::collections::{HashMap, HashSet};
@@ -10,7 +10,7 @@ use super::report::StepReport;
 use crate::base::DVec3;
 use crate::error::Result;
 
-/// Particles that are looked at.
+/// Particles that are sampled.
 const SAMPLES: usize = 2000;
 /// Particles beside each other that go apart by more than this in a frame (spacings), in the median, are not the same ones: in a dam
 /// break that splashes it is 0.2.
@@ -45,8 +45,8 @@ impl Mismatch {
     /// Both point the same way from this cosine on.
     const ALIGNED: f64 = 0.9;
 
-    /// What it means for particles of a spacing (m), in a sentence; none where it means nothing.
-    pub fn told(&self, spacing: f64) -> Option<String> {
+    /// A warning for particles of a spacing (m); none where both agree closely enough.
+    pub fn sentence(&self, spacing: f64) -> Option<String> {
         if self.apart <= Self::STILL * spacing {
             return None;
         }
@@ -66,8 +66,8 @@ impl Mismatch {
     }
 }
 
-/// What does not fit together in the particles, of a spacing (m), of two frames that are `dt` (s) apart: a sentence. None where all
-/// does, and where a frame has none.
+/// What contradicts itself in the particles, of a spacing (m), of two frames that are `dt` (s) apart: a sentence. None where nothing
+/// does, and where a frame has no particles.
 ///
 /// # Errors
 /// Neither ids in both frames nor velocities in the first.
@@ -76,8 +76,8 @@ pub fn disagreement(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> 
         return Ok(None);
     }
     let paths = Paths::between(from, to, dt)?;
-    if let Some(told) = paths.mismatch.and_then(|mismatch| mismatch.told(spacing)) {
-        return Ok(Some(told));
+    if let Some(warning) = paths.mismatch.and_then(|mismatch| mismatch.sentence(spacing)) {
+        return Ok(Some(warning));
     }
     if from.ids.is_empty() || to.ids.is_empty() {
         return Ok(velocities_miss(from, to, dt, spacing));
@@ -90,32 +90,32 @@ pub fn disagreement(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> 
     }))
 }
 
-/// That over half of the mesh was lost or made anew in a step, and what of the particles may be the reason, a sentence each: `lost` of its
+/// Adds to a step's report that over half of the mesh was lost or made anew, and what in the particles may be the reason: `lost` of its
 /// vertices, of `all`, did not find the particles' surface. Where much of the liquid itself is gone or new, the mesh is right to be.
 ///
 /// # Errors
 /// As [`disagreement`].
-pub(super) fn torn_mesh(
-    report: &StepReport,
+pub(super) fn warn_of_tears(
+    report: &mut StepReport,
     (lost, all): (usize, usize),
     (from, to, dt): (&Particles, &Particles, f64),
     spacing: f64,
-) -> Result<Vec<String>> {
-    let mut out = Vec::new();
+) -> Result<()> {
     let [old, new] = [from, to].map(|frame| frame.places.len());
+    let warnings = &mut report.mesh_warnings;
     if 2 * lost > all && 2 * report.died <= old && 3 * new >= 2 * old {
-        out.push(format!("{lost} of the mesh's {all} vertices did not find the particles' surface"));
+        warnings.push(format!("{lost} of the mesh's {all} vertices did not find the particles' surface"));
     }
     if let Some(change) = report.change.as_ref().filter(|_| 2 * report.born <= new && 2 * new <= 3 * old) {
         let (made, triangles) = (change.rebuilt_triangles(), change.triangles.len());
         if 2 * made > triangles {
-            out.push(format!("{made} of the mesh's {triangles} triangles were made anew"));
+            warnings.push(format!("{made} of the mesh's {triangles} triangles were made anew"));
         }
     }
-    if !out.is_empty() && report.warnings.is_empty() {
-        out.extend(disagreement(from, to, dt, spacing)?);
+    if !warnings.is_empty() && report.particle_warning.is_none() {
+        report.particle_warning = disagreement(from, to, dt, spacing)?;
     }
-    Ok(out)
+    Ok(())
 }
 
 /// By how much (spacings) particles beside each other go apart, in the median.
@@ -150,7 +150,7 @@ fn torn(paths: &Paths, spacing: f64) -> Option<f64> {
     Some(*all.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Whether particles come to where no others are, in a sentence.
+/// A warning that velocities take particles to where no others are.
 fn velocities_miss(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> Option<String> {
     let bin = |place: &DVec3| cell_of(&(place / spacing));
     let filled = |frame: &Particles| -> HashSet<Coord> { frame.places.iter().map(bin).collect() };
@@ -225,7 +225,7 @@ mod tests {
         Particles { ids: (0..places.len() as i64).collect(), places, velocities }
     }
 
-    fn told(from: &Particles, to: &Particles) -> Option<String> {
+    fn warning(from: &Particles, to: &Particles) -> Option<String> {
         disagreement(from, to, DT, 0.1).unwrap()
     }
 
@@ -238,34 +238,37 @@ mod tests {
     }
 
     #[test]
-    fn what_fits_together_is_silent() {
+    fn particles_that_agree_raise_no_warning() {
         for frame in 0..12 {
             let (from, to) = (ball(frame, 1.0), ball(frame + 1, 1.0));
-            assert_eq!(told(&from, &to), None);
-            assert_eq!(told(&without_ids(&from), &without_ids(&to)), None);
-            assert_eq!(told(&without_velocities(&from), &without_velocities(&to)), None);
-            assert_eq!(told(&from, &Particles::default()), None);
+            assert_eq!(warning(&from, &to), None);
+            assert_eq!(warning(&without_ids(&from), &without_ids(&to)), None);
+            assert_eq!(warning(&without_velocities(&from), &without_velocities(&to)), None);
+            assert_eq!(warning(&from, &Particles::default()), None);
         }
     }
 
     #[test]
-    fn velocities_in_another_unit_are_told_with_their_factor() {
+    fn velocities_in_another_unit_are_reported_with_their_factor() {
         for factor in [100.0, 0.01, 3.28084] {
             let (from, to) = (ball(3, factor), ball(4, factor));
-            let what = told(&from, &to).unwrap();
+            let what = warning(&from, &to).unwrap();
             let (before, _) = what.split_once(" times as large").unwrap();
-            let told: f64 = before.rsplit(' ').next().unwrap().parse().unwrap();
-            // Ways of particles that turn are curved.
-            assert!((told / factor - 1.0).abs() < 1e-3 || (told - factor).abs() < 6e-4, "{what}");
+            let factor_found: f64 = before.rsplit(' ').next().unwrap().parse().unwrap();
+            // Paths of particles that turn are curved.
+            assert!(
+                (factor_found / factor - 1.0).abs() < 1e-3 || (factor_found - factor).abs() < 6e-4,
+                "{what}"
+            );
         }
         for (factor, words) in [(100.0, "0.0100 times"), (1000.0, "0.0010 times")] {
-            let what = told(&without_ids(&ball(3, factor)), &without_ids(&ball(4, factor))).unwrap();
+            let what = warning(&without_ids(&ball(3, factor)), &without_ids(&ball(4, factor))).unwrap();
             assert!(what.contains(words), "{what}");
         }
     }
 
     #[test]
-    fn ids_that_are_rows_are_told() {
+    fn ids_that_are_rows_are_reported() {
         // Those in the first rows go, so that all others move up, or rows come in any order.
         let rows = |from: &Particles, to: &Particles| {
             let shifted = |frame: &Particles, by: usize| {
@@ -285,11 +288,11 @@ mod tests {
         };
         let (from, to) = (ball(3, 1.0), ball(4, 1.0));
         for (from, to) in rows(&from, &to) {
-            let what = told(&from, &to).unwrap();
+            let what = warning(&from, &to).unwrap();
             assert!(what.contains("row numbers"), "{what}");
         }
         let (_, mixed) = &rows(&without_velocities(&from), &without_velocities(&to))[1];
-        let what = told(&without_velocities(&from), mixed).unwrap();
+        let what = warning(&without_velocities(&from), mixed).unwrap();
         assert!(what.contains("row numbers"), "{what}");
     }
 }

@@ -4,9 +4,6 @@ use super::apart::Apart;
 use super::change::Change;
 use crate::context::PhaseTime;
 
-/// What warnings of the mesh have in common.
-pub(super) const OF_MESH: &str = "of the mesh's";
-
 /// What a step did.
 #[derive(Debug, Clone, Default)]
 pub struct StepReport {
@@ -28,8 +25,10 @@ pub struct StepReport {
     pub apart: Vec<Apart>,
     /// What the mesh became where it was rebuilt or improved; none: vertices and triangles are those before.
     pub change: Option<Change>,
-    /// What looks wrong with the particles, and with what became of the mesh, a sentence each.
-    pub warnings: Vec<String>,
+    /// How ids, velocities and positions of the particles contradict each other, in a sentence.
+    pub particle_warning: Option<String>,
+    /// That over half of the mesh was lost or made anew, a sentence each.
+    pub mesh_warnings: Vec<String>,
     /// Time of each phase.
     pub phases: Vec<PhaseTime>,
 }
@@ -40,12 +39,15 @@ impl StepReport {
         self.jumped + self.lost + self.uncovered
     }
 
-    /// The warnings that are news: what is wrong with the particles is said of the first frame only, of which `is_told` keeps note.
-    pub fn news<'a>(&'a self, is_told: &'a mut bool) -> impl Iterator<Item = &'a String> {
-        self.warnings.iter().filter(|warning| {
-            let is_of_mesh = warning.contains(OF_MESH);
-            is_of_mesh || !std::mem::replace(is_told, true)
-        })
+    /// All warnings.
+    pub fn warnings(&self) -> impl Iterator<Item = &String> {
+        self.mesh_warnings.iter().chain(&self.particle_warning)
+    }
+
+    /// Warnings to log: all of the mesh, and the first one of the particles, after which `has_warned` is set.
+    pub fn new_warnings(&self, has_warned: &mut bool) -> impl Iterator<Item = &String> {
+        let of_particles = self.particle_warning.as_ref().filter(|_| !std::mem::replace(has_warned, true));
+        self.mesh_warnings.iter().chain(of_particles)
     }
 
     /// What two steps did, one after the other; what is flagged is so after the second.
@@ -69,10 +71,8 @@ impl StepReport {
                 (Some(first), Some(second)) => Some(second.after(&first)),
                 (first, second) => second.or(first),
             },
-            warnings: {
-                self.warnings.extend(next.warnings);
-                self.warnings
-            },
+            particle_warning: self.particle_warning.or(next.particle_warning),
+            mesh_warnings: [self.mesh_warnings, next.mesh_warnings].concat(),
             phases: self.phases,
         }
     }

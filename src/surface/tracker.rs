@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::Particles;
 use super::advect::advect;
-use super::agreement::torn_mesh;
+use super::agreement::warn_of_tears;
 use super::ahead::Ahead;
 use super::apart::{Apart, Lacking, Parts, Wanted};
 use super::band::Distances;
@@ -301,11 +301,9 @@ impl Tracker {
                     born: paths.born,
                     died: paths.died,
                     triangles: surface.1.count(),
-                    warnings: paths
+                    particle_warning: paths
                         .mismatch
-                        .and_then(|mismatch| mismatch.told(self.params.spacing))
-                        .into_iter()
-                        .collect(),
+                        .and_then(|mismatch| mismatch.sentence(self.params.spacing)),
                     ..StepReport::default()
                 },
                 drifts,
@@ -322,8 +320,7 @@ impl Tracker {
             next.report.apart = covered.apart;
             let is_torn = |(flag, delta): &(&Flag, &f32)| **flag == Flag::Lost && !delta.is_nan();
             let lost = flags.iter().zip(&self.delta).filter(is_torn).count();
-            let torn = torn_mesh(&next.report, (lost, flags.len()), (from, to, dt), self.params.spacing)?;
-            next.report.warnings.extend(torn);
+            warn_of_tears(&mut next.report, (lost, flags.len()), (from, to, dt), self.params.spacing)?;
             Ok((next, ahead))
         })?;
         let (next, ahead) = next;

@@ -1,4 +1,4 @@
-//! Whether the values of a level set are the distances that every tool takes them for: metres, in a band of some cells.
+//! Checks that the values of a level set are distances in metres in a band of some cells, as every tool expects.
 
 use super::level_set::{from_mesh, to_mesh};
 use super::{FloatGrid, Leaf};
@@ -7,9 +7,9 @@ use crate::base::blocks::VOXELS;
 use crate::context::Context;
 use crate::error::Result;
 
-/// Leaves that are looked at.
+/// Leaves that are sampled.
 const LEAVES: usize = 512;
-/// Edges between voxels inside and outside that are enough to tell.
+/// Fewest edges between voxels inside and outside to judge by.
 const ENOUGH: usize = 64;
 /// Median of differences along such edges over their length, where values are distances: 0.67 to 1, by how the surface lies. Beyond
 /// these they are not.
@@ -26,7 +26,7 @@ const BAND: f32 = 3.0;
 enum Fault {
     /// They are distances in voxels.
     InVoxels,
-    /// They grow by so much on the way of 1 m.
+    /// Their gradient at the surface.
     Slope(f64),
     /// The band reaches so far on each side (cells).
     Thin(f64),
@@ -38,7 +38,7 @@ impl Fault {
         match self {
             Self::InVoxels => "has distances in voxels, not in metres".to_string(),
             Self::Slope(slope) => format!(
-                "has values that are no distances in metres: at its surface they grow by {slope:.3} on the way of 1 m; offsets, \
+                "has values that are no distances in metres: their gradient at the surface is {slope:.3}, not 1; offsets, \
                  combinations and volumes of it are wrong"
             ),
             Self::Thin(cells) => {
@@ -59,7 +59,7 @@ pub fn warning(grid: &FloatGrid) -> Result<Option<String>> {
 
 /// A level set as it was read, or one with distances in metres in a band of three cells around the same surface, where its own values
 /// count in voxels or end within two cells of the surface; with what was wrong, in words that follow its name. Values that
-/// are no distances at all stay as they are, and are told.
+/// are no distances at all stay as they are, with what is wrong with them.
 ///
 /// # Errors
 /// Cancel, or what OpenVDB reports.
@@ -87,7 +87,7 @@ pub fn mended(ctx: &Context, grid: FloatGrid) -> Result<(FloatGrid, Option<Strin
     Ok((made, Some(what)))
 }
 
-/// What is wrong with the values of a level set, where that can be told from those at its surface.
+/// What is wrong with the values of a level set, judged at its surface.
 fn fault(grid: &FloatGrid) -> Result<Option<Fault>> {
     let voxel = grid.voxel_size();
     let leaves = grid.leaves()?;

@@ -5,7 +5,7 @@ use std::path::Path;
 use frazil::base::points::{Attribute, Column, Points, Values};
 use frazil::base::{DVec3, TriMesh};
 use frazil::io::{mesh, particles};
-use frazil::surface::{Params, Particles, SUPPORT, Tracker};
+use frazil::surface::{Implicit, Isosurface, Params, Particles, SUPPORT, Tracker};
 use frazil::{Context, Pool};
 
 use super::shapes::sphere;
@@ -13,6 +13,12 @@ use super::shapes::sphere;
 /// A context with threads of its own.
 pub fn context(threads: usize) -> Context {
     Context::new(Pool::new(threads).expect("threads"))
+}
+
+/// The surface of particles at these positions (m) with cells of half a spacing (m), as the tracker has it.
+pub fn own_surface(ctx: &Context, positions: &[DVec3], spacing: f64) -> TriMesh {
+    let phi = Implicit::new(ctx, positions, spacing, 0.5 * spacing).expect("a surface");
+    Isosurface::new(&phi).mesh(&phi)
 }
 
 /// Numbers from -1 to 1, the same in each run.

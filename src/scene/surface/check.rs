@@ -82,18 +82,18 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let (mut least, mut most) = (usize::MAX, 0);
     let (mut has_ids, mut has_velocities) = (true, true);
     let files = all_files(scene, surface);
-    let (mut before, mut is_told): (Option<Particles>, bool) = (None, false);
+    let (mut before, mut has_warned): (Option<Particles>, bool) = (None, false);
     let mut most_bytes = Most::default();
     for path in &files {
         ctx.check()?;
         let particles = read(path, surface, &inputs.seen)?;
         ctx.pool().install(|| most_bytes.add(&particles, inputs.spacing, surface.cell));
-        if let Some(before) = before.take().filter(|_| !is_told) {
-            // Where particles go is not known without ids and velocities: that is told below.
+        if let Some(before) = before.take().filter(|_| !has_warned) {
+            // Particles with neither ids nor velocities are reported below.
             let compared = || disagreement(&before, &particles, 1.0 / shot.fps, inputs.spacing);
             if let Ok(Some(what)) = ctx.pool().install(compared) {
                 warnings.push(format!("{}: {what}", path.display()));
-                is_told = true;
+                has_warned = true;
             }
         }
         let Particles { places, velocities, ids } = &particles;

@@ -47,8 +47,9 @@ pub(super) fn told(report: &StepReport, particles: usize, tracker: &Tracker, is_
     }) else {
         unreachable!("it is written as an object")
     };
-    if !report.warnings.is_empty() {
-        results.insert("warnings".into(), json!(report.warnings));
+    let warnings: Vec<&String> = report.warnings().collect();
+    if !warnings.is_empty() {
+        results.insert("warnings".into(), json!(warnings));
     }
     Report { results, phases: report.phases.clone() }
 }

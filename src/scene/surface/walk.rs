@@ -36,7 +36,7 @@ pub struct Walk<'a> {
     /// The first frame that could not be made ahead: beyond the shot's end, or one that fails.
     end: Option<i32>,
     /// Whether what is wrong with the particles was said.
-    is_told: bool,
+    has_warned: bool,
 }
 
 /// A mesh as an artist made it: that of the first frame, or an edited one.
@@ -127,7 +127,16 @@ impl<'a> Walk<'a> {
 
     fn at((scene, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs), frame: i32, at: At) -> Self {
         let liquid = Liquid::new(surface, scene.shot, &inputs.seen);
-        Self { scene, surface, inputs, liquid, frame, known: VecDeque::from([at]), end: None, is_told: false }
+        Self {
+            scene,
+            surface,
+            inputs,
+            liquid,
+            frame,
+            known: VecDeque::from([at]),
+            end: None,
+            has_warned: false,
+        }
     }
 
     /// Goes on to a frame, and as far ahead as that needs.
@@ -304,7 +313,7 @@ impl<'a> Walk<'a> {
         let is_resculpted = sculpted.is_some();
         let report = sculpted.into_iter().fold(report, StepReport::followed_by);
         let report = StepReport { phases: phases.times(), ..report };
-        report.news(&mut self.is_told).for_each(|warning| log::warn!("frame {frame}: {warning}"));
+        report.new_warnings(&mut self.has_warned).for_each(|warning| log::warn!("frame {frame}: {warning}"));
         at.report = told(&report, from.places.len(), &at.tracker, is_resculpted);
         Ok(at)
     }

@@ -1,6 +1,7 @@
 //! Frames without particles, and frames that are missing.
 
 use std::fs;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use frazil::base::DVec3;
@@ -50,10 +51,15 @@ fn frames_without_particles_get_empty_meshes_and_liquid_comes_back() {
     // From a state without a mesh a run goes on with the same bytes.
     works(folder, "surface -p p.%04d.bgeo --spacing 0.1 -o again --frames 1-6");
     works(folder, "surface -p p.%04d.bgeo --spacing 0.1 -o again");
-    for number in 1..=9 {
+    are_same(folder, "again", 1..=9);
+}
+
+/// The meshes of these frames are the same bytes in `out` and in another run.
+fn are_same(folder: &Path, run: &str, frames: RangeInclusive<i32>) {
+    for frame in frames {
         let read =
-            |run: &str| fs::read(folder.join(format!("{run}/surface/surface.{number:04}.ply"))).unwrap();
-        assert!(read("out") == read("again"), "{number}");
+            |run: &str| fs::read(folder.join(format!("{run}/surface/surface.{frame:04}.ply"))).unwrap();
+        assert!(read("out") == read(run), "frame {frame} of {run}");
     }
 }
 
@@ -70,15 +76,11 @@ fn frames_before_a_missing_file_are_made_and_the_rest_when_it_comes() {
     works(folder, run);
     assert!((1..=8).all(|number| made(number) > Some(0)));
     works(folder, &run.replace("-o out", "-o whole"));
-    for number in 1..=8 {
-        let read =
-            |run: &str| fs::read(folder.join(format!("{run}/surface/surface.{number:04}.ply"))).unwrap();
-        assert!(read("out") == read("whole"), "{number}");
-    }
+    are_same(folder, "whole", 1..=8);
 }
 
 #[test]
-fn ids_that_are_row_numbers_are_told_by_check_and_run() {
+fn check_and_run_warn_of_ids_that_are_row_numbers() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     for number in 1..=3 {

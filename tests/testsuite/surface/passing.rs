@@ -2,13 +2,13 @@
 
 use frazil::base::DVec3;
 use frazil::base::topology::bodies;
-use frazil::surface::{Implicit, Isosurface, Params, Tracker};
+use frazil::surface::{Params, Tracker};
 
-use crate::common::liquids::{context, filled, numbered};
+use crate::common::liquids::{context, filled, numbered, own_surface};
 
 const FRAMES: usize = 24;
 
-/// Two slabs whose outermost particles pass by at a distance: their places in a frame (spacings).
+/// Two slabs whose outermost particles pass by at a distance: their particles' positions in a frame (spacings).
 fn slabs(gap: f64, frame: usize) -> Vec<DVec3> {
     let slab = filled(1.0, 0.1, 8.0, |at| at.x.abs() < 6.0 && at.y.abs() < 3.0 && at.z.abs() < 4.0);
     let along = 10.0 - 20.0 * frame as f64 / FRAMES as f64;
@@ -19,14 +19,11 @@ fn slabs(gap: f64, frame: usize) -> Vec<DVec3> {
 #[test]
 fn the_mesh_is_one_where_the_particles_own_surface_is_one() {
     let ctx = context(2);
-    // Between their particles. Half-way between flat sides the mean of the particles moves 3.5 times as fast as the place, from which rate on
-    // nothing is inside, where they are 4.2 spacings apart.
+    // Between their particles. Half-way between flat sides the mean of the particles moves 3.5 times as fast as the point it is taken for where
+    // they are 4.2 spacings apart; from that rate on no point is inside.
     for (gap, is_joined) in [(1.6, true), (2.6, true), (5.0, false)] {
         let at = |frame: usize| numbered(slabs(gap, frame));
-        let own = |frame: usize| {
-            let phi = Implicit::new(&ctx, &at(frame).places, 1.0, 0.5).expect("a surface");
-            Isosurface::new(&phi).mesh(&phi)
-        };
+        let own = |frame: usize| own_surface(&ctx, &at(frame).places, 1.0);
         let mut from = at(0);
         let params = Params { rebuild: true, min_drop: 8, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &own(0), &from).expect("a tracker");

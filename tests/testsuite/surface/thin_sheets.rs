@@ -2,9 +2,9 @@
 //! which lies one spacing off the sheet on both sides.
 
 use frazil::base::DVec3;
-use frazil::surface::{Implicit, Isosurface, Params, Tracker};
+use frazil::surface::{Params, Tracker};
 
-use crate::common::liquids::{context, filled, numbered};
+use crate::common::liquids::{context, filled, numbered, own_surface};
 
 const FRAMES: usize = 24;
 /// Half of the sheet's width at first (spacings).
@@ -19,10 +19,7 @@ fn a_sheet_that_thins_has_the_volume_of_the_particles_own_surface() {
         let wide = libm::exp2(frame as f64 / FRAMES as f64);
         numbered(first.iter().map(|at| DVec3::new(at.x * wide, at.y / (wide * wide), at.z * wide)).collect())
     };
-    let own = |frame: usize| {
-        let phi = Implicit::new(&ctx, &at(frame).places, 1.0, 0.5).expect("a surface");
-        Isosurface::new(&phi).mesh(&phi)
-    };
+    let own = |frame: usize| own_surface(&ctx, &at(frame).places, 1.0);
     let mut from = at(0);
     let params = Params { rebuild: true, min_drop: 8, ..Params::for_spacing(1.0) };
     let mut tracker = Tracker::new(&ctx, params, &own(0), &from).expect("a tracker");
