@@ -2,7 +2,7 @@
 
 /// Height (diameters) of a wall that stands by the grains' size alone, as the gate `snow.grains.wall` measures it: at an angle of
 /// repose of 32 degrees, and for each degree below and above that.
-const ALONE: [f64; 3] = [6.2, 0.4, -0.15];
+const ALONE: [f64; 3] = [6.2, 0.4, 0.15];
 /// Measured attraction (weights of a grain) times tan(a) tan(45 degrees + a/2) for each further diameter, a the angle of repose,
 /// and what each of these makes the next ones need more: long chains of contacts are solved less exactly.
 const EACH: [f64; 2] = [0.37, 0.0045];

@@ -2,6 +2,7 @@
 
 use std::mem::zeroed;
 use std::ptr::{null, null_mut};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use frazil::capi::frz_status::*;
 use frazil::capi::{grains::*, grains_params::*, grains_points::*, mist::*, mist_params::*};
@@ -27,7 +28,6 @@ pub fn run(h: &mut Harness) {
     if !h.wants("reliability.step_calls") {
         return;
     }
-    let watch = Watch::new();
     type Scenes = fn(&mut Tried);
     let functions: [(&'static str, Scenes); 10] = [
         ("frz_shallow_step", shallow),
@@ -41,17 +41,29 @@ pub fn run(h: &mut Harness) {
         ("frz_tracker_step", meshes::tracker),
         ("frz_tracker_read_eased", meshes::eased),
     ];
-    let (mut slow, mut notes) = (0, Vec::new());
-    for (name, scenes) in functions {
+    let judged = |(name, scenes): (&'static str, Scenes)| {
+        let watch = Watch::new();
         let mut tried = Tried::new(&watch, name);
         while !tried.is_done() {
             scenes(&mut tried);
         }
         let (own, note) = tried.judged();
         println!("# {note}, {own} too slow");
-        notes.push(note);
-        slow += own;
-    }
+        (own, note)
+    };
+    // Each runs in a thread of its own, and is measured by the CPU time of that: one for each core, the next function to whoever is done.
+    let next = AtomicUsize::new(0);
+    let worker = || {
+        let function = || functions.get(next.fetch_add(1, Ordering::SeqCst)).copied();
+        std::iter::from_fn(function).map(judged).collect::<Vec<_>>()
+    };
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let results: Vec<(usize, String)> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..cores.min(functions.len())).map(|_| scope.spawn(worker)).collect();
+        workers.into_iter().flat_map(|worker| worker.join().expect("a worker")).collect()
+    });
+    let slow: usize = results.iter().map(|(slow, _)| slow).sum();
+    let notes: Vec<String> = results.into_iter().map(|(_, note)| note).collect();
     let note = format!("{STEPS} each; medians, and the longest after a cancel: {}", notes.join("; "));
     h.gate("reliability.step_calls", slow as f64, &note);
 }

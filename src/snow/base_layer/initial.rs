@@ -34,6 +34,9 @@ pub enum Cover {
     Top(TriMesh),
 }
 
+/// Cosine of the steepest slope that holds snow, 89 degrees. A vertical wall whose corners are rounded leans outward by a little: the
+/// snow on it would be a film far thinner than a cell.
+const STEEPEST: f64 = 0.01745;
 /// Layers that a solid subtracts: more than prisms can overlap.
 const SOLID: i32 = -(1 << 20);
 const EVERYWHERE: Window = Window { min: [i32::MIN; 3], max: [i32::MAX; 3] };
@@ -62,9 +65,9 @@ pub fn layer(
                 if !(*depth > 0.0 && depth.is_finite()) {
                     return Err(Error::argument(format!("depth = {depth} m is not above 0")));
                 }
-                for mesh in std::iter::once(&ground).chain(&statics) {
+                for mesh in std::iter::once(&ground).chain(&statics).map(Sheet::without_walls) {
                     let raised = |p: DVec3| p + DVec3::y() * *depth;
-                    prisms(ctx, &lattice, mesh, |p| p, raised, 1, &mut faces)?;
+                    prisms(ctx, &lattice, &mesh, |p| p, raised, 1, &mut faces)?;
                 }
             }
             Cover::Top(top) => {
@@ -170,6 +173,19 @@ impl Sheet {
         let mut positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
         Weld::of(&positions, &mesh.triangles).unify(&mut positions);
         Self { positions, triangles: mesh.triangles }
+    }
+
+    /// Its triangles that are less steep than [`STEEPEST`].
+    fn without_walls(&self) -> Self {
+        let holds = |[a, b, c]: &[DVec3; 3]| {
+            let normal = (b - a).cross(&(c - a));
+            normal.y.abs() >= STEEPEST * normal.norm()
+        };
+        let triangles = self.triangles.iter().zip(self.corners()).filter(|(_, corners)| holds(corners));
+        Self {
+            positions: self.positions.clone(),
+            triangles: triangles.map(|(triangle, _)| *triangle).collect(),
+        }
     }
 
     fn corners(&self) -> impl Iterator<Item = [DVec3; 3]> + '_ {

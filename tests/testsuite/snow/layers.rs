@@ -80,6 +80,23 @@ fn snow_lies_on_static_objects_and_not_in_them() {
 }
 
 #[test]
+fn a_wall_that_leans_by_a_hair_holds_no_snow() {
+    let ctx = context();
+    let volume = |wider: f32| {
+        let mut block = cuboid([1.0, 1.0, 1.0]);
+        block
+            .positions
+            .iter_mut()
+            .filter(|p| p.y < 0.5)
+            .for_each(|p| *p = Vec3::new(wider * p.x, p.y, wider * p.z));
+        let grid = layer(&ctx, &Ground::Mesh(block), &[], &Cover::Depth(0.3), CELL, 3.0).unwrap();
+        level_set::measure(&ctx, &grid).unwrap().volume
+    };
+    let (upright, leans) = (volume(1.0), volume(1.001));
+    assert!((leans / upright - 1.0).abs() < 1.0e-3, "{leans} m3, not {upright}");
+}
+
+#[test]
 fn two_static_objects_inside_each_other_hold_no_snow() {
     let mut other = block();
     other.positions.iter_mut().for_each(|p| p.x += 0.1);
