@@ -1526,7 +1526,8 @@ typedef struct {
      */
     frz_view indices;
     /**
-     * Friction of grains against it, 0 to 10; only grains read it. 0.3 in headers of interface 1.1 and from frz_body_init.
+     * Friction of grains against it, 0 to 10; only grains read it. It holds them, and carries them along while the body moves; loose grains
+     * that slide over one that stands still meet the friction between grains. 0.3 in headers of interface 1.1 and from frz_body_init.
      */
     double friction;
     /**

@@ -46,7 +46,8 @@ pub struct frz_body {
     pub face_counts: frz_view,
     /// As in frz_mesh_desc. Where open meshes press into snow or are swept they are closed, and a warning says so.
     pub indices: frz_view,
-    /// Friction of grains against it, 0 to 10; only grains read it. 0.3 in headers of interface 1.1 and from frz_body_init.
+    /// Friction of grains against it, 0 to 10; only grains read it. It holds them, and carries them along while the body moves; loose grains
+    /// that slide over one that stands still meet the friction between grains. 0.3 in headers of interface 1.1 and from frz_body_init.
     pub friction: f64,
     /// With which it holds grains that touch it (weights of a grain), 0 to 1000; only grains read it.
     pub stick: f64,
