@@ -250,7 +250,7 @@ pub unsafe extern "C" fn frz_mist_step(
                 Some(heap) => {
                     let radius = heap.grains.params().radius;
                     let grains = heap.grains.places().zip(heap.grains.velocities());
-                    grains.map(|(place, velocity)| Source { place, velocity, radius }).collect()
+                    grains.map(|(place, velocity)| Source { place, velocity, radius, start: None }).collect()
                 }
                 None => Vec::new(),
             };
@@ -312,7 +312,12 @@ pub unsafe extern "C" fn frz_mist_step_points(
             within("radius", radius, f64::MIN_POSITIVE..=f64::MAX, " m")?;
             let points = places.iter().zip(&*velocities);
             let sources: Vec<Source> = points
-                .map(|(place, velocity)| Source { place: (*place).into(), velocity: *velocity, radius })
+                .map(|(place, velocity)| Source {
+                    place: (*place).into(),
+                    velocity: *velocity,
+                    radius,
+                    start: None,
+                })
                 .collect();
             air.step(ctx, &sources, &Scene { snow, wind, bodies: (bodies, count), time, dt })
         })

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::Flow;
 use super::around::Reader;
+use super::conserve::{self, Keeping};
 use super::paths::{At, Live, Paths, Ways, trace};
 use super::room::Room;
 use super::stencil::row_of;
@@ -41,6 +42,8 @@ pub struct Way<'a> {
     pub scheme: Scheme,
     /// The air around, as it is after the step.
     pub around: Option<&'a Flow>,
+    /// How the density keeps its mass; none: it does so as far as the scheme does.
+    pub keeping: Option<Keeping>,
 }
 
 /// Carries velocity (m/s, at lower faces) and density along for a step. The rim keeps what it holds, but for the upper faces of
@@ -66,8 +69,13 @@ pub fn advect(
         let room = [&mut *hat, &mut *below, &mut *above];
         carry(ctx, &paths, At::Faces(axis), field, around.as_ref(), room, scheme)?;
     }
+    let wanted = way.keeping.map(|_| conserve::carried(ctx, &paths, density)).transpose()?;
     let room = [hat, below, above].map(|field| &mut field[..tiles.active()]);
-    carry(ctx, &paths, At::Centres, (density, 0.0), None, room, scheme)
+    carry(ctx, &paths, At::Centres, (density, 0.0), None, room, scheme)?;
+    if let (Some(keeping), Some(wanted)) = (way.keeping, wanted) {
+        conserve::restore(tiles, density, &wanted, keeping);
+    }
+    Ok(())
 }
 
 /// Carries a field along the paths. `hat` is room for the first guess, `below` and `above` for its distances from the least and

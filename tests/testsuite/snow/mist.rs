@@ -3,7 +3,7 @@
 use frazil::base::DVec3;
 use frazil::flow::{Faces, Solids, Tiles};
 use frazil::motion::{Key, Keys, Rigid};
-use frazil::snow::mist::{Around, Boundary, Grids, Mist, Params, Source, Surroundings, Wind};
+use frazil::snow::mist::{Around, Boundary, Grids, Mist, Params, Source, Start, Surroundings, Wind};
 use frazil::sweep::Body;
 use frazil::{Context, Error, Pool};
 
@@ -30,7 +30,7 @@ fn times(frame: i32) -> [f64; 2] {
 }
 
 fn grain(place: [f64; 3], velocity: [f32; 3]) -> Source {
-    Source { place: DVec3::from(place), velocity, radius: 0.006 }
+    Source { place: DVec3::from(place), velocity, radius: 0.006, start: None }
 }
 
 /// A body that moves along x at a speed (m/s) from a place (m).
@@ -339,6 +339,69 @@ fn only_fast_grains_that_rise_raise_mist() {
     assert_eq!(raised(rising, false), (1, true));
     assert_eq!(raised(falling, false), (0, false));
     assert_eq!(raised(falling, true), (1, true));
+}
+
+/// Mist (m3) after a sixth of a second, and where its middle is (m), of grains that lie still until they are thrown, one after
+/// another, in frames of 1 / `fps` (s).
+fn thrown(fps: f64) -> (f64, DVec3) {
+    let ctx = context(2);
+    let mut mist = Mist::new(Params::for_cell(CELL)).unwrap();
+    let at = |n: i32, time: f64| {
+        let from = DVec3::new(0.03 * f64::from(n % 5), 0.05, 0.02 * f64::from(n / 5));
+        let time = time - (0.009 + 0.0131 * f64::from(n % 7));
+        let velocity = DVec3::new(0.2, 3.0, 1.0 + 0.1 * f64::from(n % 3));
+        match time > 0.0 {
+            true => {
+                let now = velocity - DVec3::y() * (9.81 * time);
+                let place = from + (velocity + now) * (0.5 * time);
+                Start { place, velocity: [now.x as f32, now.y as f32, now.z as f32] }
+            }
+            false => Start { place: from, velocity: [0.0; 3] },
+        }
+    };
+    for frame in 0..(fps / 6.0).round() as i32 {
+        let times = [frame, frame + 1].map(|frame| f64::from(frame) / fps);
+        let source = |n: i32| {
+            let Start { place, velocity } = at(n, times[1]);
+            Source { place, velocity, radius: 0.006, start: Some(at(n, times[0])) }
+        };
+        let sources: Vec<Source> = (0..35).map(source).collect();
+        mist.step(&ctx, &around(&sources, &open), times).unwrap();
+    }
+    (mist.mass(), middle(&mist))
+}
+
+#[test]
+fn mist_is_the_same_at_every_frame_rate() {
+    let [(a, low), (b, middle), (c, high)] = [24.0, 48.0, 96.0].map(thrown);
+    assert!((a / c - 1.0).abs() < 0.03 && (b / c - 1.0).abs() < 0.02, "{a} {b} {c}");
+    assert!((low - high).norm() < 0.2 * CELL && (middle - high).norm() < 0.1 * CELL, "{low} {middle} {high}");
+}
+
+#[test]
+fn a_grain_that_is_hit_raises_mist_from_where_it_lay() {
+    let ctx = context(1);
+    let from = DVec3::new(0.11, 0.01, 0.01);
+    // It was hit half way through the frame; its velocity then led it here.
+    let velocity = [0.0, 6.0f32, 0.0];
+    let place = from + DVec3::y() * (6.0 * 0.5 * FRAME);
+    let lowest = |start: Option<Start>| {
+        let mut mist = Mist::new(Params { noise: 0.0, gravity: 0.0, ..Params::for_cell(CELL) }).unwrap();
+        let source = Source { start, ..grain(place.into(), velocity) };
+        mist.step(&ctx, &around(&[source], &open), times(0)).unwrap();
+        let mut lowest = f64::INFINITY;
+        for (coord, tile) in mist.flow().tiles().coords().iter().zip(mist.flow().density()) {
+            for cell in (0..512usize).filter(|cell| tile[*cell] > 0.1) {
+                lowest = lowest.min((f64::from(coord[1] * 8 + (cell >> 3 & 7) as i32) + 0.5) * CELL);
+            }
+        }
+        lowest
+    };
+    let known = lowest(Some(Start { place: from, velocity: [0.0; 3] }));
+    assert!(known > from.y - 2.0 * CELL, "{known}");
+    // Nothing is known of where it was: it came from as far below.
+    let unknown = lowest(None);
+    assert!(unknown < known - 2.0 * CELL, "{unknown} {known}");
 }
 
 #[test]

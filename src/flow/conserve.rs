@@ -1,0 +1,224 @@
+//! Mass of a density that is carried along: what advection loses or gains is put back where it did.
+//!
+//! Every corner of the tiles has a hat: a weight of 1 there that falls linearly to 0 at the corners beside it, so that all hats
+//! together weigh each point once. Along its path each cell carries its mass to a point, and thus into the eight hats around it:
+//! that is the mass that each hat should hold. Advection makes another one of it. The density is then multiplied by factors that
+//! the corners give and that are linear between them: by what each hat should hold over what it holds, so that the mass of all
+//! hats together is right to rounding, and no density farther than a tile from a loss changes.
+
+use rayon::prelude::*;
+
+use super::paths::{Extent, Paths};
+use super::stencil::row_of;
+use super::tiles::{Field, Tile, Tiles, neighbour_at};
+use crate::base::cpu::dispatch;
+use crate::base::lanes::Lanes;
+use crate::context::Context;
+use crate::error::Result;
+
+/// What becomes of a density besides being carried along.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Keeping {
+    /// Share 0..=1 of the mass that stays.
+    pub share: f32,
+    /// A density below this is cut off; its mass goes to what is beside it.
+    pub least: f32,
+}
+
+/// Greatest factor by which density grows in a step: mist of which nearly all was cut off must not come back in what is left.
+const MOST_GAIN: f64 = 1.2;
+/// How often a hat that would have to gain more hands the rest on to those beside it. What is left then goes to all of the density.
+const PASSES: usize = 6;
+/// Powers of the factors in the rounds in which density is multiplied by them. Factors that are linear between corners bring a hat
+/// a fifth of the way where the ones beside it need the contrary: a first round does more, so that what the scheme holds back of a
+/// front goes on with it, and the last one makes the sum of all hats right.
+const POWERS: [i32; 2] = [5, 1];
+/// Greatest factor of the first round, and the inverse of the least one.
+const FIRST_GAIN: f64 = 1.1;
+/// Hats on an axis that a tile's mass may go to: those of the corners 8 cells before its first one, at it, 8 and 16 behind it.
+const HATS: usize = 4;
+/// Masses in the hats around a tile (cells).
+pub type Masses = [f32; HATS * HATS * HATS];
+
+/// The mass (cells) that each corner's hat should hold when the density was carried along; corners are named by the slot of the
+/// tile whose first cell they bound.
+///
+/// # Errors
+/// Cancel.
+pub fn carried(ctx: &Context, paths: &Paths<'_>, density: &Field) -> Result<Vec<f64>> {
+    let of_tile = |(slot, tile): (usize, &Tile)| {
+        ctx.check()?;
+        let ahead = paths.ahead.map(|field| &field[slot]);
+        Ok(masses(tile, Some(&ahead), &paths.extents[slot][1]))
+    };
+    let masses: Result<Vec<Masses>> = density.par_iter().enumerate().with_min_len(16).map(of_tile).collect();
+    Ok(in_hats(paths.tiles, &masses?))
+}
+
+/// Cuts off what is thin, lets a share of the density stay, and puts the mass that hats should hold back.
+pub fn restore(tiles: &Tiles, density: &mut Field, wanted: &[f64], keeping: Keeping) {
+    let cut = |value: &mut f32| {
+        *value *= keeping.share;
+        if *value < keeping.least {
+            *value = 0.0;
+        }
+    };
+    density.par_iter_mut().with_min_len(64).for_each(|tile| tile.iter_mut().for_each(cut));
+    let wanted: Vec<f64> = wanted.iter().map(|mass| mass * f64::from(keeping.share)).collect();
+    for power in POWERS {
+        let held: Vec<Masses> =
+            density.par_iter().with_min_len(16).map(|tile| masses(tile, None, &[[0.0; 2]; 3])).collect();
+        let held = in_hats(tiles, &held);
+        multiply(tiles, density, &factors(tiles, wanted.clone(), &held, power));
+    }
+}
+
+/// Multiplies a density by the factors of the corners.
+fn multiply(tiles: &Tiles, density: &mut Field, factors: &[f32]) {
+    density.par_iter_mut().enumerate().with_min_len(16).for_each(|(slot, tile)| {
+        let near = &tiles.neighbours()[slot];
+        let corner = |at: usize| {
+            let offset = [at >> 2, at >> 1 & 1, at & 1].map(|x| x as i32);
+            factors[near[neighbour_at(offset)] as usize]
+        };
+        let corners: [f32; 8] = std::array::from_fn(corner);
+        if corners.iter().any(|factor| *factor != 1.0) {
+            scale(tile, &corners);
+        }
+    });
+}
+
+/// The masses of a tile in the hats around it, along paths with an extent.
+fn masses(tile: &Tile, ahead: Option<&[&Tile; 3]>, extent: &Extent) -> Masses {
+    let holds = tile.iter().any(|value| *value != 0.0);
+    if holds { masses_of(tile, ahead, extent) } else { [0.0; HATS * HATS * HATS] }
+}
+
+fn masses_of(tile: &Tile, ahead: Option<&[&Tile; 3]>, extent: &Extent) -> Masses {
+    dispatch!(masses_of_rows(tile: &Tile, ahead: Option<&[&Tile; 3]>, extent: &Extent) -> Masses)
+}
+
+#[inline(always)]
+fn masses_of_rows(tile: &Tile, ahead: Option<&[&Tile; 3]>, extent: &Extent) -> Masses {
+    const CENTRES: Lanes = Lanes([0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5]);
+    let zero = Lanes::all(0.0);
+    // The hats that any cell reaches on each axis.
+    let ranges = extent.map(|[least, most]| {
+        let low = ((0.5 + least) / 8.0).floor() as i32 + 1;
+        let high = ((7.5 + most) / 8.0).floor() as i32 + 3;
+        low.clamp(0, 3) as usize..high.clamp(1, 4) as usize
+    });
+    let weights = |at: Lanes, range: &std::ops::Range<usize>| -> [Lanes; HATS] {
+        let mut weights = [zero; HATS];
+        for hat in range.clone() {
+            let off = at * Lanes::all(0.125) - Lanes::all(hat as f32 - 1.0);
+            weights[hat] = (Lanes::all(1.0) - off.max(zero - off)).max(zero);
+        }
+        weights
+    };
+    let mut sums = [zero; HATS * HATS * HATS];
+    for row in 0..64 {
+        let density = Lanes(row_of(tile, row));
+        if density.0.iter().all(|value| *value == 0.0) {
+            continue;
+        }
+        let middle = [Lanes::all((row >> 3) as f32 + 0.5), Lanes::all((row & 7) as f32 + 0.5), CENTRES];
+        let at = |axis: usize| match ahead {
+            Some(ahead) => middle[axis] + Lanes(row_of(ahead[axis], row)),
+            None => middle[axis],
+        };
+        let [x, y, z] = [0, 1, 2].map(|axis| weights(at(axis), &ranges[axis]));
+        for i in ranges[0].clone() {
+            let layer = density * x[i];
+            for j in ranges[1].clone() {
+                let line = layer * y[j];
+                for k in ranges[2].clone() {
+                    let sum = &mut sums[(i * HATS + j) * HATS + k];
+                    *sum = *sum + line * z[k];
+                }
+            }
+        }
+    }
+    // In an order that mirrored fields share.
+    sums.map(|Lanes([a, b, c, d, e, f, g, h])| ((a + h) + (b + g)) + ((c + f) + (d + e)))
+}
+
+/// The mass in each corner's hat, from that of the active tiles around it.
+fn in_hats(tiles: &Tiles, masses: &[Masses]) -> Vec<f64> {
+    let holds: Vec<bool> =
+        masses.par_iter().with_min_len(64).map(|masses| masses.iter().any(|mass| *mass != 0.0)).collect();
+    let neighbours = tiles.neighbours();
+    let of_corner = |corner: usize| {
+        let mut sum = 0.0;
+        for hat in 0..HATS * HATS * HATS {
+            // Where the tile lies whose hat this is, reached over one that is beside both.
+            let off = [hat / (HATS * HATS), hat / HATS % HATS, hat % HATS].map(|hat| 1 - hat as i32);
+            let first = off.map(|x| x.max(-1));
+            let next = [0, 1, 2].map(|axis| off[axis] - first[axis]);
+            let Some(beside) = neighbours.get(neighbours[corner][neighbour_at(first)] as usize) else {
+                continue;
+            };
+            let slot = beside[neighbour_at(next)] as usize;
+            if holds.get(slot) == Some(&true) {
+                sum += f64::from(masses[slot][hat]);
+            }
+        }
+        sum
+    };
+    (0..tiles.count()).into_par_iter().with_min_len(16).map(of_corner).collect()
+}
+
+/// A power of the corners' factors, for the masses that their hats should hold and do.
+fn factors(tiles: &Tiles, mut wanted: Vec<f64>, held: &[f64], power: i32) -> Vec<f32> {
+    let around = |values: &[f64], corner: usize| -> f64 {
+        let near = tiles.neighbours()[corner].iter();
+        near.filter_map(|near| values.get(*near as usize)).sum()
+    };
+    for _ in 0..PASSES {
+        let rest: Vec<f64> =
+            wanted.iter().zip(held).map(|(wanted, held)| (wanted - MOST_GAIN * held).max(0.0)).collect();
+        if rest.iter().all(|rest| *rest == 0.0) {
+            break;
+        }
+        let each = |corner: usize| {
+            let room = if rest[corner] > 0.0 { around(held, corner) } else { 0.0 };
+            if room > 0.0 { rest[corner] / room } else { 0.0 }
+        };
+        let each: Vec<f64> = (0..wanted.len()).into_par_iter().with_min_len(64).map(each).collect();
+        let next = |corner: usize| wanted[corner] - rest[corner] + held[corner] * around(&each, corner);
+        wanted = (0..wanted.len()).into_par_iter().with_min_len(64).map(next).collect();
+    }
+    let factor = |(wanted, held): (&f64, &f64)| match *held > 0.0 {
+        true => (wanted / held).min(MOST_GAIN),
+        false => 1.0,
+    };
+    let factors: Vec<f64> = wanted.iter().zip(held).map(factor).collect();
+    let all: f64 = factors.iter().zip(held).map(|(factor, held)| factor * held).sum();
+    let rest = (wanted.iter().sum::<f64>() / all).min(MOST_GAIN);
+    let rest = if rest.is_finite() { rest } else { 1.0 };
+    let raised = |factor: &f64| match power {
+        1 => (factor * rest) as f32,
+        _ => factor.powi(power).clamp(1.0 / FIRST_GAIN, FIRST_GAIN) as f32,
+    };
+    factors.iter().map(raised).collect()
+}
+
+fn scale(tile: &mut Tile, corners: &[f32; 8]) {
+    dispatch!(scale_rows(tile: &mut Tile, corners: &[f32; 8]))
+}
+
+/// Multiplies a tile's values by the factors of its corners, linear between them.
+#[inline(always)]
+fn scale_rows(tile: &mut Tile, corners: &[f32; 8]) {
+    let share = |at: usize| (at as f32 + 0.5) / 8.0;
+    let mix = |a: f32, b: f32, share: f32| a * (1.0 - share) + b * share;
+    for row in 0..64 {
+        let (x, y) = (share(row >> 3), share(row & 7));
+        let line =
+            |z: usize| mix(mix(corners[z], corners[4 + z], x), mix(corners[2 + z], corners[6 + z], x), y);
+        let (low, high) = (line(0), line(1));
+        for (z, value) in tile[row * 8..][..8].iter_mut().enumerate() {
+            *value *= mix(low, high, share(z));
+        }
+    }
+}
