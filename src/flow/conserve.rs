@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::paths::{Extent, Paths};
 use super::stencil::row_of;
 use super::tiles::{Field, Tile, Tiles, neighbour_at};
+use super::window::{max, min};
 use crate::base::cpu::dispatch;
 use crate::base::lanes::Lanes;
 use crate::context::Context;
@@ -21,7 +22,7 @@ use crate::error::Result;
 pub struct Keeping {
     /// Share 0..=1 of the mass that stays.
     pub share: f32,
-    /// A density below this is cut off; its mass goes to what is beside it.
+    /// A density below this fades, and is gone at half of it; its mass goes to what is beside it.
     pub least: f32,
 }
 
@@ -29,12 +30,11 @@ pub struct Keeping {
 const MOST_GAIN: f64 = 1.2;
 /// How often a hat that would have to gain more hands the rest on to those beside it. What is left then goes to all of the density.
 const PASSES: usize = 6;
-/// Powers of the factors in the rounds in which density is multiplied by them. Factors that are linear between corners bring a hat
-/// a fifth of the way where the ones beside it need the contrary: a first round does more, so that what the scheme holds back of a
-/// front goes on with it, and the last one makes the sum of all hats right.
-const POWERS: [i32; 2] = [5, 1];
-/// Greatest factor of the first round, and the inverse of the least one.
-const FIRST_GAIN: f64 = 1.1;
+/// Rounds of factors. Those that are linear between corners bring a hat only part of the way where the ones beside it need the
+/// contrary; the last round makes the sum of all hats right.
+const ROUNDS: usize = 2;
+/// Factors of hats, and the one of all of the density, that differ from 1 by less are rounding: still air must stay so.
+const ROUNDING: [f64; 2] = [2.0e-6, 1.0e-7];
 /// Hats on an axis that a tile's mass may go to: those of the corners 8 cells before its first one, at it, 8 and 16 behind it.
 const HATS: usize = 4;
 /// Masses in the hats around a tile (cells).
@@ -57,19 +57,18 @@ pub fn carried(ctx: &Context, paths: &Paths<'_>, density: &Field) -> Result<Vec<
 
 /// Cuts off what is thin, lets a share of the density stay, and puts the mass that hats should hold back.
 pub fn restore(tiles: &Tiles, density: &mut Field, wanted: &[f64], keeping: Keeping) {
+    // Nothing jumps: what is nearly that thin fades.
     let cut = |value: &mut f32| {
-        *value *= keeping.share;
-        if *value < keeping.least {
-            *value = 0.0;
-        }
+        let kept = *value * keeping.share;
+        *value = min(kept, max(2.0 * kept - keeping.least, 0.0));
     };
     density.par_iter_mut().with_min_len(64).for_each(|tile| tile.iter_mut().for_each(cut));
     let wanted: Vec<f64> = wanted.iter().map(|mass| mass * f64::from(keeping.share)).collect();
-    for power in POWERS {
+    for _ in 0..ROUNDS {
         let held: Vec<Masses> =
             density.par_iter().with_min_len(16).map(|tile| masses(tile, None, &[[0.0; 2]; 3])).collect();
         let held = in_hats(tiles, &held);
-        multiply(tiles, density, &factors(tiles, wanted.clone(), &held, power));
+        multiply(tiles, density, &factors(tiles, wanted.clone(), &held));
     }
 }
 
@@ -168,8 +167,8 @@ fn in_hats(tiles: &Tiles, masses: &[Masses]) -> Vec<f64> {
     (0..tiles.count()).into_par_iter().with_min_len(16).map(of_corner).collect()
 }
 
-/// A power of the corners' factors, for the masses that their hats should hold and do.
-fn factors(tiles: &Tiles, mut wanted: Vec<f64>, held: &[f64], power: i32) -> Vec<f32> {
+/// The corners' factors, for the masses that their hats should hold and do.
+fn factors(tiles: &Tiles, mut wanted: Vec<f64>, held: &[f64]) -> Vec<f32> {
     let around = |values: &[f64], corner: usize| -> f64 {
         let near = tiles.neighbours()[corner].iter();
         near.filter_map(|near| values.get(*near as usize)).sum()
@@ -189,18 +188,19 @@ fn factors(tiles: &Tiles, mut wanted: Vec<f64>, held: &[f64], power: i32) -> Vec
         wanted = (0..wanted.len()).into_par_iter().with_min_len(64).map(next).collect();
     }
     let factor = |(wanted, held): (&f64, &f64)| match *held > 0.0 {
-        true => (wanted / held).min(MOST_GAIN),
+        true => exact(wanted / held, ROUNDING[0]).min(MOST_GAIN),
         false => 1.0,
     };
     let factors: Vec<f64> = wanted.iter().zip(held).map(factor).collect();
     let all: f64 = factors.iter().zip(held).map(|(factor, held)| factor * held).sum();
-    let rest = (wanted.iter().sum::<f64>() / all).min(MOST_GAIN);
+    let rest = exact(wanted.iter().sum::<f64>() / all, ROUNDING[1]).min(MOST_GAIN);
     let rest = if rest.is_finite() { rest } else { 1.0 };
-    let raised = |factor: &f64| match power {
-        1 => (factor * rest) as f32,
-        _ => factor.powi(power).clamp(1.0 / FIRST_GAIN, FIRST_GAIN) as f32,
-    };
-    factors.iter().map(raised).collect()
+    factors.iter().map(|factor| (factor * rest) as f32).collect()
+}
+
+/// A factor, 1 where it differs from that by rounding only.
+fn exact(factor: f64, rounding: f64) -> f64 {
+    if (factor - 1.0).abs() > rounding { factor } else { 1.0 }
 }
 
 fn scale(tile: &mut Tile, corners: &[f32; 8]) {

@@ -184,14 +184,14 @@ impl Flow {
         self.carry(ctx, dt, scheme, None)
     }
 
-    /// The same with [`Scheme::MacCormack`], by which a density that is not negative keeps the share of its mass that is asked for,
+    /// The same with [`Scheme::Bounded`], by which a density that is not negative keeps the share of its mass that is asked for,
     /// to rounding: what the scheme loses or gains is put back within two tiles of where it did. Only of density that grows by
     /// more than a tenth there some is lost: of the last mist that is thinner than the least one.
     ///
     /// # Errors
     /// Cancel; the fields are then of no use.
     pub fn advect_keeping(&mut self, ctx: &Context, dt: f64, keeping: Keeping) -> Result<()> {
-        self.carry(ctx, dt, Scheme::MacCormack, Some(keeping))
+        self.carry(ctx, dt, Scheme::Bounded, Some(keeping))
     }
 
     fn carry(&mut self, ctx: &Context, dt: f64, scheme: Scheme, keeping: Option<Keeping>) -> Result<()> {

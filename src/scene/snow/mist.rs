@@ -140,15 +140,18 @@ impl<'a> Mist<'a> {
         if !raises && state.mist.flow().tiles().active() == 0 {
             return Ok(StepReport::default());
         }
-        // What objects remove in this frame still bounds the air: see `Surroundings`.
+        // What objects remove in this frame bounds the air until they are there: see `Surroundings`.
         self.go_to(ctx, state, base, frame - 1)?;
         let State { mist, statics, layer, .. } = state;
         let moving = self.scene.objects.iter().filter(|object| object.role.moves());
         let pushing = self.inputs.bodies.iter().zip(moving).filter(|(_, object)| object.role.pushes());
-        let bodies: Vec<&Body> = pushing.map(|(body, _)| body).chain(statics.iter()).collect();
+        let (moving, removing): (Vec<&Body>, Vec<bool>) =
+            pushing.map(|(body, object)| (body, object.role.removes())).unzip();
+        let bodies: Vec<&Body> = moving.into_iter().chain(statics.iter()).collect();
         let around = Surroundings {
             base: layer.as_ref().map(|(_, layer)| &layer.surface),
             bodies: &bodies,
+            removing: &removing,
             floor: self.inputs.floor(),
         };
         let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;

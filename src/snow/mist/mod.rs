@@ -41,6 +41,9 @@ pub use wind::Wind;
 const JETS: f64 = 1.0e-4;
 /// Density under which there is no mist.
 pub const LEAST: f32 = 2.0e-3;
+/// Density from which on a tile gets air around it, so that its mist may spread there. What is thinner cannot be seen, and goes on
+/// in the tiles that are there: a few fast grains would else open hundreds of tiles for a litre of mist.
+const DENSE: f32 = 0.02;
 /// Longest sub-step (s): how long they are decides how far mist spreads, and how often grains fill the cells that they cross, so
 /// that a frame of usual films is divided whatever its rate.
 const LONGEST: f64 = 1.0 / 96.0;
@@ -297,17 +300,21 @@ impl Mist {
         (sums.iter().sum::<f64>() + 0.0) * self.params.cell.powi(3)
     }
 
-    /// The tiles that hold mist or will get some, with padding.
+    /// The tiles that hold mist or will get some, and around those with a density that can be seen the padding.
     fn wanted(&self, seeds: &[Seed]) -> Vec<Coord> {
-        let holds = |tile: &crate::flow::Tile| tile.iter().any(|density| *density > LEAST);
+        let most = |tile: &crate::flow::Tile| tile.iter().fold(0.0f32, |most, density| most.max(*density));
         let held = self.flow.tiles().coords().iter().zip(self.flow.density());
-        let mut wanted: Vec<Coord> = held
-            .filter(|(_, tile)| holds(tile))
-            .map(|(coord, _)| *coord)
-            .chain(seeds.iter().map(|seed| seed.coord))
-            .collect();
+        let held = held.map(|(coord, tile)| (*coord, most(tile)));
+        let new = seeds.iter().map(|seed| (seed.coord, most(&*seed.density)));
+        let all: Vec<(Coord, f32)> = held.chain(new).filter(|(_, most)| *most > LEAST).collect();
+        let mut dense: Vec<Coord> =
+            all.iter().filter(|(_, most)| *most > DENSE).map(|(coord, _)| *coord).collect();
+        dense.sort_unstable();
+        dense.dedup();
+        let mut wanted = tiles::bordered(&dense, self.params.padding as usize);
+        wanted.extend(all.iter().map(|(coord, _)| *coord));
         wanted.sort_unstable();
         wanted.dedup();
-        tiles::bordered(&wanted, self.params.padding as usize)
+        wanted
     }
 }

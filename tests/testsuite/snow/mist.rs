@@ -3,6 +3,7 @@
 use frazil::base::DVec3;
 use frazil::flow::{Faces, Solids, Tiles};
 use frazil::motion::{Key, Keys, Rigid};
+use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::mist::{Around, Boundary, Grids, Mist, Params, Source, Start, Surroundings, Wind};
 use frazil::sweep::Body;
 use frazil::{Context, Error, Pool};
@@ -71,7 +72,7 @@ fn each_face(tiles: &Tiles, solids: &Solids, mut each: impl FnMut(DVec3, usize, 
 #[test]
 fn a_floor_closes_what_lies_below_it_and_cuts_the_faces_that_it_crosses() {
     let floor = 0.013;
-    let (tiles, solids) = faces(&Surroundings { base: None, bodies: &[], floor: Some(floor) });
+    let (tiles, solids) = faces(&Surroundings { base: None, bodies: &[], removing: &[], floor: Some(floor) });
     each_face(&tiles, &solids, |place, axis, open, speed| {
         let wanted = match axis {
             1 => f64::from(u8::from(place.y >= floor)),
@@ -86,7 +87,7 @@ fn a_floor_closes_what_lies_below_it_and_cuts_the_faces_that_it_crosses() {
 fn faces_of_a_ball_that_moves_cover_it_and_move_as_it_does() {
     let speed = 1.5;
     let ball = moving(sphere(0.1, 24), [0.011, 0.004, -0.007], speed);
-    let (tiles, solids) = faces(&Surroundings { base: None, bodies: &[&ball], floor: None });
+    let (tiles, solids) = faces(&Surroundings { base: None, bodies: &[&ball], removing: &[], floor: None });
     let centre = DVec3::new(0.011 + speed * FRAME, 0.004, -0.007);
     let mut covered = [0.0; 3];
     each_face(&tiles, &solids, |place, axis, open, own| {
@@ -107,13 +108,50 @@ fn faces_of_a_ball_that_moves_cover_it_and_move_as_it_does() {
 }
 
 #[test]
+fn snow_opens_where_an_object_has_moved_through_it_within_the_step() {
+    let ctx = context(2);
+    let area = [-0.6, -0.4, 0.6, 0.4];
+    let snow = layer(&ctx, &Ground::Plane { height: 0.0, area }, &[], &Cover::Depth(0.2), 0.01, 3.0).unwrap();
+    // From -0.35 to -0.25 m on x at first; it moves by 0.1 m.
+    let plate = moving(cuboid([0.1, 0.6, 0.3]), [-0.3, 0.2, 0.0], 0.1 / FRAME);
+    let coords: Vec<[i32; 3]> =
+        (-4..1).flat_map(|x| (-1..2).flat_map(move |y| (-1..1).map(move |z| [x, y, z]))).collect();
+    let tiles = Tiles::new(&coords);
+    let open = |removing: &[bool], share: f64, at: f64| {
+        let surroundings = Surroundings { base: Some(&snow), bodies: &[&plate], removing, floor: Some(0.0) };
+        let walls = surroundings.during([0.0, FRAME], CELL).unwrap();
+        // In the order of a run: what has opened stays so.
+        walls.faces(&ctx, &tiles, CELL as f32, 0.5 * share).unwrap();
+        let solids = walls.faces(&ctx, &tiles, CELL as f32, share).unwrap();
+        let mut sum = (0.0, 0);
+        each_face(&tiles, &solids, |place, axis, open, _| {
+            let is_there = (place.x - at).abs() < 0.6 * CELL && place.z.abs() < 0.1;
+            if axis == 1 && is_there && (0.05..0.15).contains(&place.y) {
+                sum = (sum.0 + open, sum.1 + 1);
+            }
+        });
+        assert!(sum.1 > 0);
+        sum.0 / sum.1 as f32
+    };
+    // Behind it, where it was at the beginning, inside it, and in the snow before it.
+    for (share, at, wanted) in [(1.0, -0.29, 1.0), (1.0, -0.33, 1.0), (1.0, -0.21, 0.0), (1.0, -0.09, 0.0)] {
+        assert_eq!(open(&[true], share, at), wanted, "{share} {at}");
+    }
+    for (share, at, wanted) in [(0.5, -0.33, 1.0), (0.5, -0.27, 0.0), (0.5, -0.15, 0.0)] {
+        assert_eq!(open(&[true], share, at), wanted, "{share} {at}");
+    }
+    // One that takes no snow away leaves it closed.
+    assert_eq!(open(&[false], 1.0, -0.29), 0.0);
+}
+
+#[test]
 fn an_open_mesh_closes_the_faces_that_it_crosses() {
     let mut sheet = cuboid([0.2, 0.1, 0.2]);
     // Only its upper side is left: a square.
     sheet.triangles.retain(|triangle| triangle.iter().all(|at| sheet.positions[*at as usize].y > 0.04));
     assert_eq!(sheet.triangles.len(), 2);
     let sheet = moving(sheet, [0.0, -0.04, 0.0], 0.0);
-    let (tiles, solids) = faces(&Surroundings { base: None, bodies: &[&sheet], floor: None });
+    let (tiles, solids) = faces(&Surroundings { base: None, bodies: &[&sheet], removing: &[], floor: None });
     let mut closed = 0;
     each_face(&tiles, &solids, |place, axis, open, _| {
         let is_inside = place.x.abs() < 0.09 && place.z.abs() < 0.09;
@@ -136,7 +174,7 @@ fn busy(threads: usize, frames: std::ops::Range<i32>, state: Option<&[u8]>) -> M
     };
     let ball = moving(sphere(0.08, 12), [-0.1, 0.05, 0.0], 1.0);
     for frame in frames {
-        let surroundings = Surroundings { base: None, bodies: &[&ball], floor: Some(0.0) };
+        let surroundings = Surroundings { base: None, bodies: &[&ball], removing: &[], floor: Some(0.0) };
         let walls = surroundings.during(times(frame), CELL).unwrap();
         let boundary = |tiles: &Tiles, cell: f32, share: f64| walls.faces(&ctx, tiles, cell, share);
         let sources: Vec<Source> = (0..40)
