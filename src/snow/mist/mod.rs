@@ -44,8 +44,8 @@ pub const LEAST: f32 = 2.0e-3;
 /// Density from which on a tile gets air around it, so that its mist may spread there. What is thinner cannot be seen, and goes on
 /// in the tiles that are there: a few fast grains would else open hundreds of tiles for a litre of mist.
 const DENSE: f32 = 0.02;
-/// Longest sub-step (s): how long they are decides how far mist spreads, and how often grains fill the cells that they cross, so
-/// that a frame of usual films is divided whatever its rate.
+/// Longest sub-step (s). Its length decides how far mist spreads, and how often grains fill the cells that they cross: frames of 1/24,
+/// 1/48 and 1/96 s have the same sub-steps.
 const LONGEST: f64 = 1.0 / 96.0;
 /// Most sub-steps of a step, and most parts of a sub-step.
 const MOST: usize = 1000;
@@ -237,7 +237,7 @@ impl Mist {
         let speeds = around.sources.iter().map(Source::fastest);
         let fastest = speeds.fold(self.bulk(), |most, speed| most.max(speed));
         let speed = f64::from(fastest).max(around.fastest) + self.params.gravity.abs() * dt;
-        // Whole parts of the longest ones: at usual rates the same ones whatever the rate.
+        // Whole parts of the longest ones, so that frames of other lengths have the same sub-steps.
         let least = ((dt / LONGEST * (1.0 - 1.0e-9)).ceil() as usize).clamp(1, MOST);
         Ok(self.parts(speed, dt)?.div_ceil(least) * least)
     }
