@@ -115,30 +115,36 @@ fn masses_of_rows(tile: &Tile, ahead: Option<&[&Tile; 3]>, extent: &Extent) -> M
         }
         weights
     };
-    let mut sums = [zero; HATS * HATS * HATS];
-    for row in 0..64 {
+    let of_row = |row: usize| {
         let density = Lanes(row_of(tile, row));
-        if density.0.iter().all(|value| *value == 0.0) {
-            continue;
-        }
         let middle = [Lanes::all((row >> 3) as f32 + 0.5), Lanes::all((row & 7) as f32 + 0.5), CENTRES];
         let at = |axis: usize| match ahead {
             Some(ahead) => middle[axis] + Lanes(row_of(ahead[axis], row)),
             None => middle[axis],
         };
         let [x, y, z] = [0, 1, 2].map(|axis| weights(at(axis), &ranges[axis]));
+        (x.map(|x| density * x), y, z)
+    };
+    let mut sums = [zero; HATS * HATS * HATS];
+    for four in 0..16 {
+        // A row and its mirror images: in an order that mirrored fields share.
+        let (x, y) = (four >> 2, four & 3);
+        let rows = [[x, y], [7 - x, 7 - y], [x, 7 - y], [7 - x, y]].map(|[x, y]| x << 3 | y);
+        if rows.iter().all(|row| row_of(tile, *row).iter().all(|value| *value == 0.0)) {
+            continue;
+        }
+        let rows = rows.map(of_row);
         for i in ranges[0].clone() {
-            let layer = density * x[i];
             for j in ranges[1].clone() {
-                let line = layer * y[j];
+                let lines = rows.each_ref().map(|(x, y, _)| x[i] * y[j]);
                 for k in ranges[2].clone() {
+                    let [a, b, c, d] = [0, 1, 2, 3].map(|row| lines[row] * rows[row].2[k]);
                     let sum = &mut sums[(i * HATS + j) * HATS + k];
-                    *sum = *sum + line * z[k];
+                    *sum = *sum + ((a + b) + (c + d));
                 }
             }
         }
     }
-    // In an order that mirrored fields share.
     sums.map(|Lanes([a, b, c, d, e, f, g, h])| ((a + h) + (b + g)) + ((c + f) + (d + e)))
 }
 
