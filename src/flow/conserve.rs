@@ -22,7 +22,7 @@ use crate::error::Result;
 pub struct Keeping {
     /// Share 0..=1 of the mass that stays.
     pub share: f32,
-    /// A density below this fades, and is gone at half of it; its mass goes to what is beside it.
+    /// A density below this fades within some steps; its mass goes to what is beside it.
     pub least: f32,
 }
 
@@ -30,6 +30,9 @@ pub struct Keeping {
 const MOST_GAIN: f64 = 1.2;
 /// How often a hat that would have to gain more hands the rest on to those beside it. What is left then goes to all of the density.
 const PASSES: usize = 6;
+/// By which share of what a thin density lacks it fades in a step. Slowly: where it ended at once, flows that differ by rounding
+/// soon differed by as much as is thin.
+const FADING: f32 = 0.125;
 /// Rounds of factors. Those that are linear between corners bring a hat only part of the way where the ones beside it need the
 /// contrary; the last round makes the sum of all hats right.
 const ROUNDS: usize = 2;
@@ -57,12 +60,11 @@ pub fn carried(ctx: &Context, paths: &Paths<'_>, density: &Field) -> Result<Vec<
 
 /// Cuts off what is thin, lets a share of the density stay, and puts the mass that hats should hold back.
 pub fn restore(tiles: &Tiles, density: &mut Field, wanted: &[f64], keeping: Keeping) {
-    // Nothing jumps: what is nearly that thin fades.
-    let cut = |value: &mut f32| {
+    let thin_out = |value: &mut f32| {
         let kept = *value * keeping.share;
-        *value = min(kept, max(2.0 * kept - keeping.least, 0.0));
+        *value = min(kept, max(kept - FADING * (keeping.least - kept), 0.0));
     };
-    density.par_iter_mut().with_min_len(64).for_each(|tile| tile.iter_mut().for_each(cut));
+    density.par_iter_mut().with_min_len(64).for_each(|tile| tile.iter_mut().for_each(thin_out));
     let wanted: Vec<f64> = wanted.iter().map(|mass| mass * f64::from(keeping.share)).collect();
     for _ in 0..ROUNDS {
         let held: Vec<Masses> =
