@@ -76,6 +76,8 @@ mod mist_cancel;
 mod mist_eddies;
 #[path = "gates/mist_passes.rs"]
 mod mist_passes;
+#[path = "gates/mist_rates.rs"]
+mod mist_rates;
 #[path = "gates/mist_walls.rs"]
 mod mist_walls;
 #[path = "gates/oracle.rs"]
@@ -253,6 +255,7 @@ fn main() {
     grains::run(&mut h);
     plates::run(&mut h);
     mist::run(&mut h);
+    mist_rates::run(&mut h);
     mist_eddies::run(&mut h);
     mist_walls::run(&mut h);
     mist_passes::run(&mut h);

@@ -3986,6 +3986,10 @@ frz_status frz_mist_set_params(frz_mist *mist,
 /**
  * Moves mist through a step, with what fast grains raise on their way in it.
  *
+ * A grain is taken to have moved at its velocity after the step for all of dt, also where it was hit or born in it: the command,
+ * which knows where grains were before, raises less mist where grains begin to fly, and the same at every frame rate. Here that
+ * difference shrinks with dt.
+ *
  * Call it once after each frz_grains_step, with the same base layer, bodies and dt, but not at the first frame of a shot, with a
  * dt of 0: nothing moved before it. After a failure or a cancel the mist is as it was before.
  *
@@ -4019,7 +4023,7 @@ frz_status frz_mist_step(frz_context *context,
  * layer are its own, or that has their files only. The mist is the same, bit for bit.
  *
  * positions: double[3] for each point at the step's end (m), finite, within 1e7 cells of the origin along each axis.
- * velocities: float[3] for each point (m/s), finite.
+ * velocities: float[3] for each point (m/s), finite; taken to be those of all of dt.
  * radius: of the points (m), above 0 and at most 64 cells.
  * snow: a level set around which the air flows, with voxels fixed in the world, as it was before the layer's step, in which bodies
  *     move into it. NULL: there is none.

@@ -244,7 +244,8 @@ pub const GATES: &[Gate] = &[
     gate("snow.mist.mass_drift", "%", Most(5.0), Most(1.0)),
     gate("snow.mist.padding", "%", Most(1.0), Most(0.2)),
     gate("snow.mist.dashes", "1", Most(0.0), Open),
-    // Eddies that change, and do not only move.
+    // The same at 24, 48 and 96 frames a second: mass, density and momentum; and eddies that change, not only move.
+    gate("snow.mist.frame_rate", "%", Most(3.0), Open),
     yes("snow.mist.turbulence_decorrelates"),
     // Solids that move through mist, and a pocket that they close.
     gate("snow.mist.flux", "1", Most(1.0e-3), Open),

@@ -321,7 +321,7 @@ fn dashes(h: &mut Harness) {
     let start = DVec3::new(0.013, 0.007, 0.004);
     let at = |time: f64| start + DVec3::from(velocity.map(f64::from)) * time;
     for frame in 1..=6 {
-        let source = Source { place: at(f64::from(frame) * FRAME), velocity, radius: 0.0025 };
+        let source = Source { place: at(f64::from(frame) * FRAME), velocity, radius: 0.0025, start: None };
         step(&mut mist, &ctx, &[source], &open, frame);
     }
     let density = |place: DVec3| {

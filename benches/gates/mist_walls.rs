@@ -43,7 +43,7 @@ fn flux(h: &mut Harness) {
     let body = hollow();
     for frame in 0..FRAMES {
         let times = [frame, frame + 1].map(|frame| f64::from(frame) * FRAME);
-        let around = Surroundings { base: None, bodies: &[&body], floor: None };
+        let around = Surroundings { base: None, bodies: &[&body], removing: &[], floor: None };
         let walls = around.during(times, CELL).expect("poses");
         let boundary = |tiles: &Tiles, cell: f32, share: f64| walls.faces(&ctx, tiles, cell, share);
         let around = Around { sources: &[], boundary: &boundary, fastest: SPEED, wind: None };

@@ -116,7 +116,9 @@ impl Air {
         self.shapes = shapes;
         let bodies = bodies?;
         let bodies: Vec<&Body> = bodies.iter().map(|(body, _)| body).collect();
-        let surroundings = Surroundings { base: snow, bodies: &bodies, floor: self.floor };
+        let removing = vec![true; bodies.len()];
+        let surroundings =
+            Surroundings { base: snow, bodies: &bodies, removing: &removing, floor: self.floor };
         let walls = surroundings.during([0.0, dt], self.mist.params().cell)?;
         let boundary = |tiles: &Tiles, cell: f32, share: f64| walls.faces(ctx, tiles, cell, share);
         let sample = |ctx: &Context, places: &[DVec3]| match wind {
@@ -210,6 +212,10 @@ pub unsafe extern "C" fn frz_mist_set_params(
 
 /// Moves mist through a step, with what fast grains raise on their way in it.
 ///
+/// A grain is taken to have moved at its velocity after the step for all of dt, also where it was hit or born in it: the command,
+/// which knows where grains were before, raises less mist where grains begin to fly, and the same at every frame rate. Here that
+/// difference shrinks with dt.
+///
 /// Call it once after each frz_grains_step, with the same base layer, bodies and dt, but not at the first frame of a shot, with a
 /// dt of 0: nothing moved before it. After a failure or a cancel the mist is as it was before.
 ///
@@ -250,7 +256,7 @@ pub unsafe extern "C" fn frz_mist_step(
                 Some(heap) => {
                     let radius = heap.grains.params().radius;
                     let grains = heap.grains.places().zip(heap.grains.velocities());
-                    grains.map(|(place, velocity)| Source { place, velocity, radius }).collect()
+                    grains.map(|(place, velocity)| Source { place, velocity, radius, start: None }).collect()
                 }
                 None => Vec::new(),
             };
@@ -264,7 +270,7 @@ pub unsafe extern "C" fn frz_mist_step(
 /// layer are its own, or that has their files only. The mist is the same, bit for bit.
 ///
 /// positions: double[3] for each point at the step's end (m), finite, within 1e7 cells of the origin along each axis.
-/// velocities: float[3] for each point (m/s), finite.
+/// velocities: float[3] for each point (m/s), finite; taken to be those of all of dt.
 /// radius: of the points (m), above 0 and at most 64 cells.
 /// snow: a level set around which the air flows, with voxels fixed in the world, as it was before the layer's step, in which bodies
 ///     move into it. NULL: there is none.
@@ -312,7 +318,12 @@ pub unsafe extern "C" fn frz_mist_step_points(
             within("radius", radius, f64::MIN_POSITIVE..=f64::MAX, " m")?;
             let points = places.iter().zip(&*velocities);
             let sources: Vec<Source> = points
-                .map(|(place, velocity)| Source { place: (*place).into(), velocity: *velocity, radius })
+                .map(|(place, velocity)| Source {
+                    place: (*place).into(),
+                    velocity: *velocity,
+                    radius,
+                    start: None,
+                })
                 .collect();
             air.step(ctx, &sources, &Scene { snow, wind, bodies: (bodies, count), time, dt })
         })

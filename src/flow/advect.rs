@@ -1,15 +1,17 @@
-//! Advection: values are carried along the flow (semi-Lagrangian: Stam 1999), and MacCormack's correction of the blur that
+//! Advection: values are carried along the flow (semi-Lagrangian: Stam 1999). Velocities get MacCormack's correction of the blur that
 //! this leaves (Selle, Fedkiw, Kim, Liu and Rossignac 2008), within the range of the values around the place that a value came
-//! from ([`Limit`]).
+//! from. The density, which has sharp edges, is interpolated by cubic functions instead, within the same range: MacCormack's waves
+//! run behind an edge, and as the range cuts them off there, it holds edges back (by about a cell).
 //!
 //! The path of each cell's centre is traced once (midpoint rule), backward and, for the correction, forward; a face takes the
-//! mean of its two cells' paths. All four fields follow these, one after the other, in two passes each: the first guess with
+//! mean of its two cells' paths. All four fields follow these, one after the other: velocities in two passes each, the first guess with
 //! its bounds, then the correction.
 
 use rayon::prelude::*;
 
 use super::Flow;
 use super::around::Reader;
+use super::conserve::{self, Keeping};
 use super::paths::{At, Live, Paths, Ways, trace};
 use super::room::Room;
 use super::stencil::row_of;
@@ -25,10 +27,10 @@ use crate::error::{Error, Result};
 pub enum Scheme {
     /// First order: stable, blurs.
     SemiLagrangian,
-    /// Second order; no new extremes.
+    /// Velocities by MacCormack's scheme, of second order, and density by cubic interpolation; no new extremes.
     #[default]
-    MacCormack,
-    /// Second order where the flow is smooth, without bounds: for measurements of the order.
+    Bounded,
+    /// The same without bounds: for measurements of the order.
     Unbounded,
 }
 
@@ -41,6 +43,8 @@ pub struct Way<'a> {
     pub scheme: Scheme,
     /// The air around, as it is after the step.
     pub around: Option<&'a Flow>,
+    /// How the density keeps its mass; none: it does so as far as the scheme does.
+    pub keeping: Option<Keeping>,
 }
 
 /// Carries velocity (m/s, at lower faces) and density along for a step. The rim keeps what it holds, but for the upper faces of
@@ -64,33 +68,37 @@ pub fn advect(
         let around = way.around.map(|around| around.faces(axis));
         let field = (&mut velocity[axis], outside);
         let room = [&mut *hat, &mut *below, &mut *above];
-        carry(ctx, &paths, At::Faces(axis), field, around.as_ref(), room, scheme)?;
+        carry_faces(ctx, &paths, axis, field, around.as_ref(), room, scheme)?;
     }
-    let room = [hat, below, above].map(|field| &mut field[..tiles.active()]);
-    carry(ctx, &paths, At::Centres, (density, 0.0), None, room, scheme)
+    let wanted = way.keeping.map(|_| conserve::carried(ctx, &paths, density)).transpose()?;
+    carry_density(ctx, &paths, density, &mut hat[..tiles.active()], scheme)?;
+    if let (Some(keeping), Some(wanted)) = (way.keeping, wanted) {
+        conserve::restore(tiles, density, &wanted, keeping);
+    }
+    Ok(())
 }
 
-/// Carries a field along the paths. `hat` is room for the first guess, `below` and `above` for its distances from the least and
-/// the greatest value around the place that it came from.
+/// Carries a velocity on an axis along the paths. `hat` is room for the first guess, `below` and `above` for its distances from the
+/// least and the greatest value around the place that it came from.
 ///
 /// # Errors
 /// Cancel.
-fn carry(
+fn carry_faces(
     ctx: &Context,
     paths: &Paths<'_>,
-    at: At,
+    axis: usize,
     (field, outside): (&mut Field, f32),
     around: Option<&Reader<'_>>,
     [hat, below, above]: [&mut [Tile]; 3],
     scheme: Scheme,
 ) -> Result<()> {
-    let is_moved = moved(paths, at, field, scheme);
-    let is_bounded = scheme == Scheme::MacCormack;
+    let at = At::Faces(axis);
+    let is_bounded = scheme == Scheme::Bounded;
     let bounds = below.par_iter_mut().zip(above.par_iter_mut());
     let tiles = hat.par_iter_mut().zip(bounds).enumerate().with_min_len(16);
     tiles.try_for_each_init(Window::default, |window, (slot, (hat, (below, above)))| {
         ctx.check()?;
-        let live = paths.live(slot, at).filter(|_| is_moved[slot]);
+        let live = paths.live(slot, at);
         if live.as_ref().is_none_or(|live| !live.is_whole()) {
             // Of what lies around, the guess is what it has become there.
             *hat = match around {
@@ -115,23 +123,62 @@ fn carry(
     let tiles = field.par_iter_mut().enumerate().with_min_len(16);
     tiles.try_for_each_init(Window::default, |window, (slot, values)| {
         ctx.check()?;
-        let Some(live) = paths.live(slot, at).filter(|_| is_moved[slot]) else { return Ok(()) };
+        let Some(live) = paths.live(slot, at) else { return Ok(()) };
         window.fill(hat, &paths.tiles.neighbours()[slot], &paths.ahead_span(slot, at), outside);
-        let bounds = is_bounded.then(|| ([&below[slot], &above[slot]], Limit::of(at)));
+        let bounds = is_bounded.then(|| [&below[slot], &above[slot]]);
         correct_tile(&live, &paths.ways(slot, at, &paths.ahead), window, &hat[slot], bounds, values);
         Ok(())
     })
 }
 
-/// Whether paths bring something to each tile of a field: into tiles among others without density they bring none.
-fn moved(paths: &Paths<'_>, at: At, field: &Field, scheme: Scheme) -> Vec<bool> {
-    if at != At::Centres || scheme == Scheme::Unbounded {
-        return vec![true; field.len()];
-    }
+/// Carries the density along the paths, by way of `to`.
+///
+/// # Errors
+/// Cancel.
+fn carry_density(
+    ctx: &Context,
+    paths: &Paths<'_>,
+    density: &mut Field,
+    to: &mut [Tile],
+    scheme: Scheme,
+) -> Result<()> {
     let holds = |tile: &Tile| tile.iter().any(|value| *value != 0.0);
-    let holds: Vec<bool> = field.par_iter().with_min_len(64).map(holds).collect();
-    let any = |near: &[u32; 27]| near.iter().any(|near| holds.get(*near as usize) == Some(&true));
-    paths.tiles.neighbours()[..field.len()].iter().map(any).collect()
+    let holds: Vec<bool> = density.par_iter().with_min_len(64).map(holds).collect();
+    let tiles = to.par_iter_mut().enumerate().with_min_len(16);
+    tiles.try_for_each_init(Window::default, |window, (slot, to)| {
+        ctx.check()?;
+        let near = &paths.tiles.neighbours()[slot];
+        // Into a tile among others without density paths bring none.
+        if !near.iter().any(|near| holds.get(*near as usize) == Some(&true)) {
+            to.fill(0.0);
+            return Ok(());
+        }
+        window.fill(density, near, &paths.back_span(slot, At::Centres).for_cubic(), 0.0);
+        density_tile(&paths.ways(slot, At::Centres, &paths.back), window, scheme, to);
+        Ok::<_, Error>(())
+    })?;
+    density.copy_from_slice(to);
+    Ok(())
+}
+
+fn density_tile(ways: &Ways<'_>, window: &Window, scheme: Scheme, to: &mut Tile) {
+    dispatch!(density_rows(ways: &Ways<'_>, window: &Window, scheme: Scheme, to: &mut Tile))
+}
+
+#[inline(always)]
+fn density_rows(ways: &Ways<'_>, window: &Window, scheme: Scheme, to: &mut Tile) {
+    for row in 0..64 {
+        let ways = ways.row(row);
+        let values = match scheme {
+            Scheme::SemiLagrangian => window.sample(row, &ways),
+            Scheme::Unbounded => window.sample_cubic(row, &ways)[0],
+            Scheme::Bounded => {
+                let [values, least, most] = window.sample_cubic(row, &ways);
+                values.max(least).min(most)
+            }
+        };
+        to[row * 8..][..8].copy_from_slice(&values.0);
+    }
 }
 
 fn guess_tile(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: Option<[&mut Tile; 2]>) {
@@ -167,7 +214,7 @@ fn correct_tile(
     ways: &Ways<'_>,
     window: &Window,
     hat: &Tile,
-    bounds: Option<([&Tile; 2], Limit)>,
+    bounds: Option<[&Tile; 2]>,
     values: &mut Tile,
 ) {
     dispatch!(correct_rows(
@@ -175,7 +222,7 @@ fn correct_tile(
         ways: &Ways<'_>,
         window: &Window,
         hat: &Tile,
-        bounds: Option<([&Tile; 2], Limit)>,
+        bounds: Option<[&Tile; 2]>,
         values: &mut Tile
     ))
 }
@@ -187,7 +234,7 @@ fn correct_rows(
     ways: &Ways<'_>,
     window: &Window,
     hat: &Tile,
-    bounds: Option<([&Tile; 2], Limit)>,
+    bounds: Option<[&Tile; 2]>,
     values: &mut Tile,
 ) {
     let rows = |tile: &Tile, row: usize| Lanes(row_of(tile, row));
@@ -195,40 +242,20 @@ fn correct_rows(
         let there = window.sample(row, &ways.row(row));
         let guess = rows(hat, row);
         let mut change = Lanes::all(0.5) * (rows(values, row) - there);
-        if let Some(([below, above], limit)) = bounds {
-            change = limited(change, rows(below, row), rows(above, row), limit);
+        if let Some([below, above]) = bounds {
+            change = limited(change, rows(below, row), rows(above, row));
         }
         values[row * 8..][..live.lanes()].copy_from_slice(&(guess + change).0[..live.lanes()]);
     }
 }
 
-/// What becomes of a correction that leaves the range of the values around the place that a value came from. Nothing jumps:
-/// where a correction was dropped at the bound, the least difference between two flows grew fourfold in ten steps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Limit {
-    /// It ends at the bound.
-    Cut,
-    /// What lies behind the bound is taken off: from twice the distance on, nothing is left. Thin mist gains no mass so.
-    Fold,
-}
-
-impl Limit {
-    fn of(at: At) -> Self {
-        if at == At::Centres { Self::Fold } else { Self::Cut }
-    }
-}
-
-/// A correction within its bounds.
+/// A correction within its bounds: one that leaves the range of the values around the place that a value came from ends there.
+/// Nothing jumps: where it was dropped at the bound, the least difference between two flows grew fourfold in ten steps.
 #[inline(always)]
-fn limited(change: Lanes, below: Lanes, above: Lanes, limit: Limit) -> Lanes {
+fn limited(change: Lanes, below: Lanes, above: Lanes) -> Lanes {
     let zero = Lanes::all(0.0);
-    let is_negative = change.is_less(zero);
-    let most = is_negative.choose(below, above);
-    let size = change.max(zero - change);
-    let bound = if limit == Limit::Fold { (Lanes::all(2.0) * most - size).max(zero) } else { most };
     // Rounding may leave a distance a little under 0.
-    let kept = size.min(bound).max(zero);
-    is_negative.choose(zero - kept, kept)
+    change.max(zero - below.max(zero)).min(above.max(zero))
 }
 
 #[cfg(test)]
@@ -236,12 +263,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn corrections_stay_in_their_bounds_and_do_not_jump() {
-        let within =
-            |change, limit| limited(Lanes::all(change), Lanes::all(1.0), Lanes::all(2.0), limit).0[0];
-        let cut = |change| within(change, Limit::Cut);
-        let fold = |change| within(change, Limit::Fold);
-        assert_eq!([-3.0, -1.5, -0.5, 1.5, 2.5, 5.0].map(cut), [-1.0, -1.0, -0.5, 1.5, 2.0, 2.0]);
-        assert_eq!([-3.0, -1.5, -0.5, 1.5, 2.5, 5.0].map(fold), [0.0, -0.5, -0.5, 1.5, 1.5, 0.0]);
+    fn corrections_stay_in_their_bounds() {
+        let within = |change| limited(Lanes::all(change), Lanes::all(1.0), Lanes::all(2.0)).0[0];
+        assert_eq!([-3.0, -1.0, -0.5, 1.5, 2.5, 5.0].map(within), [-1.0, -1.0, -0.5, 1.5, 2.0, 2.0]);
+        assert_eq!(limited(Lanes::all(0.1), Lanes::all(0.0), Lanes::all(-1e-9)).0, [0.0; 8]);
     }
 }

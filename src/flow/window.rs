@@ -3,10 +3,10 @@
 use super::tiles::Tile;
 use crate::base::lanes::Lanes;
 
-/// Most cells around a tile: a displacement of five cells, and one for interpolation.
-pub const MOST: i32 = 6;
-/// Layers, and rows of a layer: 8 + 2 x 6.
-const SIDE: usize = 20;
+/// Most cells around a tile: a displacement of five cells, and two for cubic interpolation.
+pub const MOST: i32 = 7;
+/// Layers, and rows of a layer: 8 + 2 x 7.
+const SIDE: usize = 22;
 /// Values of a row: whole rows of the tile and of the tiles before and behind it, which copies fastest.
 const ROW: usize = 24;
 /// Values of a layer.
@@ -15,8 +15,8 @@ const LAYER: usize = SIDE * ROW;
 const FIRST: usize = MOST as usize * (LAYER + ROW) + 8;
 /// Masks indices, which are in bounds then.
 const MASK: usize = 16383;
-/// Room for the values: the corners of a cell lie up to a layer, a row and a value behind its first one.
-const ROOM: usize = MASK + 1 + LAYER + ROW + 8;
+/// Room for the values: those that cubic interpolation reads lie up to three layers, rows and values behind the first one.
+const ROOM: usize = MASK + 1 + 3 * (LAYER + ROW) + 8;
 /// Room for rounding (cells) in the sum of a cell's place and a displacement.
 const ROUNDING: f32 = 1.0e-4;
 
@@ -48,6 +48,14 @@ impl Span {
             (cells[axis] + most + 1).min(8 + MOST)
         });
         Self { low, high }
+    }
+
+    /// What cubic interpolation reads where linear interpolation reads this.
+    pub fn for_cubic(self) -> Self {
+        Self {
+            low: self.low.map(|low| (low - 1).max(-MOST)),
+            high: self.high.map(|high| (high + 1).min(8 + MOST)),
+        }
     }
 }
 
@@ -88,7 +96,7 @@ impl Window {
         }
     }
 
-    /// The value of a cell, counted from the tile's first one; each coordinate is at least -6.
+    /// The value of a cell, counted from the tile's first one; each coordinate is at least -7.
     #[inline(always)]
     pub fn at(&self, x: i32, y: i32, z: i32) -> f32 {
         let index = (x + MOST) as usize * LAYER + (y + MOST) as usize * ROW + (z + 8) as usize;
@@ -135,37 +143,87 @@ impl Window {
         [interpolate(&corners, &weights), least, most]
     }
 
-    /// The values at the eight corners of the cells of places, and the corners' weights. Mirrored places have mirrored weights to
-    /// the last bit.
+    /// Cubic interpolation (Lagrange's, of the 4 x 4 x 4 values around) at the places of a row's cells, moved by displacements
+    /// (cells), with the least and the greatest of the eight values around each place.
+    #[inline(always)]
+    pub fn sample_cubic(&self, row: usize, ways: &[Lanes; 3]) -> [Lanes; 3] {
+        let (base, weights) = cell(row, ways, None, LAYER + ROW + 1);
+        let [x, y, z] = weights.map(lagrange);
+        let (mut least, mut most) = (Lanes::all(f32::INFINITY), Lanes::all(f32::NEG_INFINITY));
+        let mut layers = [Lanes::all(0.0); 4];
+        for layer in 0..4 {
+            let mut lines = layers;
+            for line in 0..4 {
+                let shift = layer * LAYER + line * ROW;
+                let [[a, b], [c, d]] = [shift, shift + 2].map(|shift| self.pairs(&base, shift));
+                if (1..3).contains(&layer) && (1..3).contains(&line) {
+                    least = least.min(b.min(c));
+                    most = most.max(b.max(c));
+                }
+                lines[line] = combined([a, b, c, d], &z);
+            }
+            layers[layer] = combined(lines, &y);
+        }
+        [combined(layers, &x), least, most]
+    }
+
+    /// The values at the eight corners of the cells of places, and the corners' weights.
     #[inline(always)]
     fn corners(&self, row: usize, ways: &[Lanes; 3], between: Option<usize>) -> ([Lanes; 8], Weights) {
-        let (zero, one, half) = (Lanes::all(0.0), Lanes::all(1.0), Lanes::all(0.5));
-        let (mut whole, mut weights) = ([zero; 3], [[zero; 2]; 3]);
-        for axis in 0..3 {
-            let at = ways[axis];
-            let nearest = (at + Lanes::all(WHOLE)) - Lanes::all(WHOLE);
-            if between == Some(axis) {
-                whole[axis] = nearest;
-                weights[axis] = [half - (at - nearest), half + (at - nearest)];
-            } else {
-                let down = nearest - at.is_less(nearest).choose(one, zero);
-                whole[axis] = down;
-                weights[axis] = [(down + one) - at, at - down];
-            }
-        }
-        let first = WHOLE + (FIRST + (row >> 3) * LAYER + (row & 7) * ROW) as f32;
-        // Whole numbers: the sum is exact, and its low bits are the index.
-        let index = whole[0] * Lanes::all(LAYER as f32) + whole[1] * Lanes::all(ROW as f32) + whole[2];
-        let base = (index + (Lanes::all(first) + STEPS)).0.map(|index| index.to_bits() as usize & MASK);
-        let mut corners = [zero; 8];
+        let (base, weights) = cell(row, ways, between, 0);
+        let mut corners = [Lanes::all(0.0); 8];
         for pair in 0..4 {
             let shift = (pair >> 1) * LAYER + (pair & 1) * ROW;
-            let at = |lane: usize| self.pair(base[lane] + shift);
-            let both = Lanes::pairs([at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)]);
-            corners[2 * pair..][..2].copy_from_slice(&both);
+            corners[2 * pair..][..2].copy_from_slice(&self.pairs(&base, shift));
         }
         (corners, weights)
     }
+
+    /// For each lane the value at an index, and the one behind it.
+    #[inline(always)]
+    fn pairs(&self, base: &[usize; 8], shift: usize) -> [Lanes; 2] {
+        let at = |lane: usize| self.pair(base[lane] + shift);
+        Lanes::pairs([at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)])
+    }
+}
+
+/// The indices of the first corners of the cells of places, less `before`, and the weights of the lower and the upper corners. Mirrored
+/// places have mirrored weights to the last bit.
+#[inline(always)]
+fn cell(row: usize, ways: &[Lanes; 3], between: Option<usize>, before: usize) -> ([usize; 8], Weights) {
+    let (zero, one, half) = (Lanes::all(0.0), Lanes::all(1.0), Lanes::all(0.5));
+    let (mut whole, mut weights) = ([zero; 3], [[zero; 2]; 3]);
+    for axis in 0..3 {
+        let at = ways[axis];
+        let nearest = (at + Lanes::all(WHOLE)) - Lanes::all(WHOLE);
+        if between == Some(axis) {
+            whole[axis] = nearest;
+            weights[axis] = [half - (at - nearest), half + (at - nearest)];
+        } else {
+            let down = nearest - at.is_less(nearest).choose(one, zero);
+            whole[axis] = down;
+            weights[axis] = [(down + one) - at, at - down];
+        }
+    }
+    let first = WHOLE + (FIRST + (row >> 3) * LAYER + (row & 7) * ROW - before) as f32;
+    // Whole numbers: the sum is exact, and its low bits are the index.
+    let index = whole[0] * Lanes::all(LAYER as f32) + whole[1] * Lanes::all(ROW as f32) + whole[2];
+    ((index + (Lanes::all(first) + STEPS)).0.map(|index| index.to_bits() as usize & MASK), weights)
+}
+
+/// Weights of four values in a row for a place between the middle two, from the linear weights of these.
+#[inline(always)]
+fn lagrange([low, high]: [Lanes; 2]) -> [Lanes; 4] {
+    let one = Lanes::all(1.0);
+    let outer = Lanes::all(-1.0 / 6.0) * (low * high);
+    let inner = Lanes::all(0.5) * ((one + low) * (one + high));
+    [outer * (one + low), inner * low, inner * high, outer * (one + high)]
+}
+
+/// Mirrored values with mirrored weights have the same result to the last bit.
+#[inline(always)]
+fn combined([a, b, c, d]: [Lanes; 4], weights: &[Lanes; 4]) -> Lanes {
+    (a * weights[0] + d * weights[3]) + (b * weights[1] + c * weights[2])
 }
 
 /// 1.5 x 2^23: the sum with a small number is rounded to whole numbers.
@@ -236,6 +294,33 @@ mod tests {
             assert!((value - (13.5 + far)).abs() < 1e-5, "{margin}: {value}");
             let [_, low, high] = window.sample_bounded(42, &ways).map(|values| values.0[3]);
             assert_eq!((low, high), (0.0, 6.0));
+        }
+        // Cubic functions are interpolated exactly by the cubic one, up to five cells away.
+        let cube = |x: f32, y: f32, z: f32| 0.01 * x * x * x + 0.1 * x * y - 0.2 * y * y * z + z;
+        let cubic: Vec<Tile> = tiles
+            .coords()
+            .iter()
+            .map(|coord| {
+                std::array::from_fn(|at| {
+                    let cell = [at >> 6, at >> 3 & 7, at & 7];
+                    let [x, y, z] = [0, 1, 2].map(|axis| (coord[axis] * 8 + cell[axis] as i32) as f32);
+                    cube(x, y, z)
+                })
+            })
+            .collect();
+        for ways in [[-4.9f32, 4.9, 0.3], [0.25, -0.5, -4.75], [0.0, 1.0, 2.5]] {
+            let mut window = Window::default();
+            window.values.fill(f32::NAN);
+            let span = Span::moved([8; 3], &ways.map(|way| [way, way])).for_cubic();
+            window.fill(&cubic, &tiles.neighbours()[middle], &span, 0.0);
+            for (row, lane) in [(0usize, 0usize), (63, 7), (42, 3)] {
+                let [value, low, high] =
+                    window.sample_cubic(row, &ways.map(Lanes::all)).map(|values| values.0[lane]);
+                let wanted =
+                    cube((row >> 3) as f32 + ways[0], (row & 7) as f32 + ways[1], lane as f32 + ways[2]);
+                assert!((value - wanted).abs() < 1e-3 * (1.0 + wanted.abs()), "{ways:?} {value} {wanted}");
+                assert!(low <= high && low.is_finite());
+            }
         }
         // Only what paths reach is covered, to the last cell.
         let extent = [[-4.3, -3.7], [1.0, 1.0], [-0.2, 4.9]];

@@ -22,7 +22,7 @@ use crate::scene::shot::{
 use crate::scene::text::keys::{first_of, settings_of};
 use crate::scene::{Role, Scene, System, moving};
 use crate::snow::base_layer;
-use crate::snow::mist::{self, Around, Grids, Params, Source, StepReport, Surroundings, Wind};
+use crate::snow::mist::{self, Around, Grids, Params, Source, Start, StepReport, Surroundings, Wind};
 use crate::sweep::Body;
 use crate::vdb::file::{WriteOptions, any_to_bytes};
 use crate::vdb::{AnyGrid, FloatGrid, GridRef, VectorGrid, file};
@@ -45,6 +45,8 @@ pub struct State {
     statics: Vec<Body>,
     /// The grains after a frame.
     grains: Whole,
+    /// Where they were after a frame, that before the one which is made next.
+    starts: Option<(i32, Vec<(i64, Start)>)>,
     /// The base layer after a frame, the one before that which is made next.
     layer: Option<(i32, base_layer::Grids)>,
 }
@@ -109,9 +111,21 @@ impl<'a> Mist<'a> {
 
     /// The grains of a frame that may raise mist.
     fn sources(&self, ctx: &Context, state: &mut State, stored: &Stored, frame: i32) -> Result<Vec<Source>> {
-        let (points, _) = state.grains.points(ctx, stored, frame)?;
-        sources_of(points, state.mist.params())
-            .map_err(|error| Error::file(stored.folder(), format!("frame {frame} of grains {error}")))
+        let of_frame =
+            |frame: i32, error| Error::file(stored.folder(), format!("frame {frame} of grains {error}"));
+        let State { mist, grains, starts: known, .. } = state;
+        let starts = match known.take() {
+            Some((at, starts)) if at == frame - 1 => starts,
+            _ => {
+                let (before, _) = grains.points(ctx, stored, frame - 1)?;
+                starts_of(before).map_err(|error| of_frame(frame - 1, error))?
+            }
+        };
+        let (points, _) = grains.points(ctx, stored, frame)?;
+        let sources = sources_of(points, &starts, frame, mist.params());
+        let sources = sources.map_err(|error| of_frame(frame, error))?;
+        *known = Some((frame, starts_of(points).map_err(|error| of_frame(frame, error))?));
+        Ok(sources)
     }
 
     /// Moves the mist through a frame.
@@ -126,15 +140,18 @@ impl<'a> Mist<'a> {
         if !raises && state.mist.flow().tiles().active() == 0 {
             return Ok(StepReport::default());
         }
-        // What objects remove in this frame still bounds the air: see `Surroundings`.
+        // What objects remove in this frame bounds the air until they are there: see `Surroundings`.
         self.go_to(ctx, state, base, frame - 1)?;
         let State { mist, statics, layer, .. } = state;
         let moving = self.scene.objects.iter().filter(|object| object.role.moves());
         let pushing = self.inputs.bodies.iter().zip(moving).filter(|(_, object)| object.role.pushes());
-        let bodies: Vec<&Body> = pushing.map(|(body, _)| body).chain(statics.iter()).collect();
+        let (moving, removing): (Vec<&Body>, Vec<bool>) =
+            pushing.map(|(body, object)| (body, object.role.removes())).unzip();
+        let bodies: Vec<&Body> = moving.into_iter().chain(statics.iter()).collect();
         let around = Surroundings {
             base: layer.as_ref().map(|(_, layer)| &layer.surface),
             bodies: &bodies,
+            removing: &removing,
             floor: self.inputs.floor(),
         };
         let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
@@ -166,26 +183,59 @@ impl<'a> Mist<'a> {
     }
 }
 
-/// Grains as sources of mist, but for those that are too slow.
-fn sources_of(points: &Points, params: &Params) -> Result<Vec<Source>> {
+/// The identities of grains, ascending, with where they are.
+fn starts_of(points: &Points) -> Result<Vec<(i64, Start)>> {
     // A file of no points keeps no attributes.
     if points.count() == 0 {
         return Ok(Vec::new());
     }
-    let missing = |name: &str| Error::argument(format!("have no attribute {name}"));
-    let Some(Values::Vector(velocities)) = points.attribute("v") else { return Err(missing("v")) };
-    let Some(Values::Float(radii)) = points.attribute("pscale") else { return Err(missing("pscale")) };
-    let is_fast = |velocity: [f32; 3]| {
-        let square: f64 = velocity.iter().map(|x| f64::from(*x).powi(2)).sum();
-        square > params.from_speed.powi(2)
+    let (Values::Vector(velocities), Values::Long(ids)) = (attribute(points, "v")?, attribute(points, "id")?)
+    else {
+        return Err(Error::argument("have attributes v and id of other types"));
     };
-    let fast = (0..points.count()).filter(|point| is_fast(velocities.get(*point)));
-    let source = |point: usize| Source {
-        place: points.position(point),
-        velocity: velocities.get(point),
-        radius: f64::from(radii.get(point)),
+    let start = |point| Start { place: points.position(point), velocity: velocities.get(point) };
+    Ok((0..points.count()).map(|point| (ids.get(point), start(point))).collect())
+}
+
+fn attribute<'a>(points: &'a Points, name: &str) -> Result<&'a Values> {
+    points.attribute(name).ok_or_else(|| Error::argument(format!("have no attribute {name}")))
+}
+
+/// Grains after a frame as sources of mist, but for those that are too slow; from where they were before it.
+fn sources_of(points: &Points, starts: &[(i64, Start)], frame: i32, params: &Params) -> Result<Vec<Source>> {
+    if points.count() == 0 {
+        return Ok(Vec::new());
+    }
+    let all = ["v", "id", "pscale", "source_frame", "rest"].map(|name| attribute(points, name));
+    let [v, id, pscale, source_frame, rest] = all;
+    let (
+        Values::Vector(velocities),
+        Values::Long(ids),
+        Values::Float(radii),
+        Values::Int(births),
+        Values::Vector(rests),
+    ) = (v?, id?, pscale?, source_frame?, rest?)
+    else {
+        return Err(Error::argument("have attributes of other types"));
     };
-    Ok(fast.map(source).collect())
+    let source = |point: usize| {
+        let known = starts.binary_search_by_key(&ids.get(point), |(id, _)| *id);
+        let start = match known {
+            Ok(index) => Some(starts[index].1),
+            // It was born in this frame, at rest.
+            Err(_) if births.get(point) == frame => {
+                Some(Start { place: DVec3::from(rests.get(point).map(f64::from)), velocity: [0.0; 3] })
+            }
+            Err(_) => None,
+        };
+        Source {
+            place: points.position(point),
+            velocity: velocities.get(point),
+            radius: f64::from(radii.get(point)),
+            start,
+        }
+    };
+    Ok((0..points.count()).map(source).filter(|source| source.raises(params)).collect())
 }
 
 /// A mesh as a body that stands still; none where it has no triangles.
@@ -268,7 +318,7 @@ impl Stepping for Mist<'_> {
         };
         let statics = self.inputs.statics().iter().chain(self.inputs.ground());
         let statics = statics.filter_map(still).collect::<Result<_>>()?;
-        Ok(State { mist, statics, grains: Whole::default(), layer: None })
+        Ok(State { mist, statics, grains: Whole::default(), starts: None, layer: None })
     }
 
     fn step(&self, ctx: &Context, state: &mut State, to: &To<'_>) -> Result<Stepped<Step>> {

@@ -25,13 +25,13 @@ use rayon::prelude::*;
 
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
-use crate::flow::{Coord, FARTHEST, Flow, Kept, Scheme, Solids, Tiles, tiles};
+use crate::flow::{Coord, FARTHEST, Flow, Keeping, Kept, Solids, Tiles, tiles};
 use sources::Seed;
 
 #[cfg(feature = "vdb")]
 pub use grids::Grids;
 pub use params::{FASTEST_WIND, Params};
-pub use sources::Source;
+pub use sources::{Source, Start};
 #[cfg(feature = "vdb")]
 pub use surroundings::{Surroundings, Walls};
 pub use wind::Wind;
@@ -41,8 +41,12 @@ pub use wind::Wind;
 const JETS: f64 = 1.0e-4;
 /// Density under which there is no mist.
 pub const LEAST: f32 = 2.0e-3;
-/// Greatest factor by which mass that advection lost is put back in a sub-step.
-const MOST_GAIN: f64 = 1.1;
+/// Density from which on a tile gets air around it, so that its mist may spread there. What is thinner cannot be seen, and goes on
+/// in the tiles that are there: a few fast grains would else open hundreds of tiles for a litre of mist.
+const DENSE: f32 = 0.02;
+/// Longest sub-step (s). Its length decides how far mist spreads, and how often grains fill the cells that they cross: frames of 1/24,
+/// 1/48 and 1/96 s have the same sub-steps.
+const LONGEST: f64 = 1.0 / 96.0;
 /// Most sub-steps of a step, and most parts of a sub-step.
 const MOST: usize = 1000;
 
@@ -230,10 +234,12 @@ impl Mist {
 
     /// Count of sub-steps in which neither the air nor a grain nor an object moves farther than [`FARTHEST`] cells.
     fn sub_steps(&self, around: &Around<'_>, dt: f64) -> Result<usize> {
-        let speeds = around.sources.iter().flat_map(|source| source.velocity);
-        let fastest = speeds.fold(self.bulk(), |most, speed| most.max(speed.abs()));
+        let speeds = around.sources.iter().map(Source::fastest);
+        let fastest = speeds.fold(self.bulk(), |most, speed| most.max(speed));
         let speed = f64::from(fastest).max(around.fastest) + self.params.gravity.abs() * dt;
-        self.parts(speed, dt)
+        // Whole parts of the longest ones, so that frames of other lengths have the same sub-steps.
+        let least = ((dt / LONGEST * (1.0 - 1.0e-9)).ceil() as usize).clamp(1, MOST);
+        Ok(self.parts(speed, dt)?.div_ceil(least) * least)
     }
 
     /// Speed (m/s) that the air keeps within, but for jets.
@@ -255,7 +261,7 @@ impl Mist {
 
     /// Puts the mist that grains raise along a part, two shares 0..=1, of their way in a step of `dt` (s) into the air.
     fn raise(&mut self, ctx: &Context, sources: &[Source], dt: f64, shares: [f64; 2]) -> Result<()> {
-        let ways = sources::ways(sources, dt, shares);
+        let ways = sources::ways(sources, &self.params, dt, shares);
         let seeds = sources::seeds(ctx, &ways, &self.params)?;
         let wanted = self.wanted(&seeds);
         let what = format!("mist of {} cells of {:.4} m", 512 * wanted.len(), self.params.cell);
@@ -280,12 +286,11 @@ impl Mist {
 
     /// The air carries itself and the mist along for `dt` (s); some of it dissipates.
     fn follow_air(&mut self, ctx: &Context, dt: f64) -> Result<()> {
-        let mass = self.mass();
         // The boundary may have made the air faster than it was when the sub-steps were chosen.
         let parts = self.parts(f64::from(self.bulk()), dt)?;
-        (0..parts).try_for_each(|_| self.flow.advect(ctx, dt / parts as f64, Scheme::MacCormack))?;
-        self.settle(mass * libm::exp2(-dt / self.params.half_life));
-        Ok(())
+        let part = dt / parts as f64;
+        let keeping = Keeping { share: libm::exp2(-part / self.params.half_life) as f32, least: LEAST };
+        (0..parts).try_for_each(|_| self.flow.advect_keeping(ctx, part, keeping))
     }
 
     /// Sum of the density, times the volume of a cell (m3).
@@ -295,32 +300,21 @@ impl Mist {
         (sums.iter().sum::<f64>() + 0.0) * self.params.cell.powi(3)
     }
 
-    /// The tiles that hold mist or will get some, with padding.
+    /// The tiles that hold mist or will get some, and around those with a density that can be seen the padding.
     fn wanted(&self, seeds: &[Seed]) -> Vec<Coord> {
-        let holds = |tile: &crate::flow::Tile| tile.iter().any(|density| *density > LEAST);
+        let most = |tile: &crate::flow::Tile| tile.iter().fold(0.0f32, |most, density| most.max(*density));
         let held = self.flow.tiles().coords().iter().zip(self.flow.density());
-        let mut wanted: Vec<Coord> = held
-            .filter(|(_, tile)| holds(tile))
-            .map(|(coord, _)| *coord)
-            .chain(seeds.iter().map(|seed| seed.coord))
-            .collect();
+        let held = held.map(|(coord, tile)| (*coord, most(tile)));
+        let new = seeds.iter().map(|seed| (seed.coord, most(&*seed.density)));
+        let all: Vec<(Coord, f32)> = held.chain(new).filter(|(_, most)| *most > LEAST).collect();
+        let mut dense: Vec<Coord> =
+            all.iter().filter(|(_, most)| *most > DENSE).map(|(coord, _)| *coord).collect();
+        dense.sort_unstable();
+        dense.dedup();
+        let mut wanted = tiles::bordered(&dense, self.params.padding as usize);
+        wanted.extend(all.iter().map(|(coord, _)| *coord));
         wanted.sort_unstable();
         wanted.dedup();
-        tiles::bordered(&wanted, self.params.padding as usize)
-    }
-
-    /// Makes the mass (m3) what it should be: advection does not keep it, and of almost no mist nothing is left.
-    fn settle(&mut self, mass: f64) {
-        let (_, _, density) = self.flow.fields();
-        density.par_iter_mut().with_min_len(64).for_each(|tile| {
-            tile.iter_mut().filter(|value| **value < LEAST).for_each(|value| *value = 0.0);
-        });
-        let share = mass / self.mass();
-        if share.is_finite() {
-            // Mist of which nearly all was cut off must not come back in what is left.
-            let share = share.min(MOST_GAIN) as f32;
-            let (_, _, density) = self.flow.fields();
-            density.par_iter_mut().with_min_len(64).flatten().for_each(|value| *value *= share);
-        }
+        wanted
     }
 }

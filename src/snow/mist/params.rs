@@ -57,7 +57,7 @@ impl Params {
             noise_size: 4.0 * cell,
             seed: 0,
             padding: 1,
-            tolerance: 5.0e-5,
+            tolerance: 5.0e-6,
         }
     }
 

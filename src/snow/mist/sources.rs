@@ -10,6 +10,8 @@ use crate::flow::{Coord, Tile};
 
 /// Farthest place of a grain from the origin on an axis (cells).
 const FARTHEST_CELL: f64 = 1e7;
+/// Acceleration (m/s2) up to which a grain is taken to fly freely, under gravity and the drag of air; at twice as much it is hit.
+const FREE: f64 = 20.0;
 /// Largest radius of a grain (cells).
 const LARGEST: f64 = 64.0;
 
@@ -22,6 +24,17 @@ pub struct Source {
     pub velocity: [f32; 3],
     /// Radius (m) of the grain.
     pub radius: f64,
+    /// Where it was at the beginning of the step; none: it moved at its velocity all the time.
+    pub start: Option<Start>,
+}
+
+/// A grain at the beginning of a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    /// Position (m): that of its birth where it was born in the step.
+    pub place: DVec3,
+    /// Velocity (m/s), 0 where it was born in the step.
+    pub velocity: [f32; 3],
 }
 
 impl Source {
@@ -40,6 +53,14 @@ impl Source {
         if !self.velocity.iter().all(|speed| speed.is_finite()) {
             return Err(Error::argument(format!("the velocity of the {at} is not finite")));
         }
+        if let Some(start) = self.start {
+            let is_near = start.place.iter().all(|x| x.abs() <= FARTHEST_CELL * cell);
+            if !(is_near && start.velocity.iter().all(|speed| speed.is_finite())) {
+                return Err(Error::argument(format!(
+                    "the {at} began the step with a velocity that is not finite, or farther than {FARTHEST_CELL:.0} cells from the origin"
+                )));
+            }
+        }
         let most = LARGEST * cell;
         if !(0.0..=most).contains(&self.radius) {
             let radius = self.radius;
@@ -50,11 +71,63 @@ impl Source {
         Ok(())
     }
 
-    /// Whether a grain is fast enough to raise mist, and does not fall where falling grains do not.
+    /// Whether a grain is fast enough to raise mist at either end of a step, and does not fall there where falling grains do not.
     pub fn raises(&self, params: &Params) -> bool {
-        let speed = self.velocity.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
-        speed > params.from_speed && (params.falling || self.velocity[1] >= 0.0)
+        raises(self.velocity, params) || self.start.is_some_and(|start| raises(start.velocity, params))
     }
+
+    /// Its greatest speed (m/s) on any axis.
+    pub(super) fn fastest(&self) -> f32 {
+        let start = self.start.map_or([0.0; 3], |start| start.velocity);
+        self.velocity.iter().chain(&start).fold(0.0, |most, speed| most.max(speed.abs()))
+    }
+
+    /// Its motion in a step of `dt` (s) from a start.
+    fn motion(&self, start: &Start, dt: f64) -> Motion {
+        let now = DVec3::from(self.velocity.map(f64::from)) * dt;
+        let before = DVec3::from(start.velocity.map(f64::from)) * dt;
+        let (gain, off) = (now - before, start.place + now - self.place);
+        let middle = (off.dot(&gain) / gain.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        // What the velocities do not lead to is spread over the step.
+        let rest = gain * middle - off;
+        let free = 2.0 - gain.norm() / (FREE * dt * dt);
+        let width = 2.0 * middle.min(1.0 - middle) * free.clamp(0.0, 1.0);
+        Motion { from: start.place, before: before + rest, gain, middle, width }
+    }
+}
+
+/// The motion of a grain in a step: one change of velocity, evenly in a time around the moment by which both velocities lead as
+/// near to its end as they can. Of a grain that flies that is all of the step, of one that is hit a moment.
+struct Motion {
+    /// Position (m) at the beginning.
+    from: DVec3,
+    /// Displacement (m) in a step at the first velocity, and what it is more at the last one.
+    before: DVec3,
+    gain: DVec3,
+    /// Middle of the change, and its length: shares 0..=1 of the step.
+    middle: f64,
+    width: f64,
+}
+
+impl Motion {
+    /// Position (m) at a share 0..=1 of the step.
+    fn place(&self, share: f64) -> DVec3 {
+        let into = share - (self.middle - 0.5 * self.width);
+        let gained = if into <= 0.0 {
+            0.0
+        } else if into < self.width {
+            0.5 * into * into / self.width
+        } else {
+            share - self.middle
+        };
+        self.from + self.before * share + self.gain * gained
+    }
+}
+
+/// Whether a grain at a velocity (m/s) raises mist.
+fn raises(velocity: [f32; 3], params: &Params) -> bool {
+    let speed = velocity.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
+    speed > params.from_speed && (params.falling || velocity[1] >= 0.0)
 }
 
 /// Mist that is new in a tile.
@@ -67,14 +140,26 @@ pub struct Seed {
     pub velocity: Box<[Tile; 3]>,
 }
 
-/// The ways (m) of grains that raise mist, in the part of a step of `dt` (s) between two shares 0..=1 of it.
-pub fn ways(sources: &[Source], dt: f64, part: [f64; 2]) -> Vec<Way> {
+/// The ways (m) of grains that raise mist in the part of a step of `dt` (s) between two shares 0..=1 of it, at their mean velocity
+/// in it.
+pub fn ways(sources: &[Source], params: &Params, dt: f64, [first, last]: [f64; 2]) -> Vec<Way> {
+    let time = (last - first) * dt;
     let way = |source: &Source| {
-        let velocity = DVec3::from(source.velocity.map(f64::from));
-        let ends = part.map(|share| source.place - velocity * (dt * (1.0 - share)));
-        Way { ends, velocity: source.velocity, radius: source.radius }
+        let (velocity, ends) = match &source.start {
+            None => {
+                let now = DVec3::from(source.velocity.map(f64::from)) * dt;
+                (source.velocity, [first, last].map(|share| source.place - now * (1.0 - share)))
+            }
+            Some(start) => {
+                let motion = source.motion(start, dt);
+                let ends = [first, last].map(|share| motion.place(share));
+                let mean = (ends[1] - ends[0]) / time;
+                ([mean.x as f32, mean.y as f32, mean.z as f32], ends)
+            }
+        };
+        raises(velocity, params).then_some(Way { ends, velocity, radius: source.radius })
     };
-    sources.iter().map(way).collect()
+    sources.iter().filter_map(way).collect()
 }
 
 /// The way of a grain.

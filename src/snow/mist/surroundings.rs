@@ -21,11 +21,13 @@ use crate::vdb::FloatGrid;
 
 /// What mist flows around in a step.
 pub struct Surroundings<'a> {
-    /// The base layer at the beginning of the step. That at its end has room for objects on their whole way: air would be
-    /// pressed out of it through gaps that are not there.
+    /// The base layer at the beginning of the step. That at its end has room for objects on their whole path: air would be
+    /// pressed out of it through gaps that are not there. It opens as those of [`Self::removing`] move into it.
     pub base: Option<&'a FloatGrid>,
     /// Objects, moving or not.
     pub bodies: &'a [&'a Body],
+    /// Which of them take away the snow that they move through; those behind the last one do not.
+    pub removing: &'a [bool],
     /// Height of a level ground plane (m).
     pub floor: Option<f64>,
 }
@@ -49,6 +51,8 @@ struct Held {
     fixed: Option<Moment>,
     /// Moving ones at the last moment that was asked for: finer and wider cells ask for the same one.
     moving: Option<Moment>,
+    /// What moving ones have taken out of the base layer since the step began.
+    opened: Option<Opened>,
     /// Faces of tiles that no moving object comes near in the step, by the cells' edge (m, its bits) and the tile; none: all
     /// are open.
     faces: HashMap<(u64, Coord), Option<Faces>>,
@@ -66,6 +70,15 @@ struct Moment {
     surfaces: Vec<Surface>,
 }
 
+/// The volume that objects have swept since the step began.
+struct Opened {
+    /// Share 0..=1 of the step at which that was.
+    share: f64,
+    /// Indices of the objects.
+    near: Vec<usize>,
+    swept: FloatGrid,
+}
+
 /// An object during a step.
 struct Moving<'a> {
     body: &'a Body,
@@ -73,6 +86,8 @@ struct Moving<'a> {
     is_sheet: bool,
     /// Whether it moves too fast to carry the air along: it then stands where it ends.
     jumps: bool,
+    /// Whether it opens the base layer as it moves.
+    opens: bool,
     /// Its triangles, counter-clockwise seen from outside.
     triangles: Vec<[u32; 3]>,
     /// Least and greatest corner over the step (m).
@@ -99,13 +114,17 @@ impl<'a> Surroundings<'a> {
     /// # Errors
     /// A pose that cannot be computed.
     pub fn during(&'a self, [from, to]: [f64; 2], cell: f64) -> Result<Walls<'a>> {
-        let bodies = self.bodies.iter().map(|body| Moving::new(body, from, to)).collect::<Result<_>>()?;
+        let removes = self.removing.iter().chain(std::iter::repeat(&false));
+        let removes = removes.map(|removes| *removes && self.base.is_some());
+        let bodies = self.bodies.iter().zip(removes);
+        let bodies =
+            bodies.map(|(body, removes)| Moving::new(body, removes, [from, to])).collect::<Result<_>>()?;
         Ok(Walls { around: self, bodies, from, dt: to - from, cell, held: Mutex::default() })
     }
 }
 
 impl<'a> Moving<'a> {
-    fn new(body: &'a Body, from: f64, to: f64) -> Result<Self> {
+    fn new(body: &'a Body, removes: bool, [from, to]: [f64; 2]) -> Result<Self> {
         let (mut first, mut last) = (Vec::new(), Vec::new());
         body.closed_pose(from, &mut first)?;
         body.closed_pose(to, &mut last)?;
@@ -121,6 +140,7 @@ impl<'a> Moving<'a> {
             body,
             is_sheet,
             jumps,
+            opens: removes && farthest > 0.0 && !jumps && !is_sheet,
             triangles: body.closed_triangles().collect(),
             bounds: [low - room, high + room],
             speed: if jumps { 0.0 } else { farthest / (to - from) },
@@ -146,7 +166,7 @@ impl Walls<'_> {
         }
         let lattice = Lattice { cell, parts: self.parts() };
         let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
-        let Held { fixed, moving, faces: known } = &mut *held;
+        let Held { fixed, moving, opened, faces: known } = &mut *held;
         let key = |tile: &Coord| (cell.to_bits(), *tile);
         let slots = (0..tiles.count()).filter(|slot| !known.contains_key(&key(&tiles.coords()[*slot])));
         let slots: Vec<usize> = slots.collect();
@@ -155,6 +175,7 @@ impl Walls<'_> {
         let is_near = |body: &Moving<'_>| body.is_near(&bounds, NEAR * cell);
         let fixed = self.at(ctx, fixed, 1.0, |body| body.speed == 0.0 && is_near(body))?;
         let moving = self.at(ctx, moving, share, |body| body.speed > 0.0 && is_near(body))?;
+        let opened = self.opened(ctx, opened, share, |body| body.opens && is_near(body))?;
         let grid = |grid| Grid::new(ctx, grid, &unknown, &lattice);
         // A level set whose band is narrower does not show what lies that deep.
         let band = moving.solid.as_ref().map_or(0.0, |grid| f64::from(grid.background()));
@@ -162,6 +183,7 @@ impl Walls<'_> {
             lattice,
             floor: self.around.floor,
             still: [grid(self.around.base)?, grid(fixed.solid.as_ref())?],
+            opened: grid(opened)?,
             moving: grid(moving.solid.as_ref())?,
             bodies: &self.bodies,
             surfaces: [&fixed.surfaces, &moving.surfaces],
@@ -229,6 +251,36 @@ impl Walls<'_> {
         Ok(held.insert(moment))
     }
 
+    /// The level set of what objects have swept since the step began; it goes on from the last one that was asked for.
+    fn opened<'h>(
+        &self,
+        ctx: &Context,
+        held: &'h mut Option<Opened>,
+        share: f64,
+        is_wanted: impl Fn(&Moving<'_>) -> bool,
+    ) -> Result<Option<&'h FloatGrid>> {
+        let near: Vec<usize> = (0..self.bodies.len()).filter(|body| is_wanted(&self.bodies[*body])).collect();
+        let has_all = |opened: &Opened| near.iter().all(|body| opened.near.contains(body));
+        let (near, from, mut swept) = match held.take().filter(|held| held.share <= share && has_all(held)) {
+            Some(held) => (held.near, held.share, Some(held.swept)),
+            None => (near, 0.0, None),
+        };
+        if swept.is_none() || from < share {
+            let lattice = Lattice { cell: self.cell, parts: self.parts() };
+            let settings = Settings::new(lattice.spacing());
+            for body in near.iter().map(|body| &self.bodies[*body]) {
+                let [from, to] = [from, share].map(|share| self.time(body, share));
+                let more = sweep::chain(ctx, std::slice::from_ref(body.body), from, to, &settings)?;
+                match &mut swept {
+                    None => swept = Some(more),
+                    Some(swept) => crate::vdb::level_set::union(ctx, swept, more)?,
+                }
+            }
+        }
+        *held = swept.map(|swept| Opened { share, near, swept });
+        Ok(held.as_ref().map(|held| &held.swept))
+    }
+
     fn time(&self, body: &Moving<'_>, share: f64) -> f64 {
         self.from + self.dt * if body.jumps { 1.0 } else { share }
     }
@@ -279,6 +331,8 @@ struct Around<'a> {
     floor: Option<f64>,
     /// The base layer, and objects that stand still.
     still: [Option<Grid<'a>>; 2],
+    /// What moving objects have taken out of the base layer.
+    opened: Option<Grid<'a>>,
     /// Moving objects.
     moving: Option<Grid<'a>>,
     bodies: &'a [Moving<'a>],
@@ -360,7 +414,10 @@ impl Around<'_> {
             );
             let of = |grid: &Grid<'_>| grid.at(index, corner, number);
             let floor = self.floor.map(|floor| (place.y - floor) as f32);
-            let still = self.still.iter().flatten().filter_map(of).chain(floor);
+            let [base, fixed] = self.still.each_ref().map(|grid| grid.as_ref().and_then(of));
+            let open = self.opened.as_ref().and_then(of).map_or(f32::NEG_INFINITY, |swept| -swept);
+            let base = base.map(|base| base.max(open));
+            let still = [base, fixed, floor].into_iter().flatten();
             let moving = self.moving.iter().filter_map(of);
             let solids = [still.fold(far, f32::min), moving.fold(far, f32::min)];
             for side in 0..2 {

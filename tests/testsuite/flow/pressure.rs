@@ -167,7 +167,7 @@ fn the_bytes_do_not_depend_on_threads() {
         let boundary = |tiles: &Tiles, cell: f32| Ok(ball(tiles, cell, 5.0, [0.0, 1.0, 0.0]));
         for _ in 0..3 {
             ctx.phase("flow", || {
-                flow.advect(&ctx, 0.05, frazil::flow::Scheme::MacCormack)?;
+                flow.advect(&ctx, 0.05, frazil::flow::Scheme::Bounded)?;
                 flow.project(&ctx, &boundary, 1.0e-4)
             })
             .unwrap();
