@@ -58,7 +58,7 @@ pub fn carried(ctx: &Context, paths: &Paths<'_>, density: &Field) -> Result<Vec<
     Ok(in_hats(paths.tiles, &masses?))
 }
 
-/// Cuts off what is thin, lets a share of the density stay, and puts the mass that hats should hold back.
+/// Lets a share of the density stay and what is thin fade, and puts the mass back that hats should hold.
 pub fn restore(tiles: &Tiles, density: &mut Field, wanted: &[f64], keeping: Keeping) {
     let thin_out = |value: &mut f32| {
         let kept = *value * keeping.share;

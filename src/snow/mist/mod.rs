@@ -305,7 +305,7 @@ impl Mist {
         let most = |tile: &crate::flow::Tile| tile.iter().fold(0.0f32, |most, density| most.max(*density));
         let held = self.flow.tiles().coords().iter().zip(self.flow.density());
         let held = held.map(|(coord, tile)| (*coord, most(tile)));
-        let new = seeds.iter().map(|seed| (seed.coord, most(&*seed.density)));
+        let new = seeds.iter().map(|seed| (seed.coord, most(&seed.density)));
         let all: Vec<(Coord, f32)> = held.chain(new).filter(|(_, most)| *most > LEAST).collect();
         let mut dense: Vec<Coord> =
             all.iter().filter(|(_, most)| *most > DENSE).map(|(coord, _)| *coord).collect();
