@@ -3986,9 +3986,8 @@ frz_status frz_mist_set_params(frz_mist *mist,
 /**
  * Moves mist through a step, with what fast grains raise on their way in it.
  *
- * A grain is taken to have moved at its velocity after the step for all of dt, also where it was hit or born in it: the command,
- * which knows where grains were before, raises less mist where grains begin to fly, and the same at every frame rate. Here that
- * difference shrinks with dt.
+ * Mist is raised along the paths of the grains from where their last step began, or where it created them: it is the same at every
+ * frame rate.
  *
  * Call it once after each frz_grains_step, with the same base layer, bodies and dt, but not at the first frame of a shot, with a
  * dt of 0: nothing moved before it. After a failure or a cancel the mist is as it was before.
@@ -4019,37 +4018,6 @@ frz_status frz_mist_step(frz_context *context,
                          frz_mist_report *report);
 
 /**
- * Moves mist through a step, with what points raise on their way in it: as frz_mist_step, for a host whose grains or base
- * layer are its own, or that has their files only. The mist is the same, bit for bit.
- *
- * positions: double[3] for each point at the step's end (m), finite, within 1e7 cells of the origin along each axis.
- * velocities: float[3] for each point (m/s), finite; taken to be those of all of dt.
- * radius: of the points (m), above 0 and at most 64 cells.
- * snow: a level set around which the air flows, with voxels fixed in the world, as it was before the layer's step, in which bodies
- *     move into it. NULL: there is none.
- * wind: as for frz_mist_step.
- * bodies: as for frz_mist_step.
- * count: as for frz_mist_step.
- * time: as for frz_mist_step.
- * dt: as for frz_mist_step.
- * report: as for frz_mist_step.
- *
- * One thread at a time; any number may read a grid.
- */
-frz_status frz_mist_step_points(frz_context *context,
-                                frz_mist *mist,
-                                frz_view positions,
-                                frz_view velocities,
-                                double radius,
-                                const frz_grid *snow,
-                                const frz_grid *wind,
-                                const frz_body *bodies,
-                                size_t count,
-                                double time,
-                                double dt,
-                                frz_mist_report *report);
-
-/**
  * Makes a grid of the mist, whose voxels are its cells: the centre of voxel (0, 0, 0) lies at half a cell on each axis.
  *
  * field: a frz_mist_field.
@@ -4077,6 +4045,74 @@ frz_status frz_mist_save(frz_context *context,
                          void *dst,
                          size_t capacity,
                          size_t *size);
+
+/**
+ * Moves mist through a step, with what points raise on their way in it: as frz_mist_step, for a host whose grains or base
+ * layer are its own, or that has their files only.
+ *
+ * Each point is taken to have moved at its velocity after the step for all of dt, also where it was hit or born in it: more mist is
+ * raised where points begin to fly, the more the longer steps are. A host that knows where points were calls frz_mist_step_paths.
+ *
+ * positions: double[3] for each point at the step's end (m), finite, within 1e7 cells of the origin along each axis.
+ * velocities: float[3] for each point (m/s), finite.
+ * radius: of the points (m), above 0 and at most 64 cells.
+ * snow: a level set around which the air flows, with voxels fixed in the world, as it was before the layer's step, in which bodies
+ *     move into it. NULL: there is none.
+ * wind: as for frz_mist_step.
+ * bodies: as for frz_mist_step.
+ * count: as for frz_mist_step.
+ * time: as for frz_mist_step.
+ * dt: as for frz_mist_step.
+ * report: as for frz_mist_step.
+ *
+ * One thread at a time; any number may read a grid.
+ */
+frz_status frz_mist_step_points(frz_context *context,
+                                frz_mist *mist,
+                                frz_view positions,
+                                frz_view velocities,
+                                double radius,
+                                const frz_grid *snow,
+                                const frz_grid *wind,
+                                const frz_body *bodies,
+                                size_t count,
+                                double time,
+                                double dt,
+                                frz_mist_report *report);
+
+/**
+ * Moves mist through a step, with what points raise along their paths: as frz_mist_step_points, for a host that knows where points
+ * were before the step. The mist is that of frz_mist_step, bit for bit.
+ *
+ * positions_before: double[3] for each point at the step's beginning (m), as positions; that of its birth where it was born in it.
+ * velocities_before: float[3] for each point then (m/s), finite; 0 where it was born in the step.
+ * positions: as for frz_mist_step_points, of the same points in the same order.
+ * velocities: as for frz_mist_step_points.
+ * radius: as for frz_mist_step_points.
+ * snow: as for frz_mist_step_points.
+ * wind: as for frz_mist_step.
+ * bodies: as for frz_mist_step.
+ * count: as for frz_mist_step.
+ * time: as for frz_mist_step.
+ * dt: as for frz_mist_step.
+ * report: as for frz_mist_step.
+ *
+ * One thread at a time; any number may read a grid.
+ */
+frz_status frz_mist_step_paths(frz_context *context,
+                               frz_mist *mist,
+                               frz_view positions_before,
+                               frz_view velocities_before,
+                               frz_view positions,
+                               frz_view velocities,
+                               double radius,
+                               const frz_grid *snow,
+                               const frz_grid *wind,
+                               const frz_body *bodies,
+                               size_t count,
+                               double time,
+                               double dt,
+                               frz_mist_report *report);
 #endif
 
 /**

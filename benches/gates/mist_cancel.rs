@@ -6,6 +6,7 @@ use std::ptr::{null, null_mut};
 use frazil::capi::body::{frz_body, frz_body_init};
 use frazil::capi::mist::*;
 use frazil::capi::mist_params::*;
+use frazil::capi::mist_points::*;
 use frazil::capi::{frz_status, frz_view};
 
 use crate::cancel_latency::{Steps, measure};

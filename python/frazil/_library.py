@@ -391,6 +391,7 @@ _FUNCTIONS = {
     "mist_params_init": [_P, _Z], "mist_create": [_P, _P, _P, _Z, _P], "mist_set_params": [_P, _P],
     "mist_step": [_P, _P, _P, _P, _P, _P, _Z, _D, _D, _P],
     "mist_step_points": [_P, _P, View, View, _D, _P, _P, _P, _Z, _D, _D, _P],
+    "mist_step_paths": [_P, _P, View, View, View, View, _D, _P, _P, _P, _Z, _D, _D, _P],
     "mist_grid": [_P, _P, _U, _P], "mist_save": [_P, _P, _P, _Z, _P],
     "particles_spacing": [_P, _P, _P], "tracker_params_init": [_P, _Z],
     "tracker_create": [_P, _P, _P, _P, _P, _Z, _P], "tracker_set_params": [_P, _P],

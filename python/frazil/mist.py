@@ -59,7 +59,8 @@ class Mist(Handle):
     def step(self, grains, base, bodies, time, dt, wind=None):
         """Moves the mist through dt seconds from a time (s), with what fast grains raise; the report, as frz_mist_report has it.
 
-        grains: frazil.Grains after their step; or (positions (n, 3), velocities (n, 3), radius); or None.
+        grains: frazil.Grains after their step; or (positions (n, 3), velocities (n, 3), radius) of points; or, of points that were at
+            known positions before the step, (positions then, velocities then, positions, velocities, radius); or None.
         base: a frazil.Base after its step; with points a frazil.Grid, the snow as it was before its step; or None.
         wind: a grid of vectors, or None.
         """
@@ -67,8 +68,10 @@ class Mist(Handle):
         report = MistReport(c.sizeof(MistReport))
         snow, gusts = (handle.pointer if handle else None for handle in (base, wind))
         if isinstance(grains, tuple):
-            places, speeds = rows(grains[0], np.float64, 3), rows(grains[1], np.float32, 3)
-            name, raising = "mist_step_points", (view(places), view(speeds), grains[2])
+            # Positions and velocities take turns.
+            arrays = [rows(array, (np.float64, np.float32)[at % 2], 3) for at, array in enumerate(grains[:-1])]
+            name = "mist_step_points" if len(arrays) == 2 else "mist_step_paths"
+            raising = (*map(view, arrays), grains[-1])
         else:
             name, raising = "mist_step", (None if grains is None else grains.pointer,)
         call(name, self._ctx.pointer, self.pointer, *raising, snow, gusts, descs, len(bodies), time, dt, c.byref(report))

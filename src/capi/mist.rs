@@ -5,9 +5,9 @@ use std::ffi::c_void;
 use super::base::frz_base;
 use super::body::{Role, Shapes, bodies, frz_body};
 use super::context::{creates, enter, frz_context};
-use super::grains::{check_snow, frz_grains};
+use super::grains::frz_grains;
 use super::grid::{Grid, frz_grid};
-use super::guard::{Failure, Outcome, frz_status, guard};
+use super::guard::{Outcome, frz_status, guard};
 use super::handle::{Noun, change, clear, destroy, read, read_some, required};
 use super::mist_params::frz_mist_params;
 use super::saved::{Saved, resumed};
@@ -16,7 +16,7 @@ use crate::base::DVec3;
 use crate::context::Context;
 use crate::flow::Tiles;
 use crate::snow::base_layer::BaseLayer;
-use crate::snow::mist::{Around, Grids, Mist, Source, Surroundings, Wind};
+use crate::snow::mist::{Around, Grids, Mist, Source, Start, Surroundings, Wind};
 use crate::sweep::Body;
 use crate::vdb::{AnyGrid, FloatGrid, VectorGrid};
 
@@ -88,12 +88,12 @@ const LONGEST: f64 = 3600.0;
 const LATEST: f64 = 1.0e9;
 
 /// What a step takes besides grains.
-struct Scene<'a> {
-    snow: Option<&'a FloatGrid>,
-    wind: Option<&'a VectorGrid>,
-    bodies: (*const frz_body, usize),
-    time: f64,
-    dt: f64,
+pub(super) struct Scene<'a> {
+    pub snow: Option<&'a FloatGrid>,
+    pub wind: Option<&'a VectorGrid>,
+    pub bodies: (*const frz_body, usize),
+    pub time: f64,
+    pub dt: f64,
 }
 
 impl Air {
@@ -101,7 +101,7 @@ impl Air {
     ///
     /// # Safety
     /// The bodies must describe memory that can be read.
-    unsafe fn step(
+    pub(super) unsafe fn step(
         &mut self,
         ctx: &Context,
         sources: &[Source],
@@ -212,9 +212,8 @@ pub unsafe extern "C" fn frz_mist_set_params(
 
 /// Moves mist through a step, with what fast grains raise on their way in it.
 ///
-/// A grain is taken to have moved at its velocity after the step for all of dt, also where it was hit or born in it: the command,
-/// which knows where grains were before, raises less mist where grains begin to fly, and the same at every frame rate. Here that
-/// difference shrinks with dt.
+/// Mist is raised along the paths of the grains from where their last step began, or where it created them: it is the same at every
+/// frame rate.
 ///
 /// Call it once after each frz_grains_step, with the same base layer, bodies and dt, but not at the first frame of a shot, with a
 /// dt of 0: nothing moved before it. After a failure or a cancel the mist is as it was before.
@@ -255,77 +254,21 @@ pub unsafe extern "C" fn frz_mist_step(
             let sources = match &grains {
                 Some(heap) => {
                     let radius = heap.grains.params().radius;
-                    let grains = heap.grains.places().zip(heap.grains.velocities());
-                    grains.map(|(place, velocity)| Source { place, velocity, radius, start: None }).collect()
+                    let grains = heap.grains.places().zip(heap.grains.velocities()).zip(heap.grains.starts());
+                    let start = |(place, velocity)| Start { place, velocity };
+                    grains
+                        .map(|((place, velocity), from)| Source {
+                            place,
+                            velocity,
+                            radius,
+                            start: from.map(start),
+                        })
+                        .collect()
                 }
                 None => Vec::new(),
             };
             let snow = base.as_deref().map(|base| before(ctx, &base.layer)).transpose()?;
             air.step(ctx, &sources, &Scene { snow: snow.as_ref(), wind, bodies: (bodies, count), time, dt })
-        })
-    }
-}
-
-/// Moves mist through a step, with what points raise on their way in it: as frz_mist_step, for a host whose grains or base
-/// layer are its own, or that has their files only. The mist is the same, bit for bit.
-///
-/// positions: double[3] for each point at the step's end (m), finite, within 1e7 cells of the origin along each axis.
-/// velocities: float[3] for each point (m/s), finite; taken to be those of all of dt.
-/// radius: of the points (m), above 0 and at most 64 cells.
-/// snow: a level set around which the air flows, with voxels fixed in the world, as it was before the layer's step, in which bodies
-///     move into it. NULL: there is none.
-/// wind: as for frz_mist_step.
-/// bodies: as for frz_mist_step.
-/// count: as for frz_mist_step.
-/// time: as for frz_mist_step.
-/// dt: as for frz_mist_step.
-/// report: as for frz_mist_step.
-///
-/// One thread at a time; any number may read a grid.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn frz_mist_step_points(
-    context: *mut frz_context,
-    mist: *mut frz_mist,
-    positions: frz_view,
-    velocities: frz_view,
-    radius: f64,
-    snow: *const frz_grid,
-    wind: *const frz_grid,
-    bodies: *const frz_body,
-    count: usize,
-    time: f64,
-    dt: f64,
-    report: *mut frz_mist_report,
-) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
-    unsafe {
-        stepped(context, mist, report, |ctx, air| {
-            let snow = read_some(snow)?;
-            let snow = snow.as_deref().map(Grid::floats).transpose()?;
-            snow.map_or(Ok(()), |snow| check_snow("snow", snow))?;
-            let wind = read_some(wind)?;
-            let wind = wind.as_deref().map(Grid::vectors).transpose()?;
-            let places = positions.elements::<[f64; 3]>("positions")?;
-            let velocities = velocities.elements::<[f32; 3]>("velocities")?;
-            if velocities.len() != places.len() {
-                let text = format!(
-                    "velocities: {} elements, but there are {} positions",
-                    velocities.len(),
-                    places.len()
-                );
-                return Err(Failure::argument(text));
-            }
-            within("radius", radius, f64::MIN_POSITIVE..=f64::MAX, " m")?;
-            let points = places.iter().zip(&*velocities);
-            let sources: Vec<Source> = points
-                .map(|(place, velocity)| Source {
-                    place: (*place).into(),
-                    velocity: *velocity,
-                    radius,
-                    start: None,
-                })
-                .collect();
-            air.step(ctx, &sources, &Scene { snow, wind, bodies: (bodies, count), time, dt })
         })
     }
 }
@@ -345,7 +288,7 @@ fn before(ctx: &Context, layer: &BaseLayer) -> Outcome<FloatGrid> {
 ///
 /// # Safety
 /// The pointers must be NULL or the caller's.
-unsafe fn stepped(
+pub(super) unsafe fn stepped(
     context: *mut frz_context,
     mist: *mut frz_mist,
     report: *mut frz_mist_report,

@@ -72,6 +72,9 @@ pub mod mist_params;
 #[cfg(feature = "vdb")]
 pub mod mist;
 
+#[cfg(feature = "vdb")]
+pub mod mist_points;
+
 pub mod tracker_params;
 
 pub mod tracker;

@@ -32,6 +32,9 @@ static frz_status mist_step(void *at, size_t size, int fails) {
 static frz_status mist_points(void *at, size_t size, int fails) {
     return (void)size, frz_mist_step_points(with(fails), mist, NO_VIEW, NO_VIEW, 0.01, NULL, NULL, NULL, 0, 0, DT, at);
 }
+static frz_status mist_paths(void *at, size_t size, int fails) {
+    return (void)size, frz_mist_step_paths(with(fails), mist, NO_VIEW, NO_VIEW, NO_VIEW, NO_VIEW, 0.01, NULL, NULL, NULL, 0, 0, DT, at);
+}
 
 static const guard_writer writers[] = {
     {"frz_grid_get_info", GUARD_FIELD, sizeof(frz_grid_info), grid_info, 1, NULL},
@@ -46,6 +49,7 @@ static const guard_writer writers[] = {
     {"frz_mist_params_init", GUARD_ARGUMENT, sizeof(frz_mist_params), mist_params, 0, NULL},
     {"frz_mist_step", GUARD_FIELD, sizeof(frz_mist_report), mist_step, 1, NULL},
     {"frz_mist_step_points", GUARD_FIELD, sizeof(frz_mist_report), mist_points, 1, NULL},
+    {"frz_mist_step_paths", GUARD_FIELD, sizeof(frz_mist_report), mist_paths, 1, NULL},
 };
 
 int main(void) {

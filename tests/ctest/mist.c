@@ -21,9 +21,32 @@ static frz_mist *mist_of(frz_context *ctx, bytes state) {
 
 static const bytes NOTHING = {NULL, 0};
 
-/* Grains that move, a layer below them, and a vector grid that blows. */
+/* Where grains are, how fast, and their numbers. */
+typedef struct moment {
+    size_t count;
+    int64_t *ids;
+    double (*places)[3];
+    float (*speeds)[3];
+} moment;
+
+static moment moment_of(const frz_grains *grains) {
+    moment now;
+    now.count = grains_count(grains);
+    now.ids = malloc((now.count + 1) * sizeof *now.ids);
+    now.places = malloc((now.count + 1) * sizeof *now.places), now.speeds = malloc((now.count + 1) * sizeof *now.speeds);
+    CHECK(now.ids != NULL && now.places != NULL && now.speeds != NULL);
+    WORKS(frz_grains_read(grains, FRZ_GRAINS_ID, SPAN(now.ids, now.count)));
+    WORKS(frz_grains_read(grains, FRZ_GRAINS_POSITION_DOUBLE, SPAN(now.places, now.count)));
+    WORKS(frz_grains_read(grains, FRZ_GRAINS_VELOCITY, SPAN(now.speeds, now.count)));
+    return now;
+}
+
+static void moment_free(moment *now) { free(now->ids), free(now->places), free(now->speeds); }
+
+/* Grains that move, what they were before, a layer below them, and a vector grid that blows. */
 typedef struct scene {
     frz_grains *grains;
+    moment before;
     layer pressed;
     const ball *rest;
     frz_grid *wind;
@@ -53,18 +76,34 @@ static frz_mist_report blow(frz_context *ctx, frz_mist *mist, const scene *with,
     return report;
 }
 
-/* The same step of a host that has points and a grid only. */
-static void blow_points(frz_context *ctx, frz_mist *mist, const scene *with, int frame) {
+/* The same step of a host that has points and a grid only, and knows where they were, or does not. */
+static void blow_points(frz_context *ctx, frz_mist *mist, const scene *with, int frame, int knows) {
     const frz_body body = rolling(with->rest, frame);
-    const size_t count = grains_count(with->grains);
-    double(*places)[3] = malloc(count * sizeof *places);
-    float(*speeds)[3] = malloc(count * sizeof *speeds);
-    CHECK(places != NULL && speeds != NULL);
-    WORKS(frz_grains_read(with->grains, FRZ_GRAINS_POSITION_DOUBLE, SPAN(places, count)));
-    WORKS(frz_grains_read(with->grains, FRZ_GRAINS_VELOCITY, SPAN(speeds, count)));
-    WORKS(frz_mist_step_points(ctx, mist, VIEW(places, count), VIEW(speeds, count), 0.02 / 3, with->pressed.before,
-                               with->wind, &body, 1, DT * (frame - 1), DT, NULL));
-    free(places), free(speeds);
+    moment now = moment_of(with->grains), then = moment_of(with->grains);
+    const size_t count = now.count;
+    size_t one, at;
+    if (knows) {
+        float(*rest)[3] = malloc((count + 1) * sizeof *rest);
+        CHECK(rest != NULL);
+        WORKS(frz_grains_read(with->grains, FRZ_GRAINS_REST, SPAN(rest, count)));
+        for (one = 0; one < count; ++one) {
+            int k;
+            for (at = 0; at < with->before.count && with->before.ids[at] != now.ids[one]; ++at) continue;
+            for (k = 0; k < 3; ++k) {
+                const int was = at < with->before.count;
+                then.places[one][k] = was ? with->before.places[at][k] : rest[one][k];
+                then.speeds[one][k] = was ? with->before.speeds[at][k] : 0;
+            }
+        }
+        free(rest);
+        WORKS(frz_mist_step_paths(ctx, mist, VIEW(then.places, count), VIEW(then.speeds, count), VIEW(now.places, count),
+                                  VIEW(now.speeds, count), 0.02 / 3, with->pressed.before, with->wind, &body, 1, DT * (frame - 1),
+                                  DT, NULL));
+    } else {
+        WORKS(frz_mist_step_points(ctx, mist, VIEW(now.places, count), VIEW(now.speeds, count), 0.02 / 3, with->pressed.before,
+                                   with->wind, &body, 1, DT * (frame - 1), DT, NULL));
+    }
+    moment_free(&now), moment_free(&then);
 }
 
 static void steps(frz_context *ctx, const scene *with) {
@@ -75,10 +114,17 @@ static void steps(frz_context *ctx, const scene *with) {
     frz_grid_info info;
     CHECK(report.sources > 0 && report.mass > 0 && report.cells > 0 && report.sub_steps > 0);
     CHECK(report.divergence < 1e-4 && report.fastest > 0 && report.fastest < 20);
-    blow_points(ctx, other, with, 3);
+    blow_points(ctx, other, with, 3, 1);
     state = mist_state(ctx, mist), again = mist_state(ctx, other);
     CHECK(same_bytes(state, again));
     free(again.data);
+    /* Without what was before, points are taken to have come at their last velocity. */
+    back = mist_of(ctx, NOTHING);
+    blow_points(ctx, back, with, 3, 0);
+    again = mist_state(ctx, back);
+    CHECK(!same_bytes(state, again));
+    free(again.data);
+    frz_mist_destroy(back);
     /* A saved state goes on as if it had never stopped, on any number of threads. */
     {
         frz_context *alone = context_on(0);
@@ -179,7 +225,8 @@ static void cancels(const scene *with) {
         frz_status status = FRZ_CANCELLED;
         pthread_t thread;
         state.ctx = ctx;
-        for (state.at = 1; status != FRZ_OK; ++state.at) {
+        /* At its first poll, and at ever later ones. */
+        for (state.at = 1; status != FRZ_OK; state.at += 1 + state.at / 4) {
             frz_mist_report report;
             report.struct_size = sizeof report, report.cells = 1;
             state.polls = 0;
@@ -309,6 +356,10 @@ static void what_is_refused(frz_context *ctx, const scene *with) {
     FAILS(POINTS(2, 2, 0, NULL), FRZ_ERROR_ARGUMENT, "radius = 0 is not within");
     FAILS(POINTS(2, 2, 100, NULL), FRZ_ERROR_ARGUMENT, "radius of 100 m");
     FAILS(POINTS(2, 2, 0.005, with->wind), FRZ_ERROR_ARGUMENT, "holds vectors");
+#define PATHS(a, b, n, m) frz_mist_step_paths(ctx, mist, VIEW(places, a), VIEW(speeds, b), VIEW(places, n), VIEW(speeds, m), 0.005, NULL, NULL, NULL, 0, 0, DT, &report)
+    FAILS(PATHS(1, 1, 2, 2), FRZ_ERROR_ARGUMENT, "positions_before: 1 elements, but there are 2 positions");
+    FAILS(PATHS(2, 1, 2, 2), FRZ_ERROR_ARGUMENT, "velocities_before: 1 elements, but there are 2 positions_before");
+    FAILS(PATHS(2, 2, 2, 1), FRZ_ERROR_ARGUMENT, "velocities: 1 elements, but there are 2 positions");
     FAILS(frz_mist_step(ctx, mist, with->grains, NULL, storm, NULL, 0, 0, DT, &report), FRZ_ERROR_ARGUMENT, "the wind at (");
     places[1][2] = (double)NAN;
     FAILS(POINTS(2, 2, 0.005, NULL), FRZ_ERROR_ARGUMENT, "from the origin");
@@ -355,12 +406,14 @@ int main(void) {
     ball_make(&rest, 0.1f);
     with.rest = &rest;
     with.grains = some(ctx, &with.pressed, &rest, snow);
+    with.before = moment_of(with.grains);
     move(ctx, with.grains, &with.pressed, &rest, 3);
     with.wind = blowing(ctx, 1);
     steps(ctx, &with);
     parameters(ctx);
     what_is_refused(ctx, &with);
     cancels(&with);
+    moment_free(&with.before);
     frz_grains_destroy(with.grains);
     frz_base_destroy(with.pressed.base), frz_grid_destroy(with.pressed.before), frz_grid_destroy(with.wind);
     frz_grid_destroy(snow);

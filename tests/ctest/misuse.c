@@ -501,7 +501,8 @@ static void call(void) {
                     const frz_view at = view(wide, 24);
                     frz_view fast = view(floats, 12);
                     if (fast.data && at.data && fast.count > at.count) fast.count = at.count;
-                    (void)frz_mist_step_points(c, some_mist(), at, fast, radius, chance(3) ? a_grid() : NULL, wind, list, count, time, dt, told);
+                    if (chance(2)) (void)frz_mist_step_points(c, some_mist(), at, fast, radius, chance(3) ? a_grid() : NULL, wind, list, count, time, dt, told);
+                    else (void)frz_mist_step_paths(c, some_mist(), at, fast, at, fast, radius, chance(3) ? a_grid() : NULL, wind, list, count, time, dt, told);
                 }
             }
             break;

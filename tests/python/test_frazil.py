@@ -336,6 +336,13 @@ class Mist(unittest.TestCase):
         self.assertEqual(report.sources, 2)
         self.assertGreater(report.mass, 0)
         self.assertRegex(repr(report), "^<MistReport sub_steps=.* fastest=")
+        # Points that lay still until they were hit half way raise less than those that came at their last velocity.
+        lay = (places, 0 * speeds, places + speeds / 48, speeds, 0.01)
+        hit = frazil.Mist(ctx, **more).step(lay, None, [moved_box(2)], 0.0, 1 / 24)
+        self.assertEqual(hit.sources, 2)
+        self.assertTrue(0 < hit.mass < 0.8 * report.mass)
+        with self.assertRaisesRegex(frazil.Error, "velocities_before: 1 elements, but there are 2 positions_before"):
+            mist.step((places, speeds[:1], places, speeds, 0.01), None, [], 0.0, 1 / 24)
         back = frazil.Mist(other, state=mist.save(), **more)
         grains = frazil.Grains(ctx, radius=0.01)
         grains.emit(places.astype(np.float32), speeds)

@@ -5,7 +5,8 @@ use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use frazil::capi::frz_status::*;
-use frazil::capi::{grains::*, grains_params::*, grains_points::*, mist::*, mist_params::*};
+use frazil::capi::{grains::*, grains_params::*, grains_points::*};
+use frazil::capi::{mist::*, mist_params::*, mist_points::*};
 use frazil::capi::{shallow::*, shallow_detail::*, shallow_detail_ground::*, shallow_flows::*};
 use frazil::capi::{shallow_params::*, shallow_terrain::*};
 

@@ -180,7 +180,12 @@ pub const GRAIN_KEYS: &[Key] = &[
     )
     .or("0.0")
     .concerns(STEP),
-    Key::new(OBJECT, "friction", Kind::Number(0.0, 10.0, ""), "of grains against it")
+    Key::new(
+        OBJECT,
+        "friction",
+        Kind::Number(0.0, 10.0, ""),
+        "of grains against it; loose ones that slide over it while it stands still meet that between grains",
+    )
         .or("0.3")
         .concerns(STEP),
 ];

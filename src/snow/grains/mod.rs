@@ -40,6 +40,7 @@ pub(super) mod shell;
 #[doc(hidden)]
 pub mod solve;
 mod sourcing;
+mod starts;
 mod state;
 mod surfaces;
 mod surroundings;
@@ -58,11 +59,13 @@ use claims::Claims;
 use heap::{Division, Heap};
 use layout::locate;
 use sourcing::Sourcing;
+use starts::Starts;
 use surroundings::{Bounds, Obstacles, TIES, have_stayed};
 
 pub use ground::Ground;
 pub use params::Params;
 pub use sourcing::{Base, PACKING, Removal, removals};
+pub use starts::Start;
 pub(super) use surroundings::HOLES;
 pub use surroundings::{FASTEST_OBJECT, Object, Surroundings};
 
@@ -89,6 +92,7 @@ pub struct Grains {
     ties: [f64; TIES],
     /// Bounding boxes (m) of the meshes at the end of the last step.
     boxes: Vec<Bounds>,
+    starts: Starts,
 }
 
 /// Results of a step.
@@ -129,7 +133,7 @@ pub const FASTEST: f32 = 10_000.0;
 
 /// Memory (bytes) of grains in a step, including the copy that a failed step restores.
 pub fn memory(grains: usize) -> u64 {
-    (grains as u64).saturating_mul(760)
+    (grains as u64).saturating_mul(808)
 }
 
 impl Grains {
@@ -140,8 +144,8 @@ impl Grains {
     pub fn new(params: Params) -> Result<Self> {
         params.validate()?;
         let heap = Heap::new(2.0 * params.radius);
-        let (births, owed, boxes) = Default::default();
-        Ok(Self { params, heap, births, next_id: 0, owed, ties: [0.0; TIES], boxes })
+        let (births, owed, boxes, starts) = Default::default();
+        Ok(Self { params, heap, births, next_id: 0, owed, ties: [0.0; TIES], boxes, starts })
     }
 
     /// Resumes from a state that [`Grains::save`] wrote.
@@ -255,7 +259,9 @@ impl Grains {
         [from, to]: [f64; 2],
         frame: i32,
     ) -> Result<StepReport> {
+        let starts = std::mem::take(&mut self.starts);
         let before = self.clone();
+        self.starts = Starts::of(&self.heap, self.next_id);
         let stepped = ctx.step(["source", "colliders", "move"].len(), || {
             let (born, removed_volume) = ctx.phase("source", || {
                 let ties = around.ties(&self.params);
@@ -300,9 +306,12 @@ impl Grains {
             })
         });
         match stepped {
-            Ok((report, phases)) => Ok(StepReport { phases, ..report }),
+            Ok((report, phases)) => {
+                self.starts.end(self.next_id);
+                Ok(StepReport { phases, ..report })
+            }
             Err(error) => {
-                *self = before;
+                *self = Self { starts, ..before };
                 Err(error)
             }
         }

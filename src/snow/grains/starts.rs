@@ -1,0 +1,95 @@
+//! Where grains were at the beginning of the last step: mist is raised along the paths from there.
+
+use rayon::prelude::*;
+
+use super::Grains;
+use super::heap::Heap;
+use crate::base::DVec3;
+
+/// Position (m) and velocity (m/s) at the beginning of a step.
+pub type Start = (DVec3, [f32; 3]);
+
+/// The grains at the beginning of the last step.
+#[derive(Clone, Default)]
+pub(super) struct Starts {
+    /// By identity, ascending.
+    grains: Vec<(u32, Start)>,
+    /// Identities of the grains that the step created: from the first one up to the second one, without it.
+    born: [u32; 2],
+}
+
+impl Starts {
+    /// Those of a step that begins now, with the next identity to be given.
+    pub fn of(heap: &Heap, next_id: u32) -> Self {
+        let all = heap.ids().iter().copied().zip(heap.places().zip(heap.velocities()));
+        let mut grains: Vec<(u32, Start)> = all.collect();
+        grains.par_sort_unstable_by_key(|(id, _)| *id);
+        Self { grains, born: [next_id; 2] }
+    }
+
+    /// The step has ended, with the next identity to be given.
+    pub fn end(&mut self, next_id: u32) {
+        self.born[1] = next_id;
+    }
+
+    fn find(&self, id: u32) -> Option<Start> {
+        self.grains.binary_search_by_key(&id, |(id, _)| *id).ok().map(|index| self.grains[index].1)
+    }
+}
+
+impl Grains {
+    /// Where each was at the beginning of the last step, and how fast; of those that the step created the position of birth, at rest.
+    /// None before the first step, and of those that were emitted since.
+    pub fn starts(&self) -> impl Iterator<Item = Option<Start>> + '_ {
+        let [first, end] = self.starts.born;
+        self.ids().iter().zip(self.rests()).map(move |(id, rest)| {
+            let is_born = || (first..end).contains(id).then(|| (DVec3::from(rest.map(f64::from)), [0.0; 3]));
+            self.starts.find(*id).or_else(is_born)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Base, Params, Surroundings};
+    use super::*;
+    use crate::context::{Context, Pool};
+
+    #[test]
+    fn grains_know_where_their_last_step_began() {
+        let ctx = Context::new(Pool::new(1).unwrap());
+        let mut grains = Grains::new(Params::for_cell(0.02)).unwrap();
+        let around = Surroundings {
+            base: Base::Missing,
+            objects: &[],
+            statics: &[],
+            ground: &[],
+            floor: None,
+            lowest: -100.0,
+        };
+        grains.emit(&[DVec3::zeros(), DVec3::x()], &[[0.0, 1.0, 0.0], [0.0; 3]], 0).unwrap();
+        assert!(grains.starts().all(|start| start.is_none()));
+        let by_id = |grains: &Grains| {
+            let mut all: Vec<(u32, Start)> =
+                grains.ids().iter().copied().zip(grains.places().zip(grains.velocities())).collect();
+            all.sort_by_key(|(id, _)| *id);
+            all
+        };
+        for frame in 1..=3 {
+            let before = by_id(&grains);
+            let times = [f64::from(frame) / 24.0, f64::from(frame + 1) / 24.0];
+            grains.step(&ctx, &around, times, frame).unwrap();
+            let mut starts: Vec<(u32, Start)> =
+                grains.ids().iter().copied().zip(grains.starts().map(Option::unwrap)).collect();
+            starts.sort_by_key(|(id, _)| *id);
+            assert_eq!(starts, before);
+            // A step that fails is none.
+            ctx.cancel();
+            assert!(grains.step(&ctx, &around, times, frame).is_err());
+            ctx.reset();
+            assert!(grains.starts().flatten().eq(grains.ids().iter().map(|id| before[*id as usize].1)));
+        }
+        grains.emit(&[DVec3::y()], &[], 3).unwrap();
+        assert_eq!(grains.starts().filter(Option::is_none).count(), 1);
+    }
+}
