@@ -186,8 +186,8 @@ pub const GRAIN_KEYS: &[Key] = &[
         Kind::Number(0.0, 10.0, ""),
         "of grains against it; loose ones that slide over it while it stands still meet that between grains",
     )
-        .or("0.3")
-        .concerns(STEP),
+    .or("0.3")
+    .concerns(STEP),
 ];
 
 /// Checks what single keys do not show.
