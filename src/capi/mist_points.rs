@@ -46,16 +46,8 @@ pub unsafe extern "C" fn frz_mist_step_points(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or the caller's.
     unsafe {
-        stepped(context, mist, report, |ctx, air| {
-            let snow = read_some(snow)?;
-            let snow = snow.as_deref().map(Grid::floats).transpose()?;
-            snow.map_or(Ok(()), |snow| check_snow("snow", snow))?;
-            let wind = read_some(wind)?;
-            let wind = wind.as_deref().map(Grid::vectors).transpose()?;
-            let ends = points(("positions", positions), ("velocities", velocities))?;
-            let sources = sources(&ends, None, radius)?;
-            air.step(ctx, &sources, &Scene { snow, wind, bodies: (bodies, count), time, dt })
-        })
+        let raised = || sources(&points(("positions", positions), ("velocities", velocities))?, None, radius);
+        step_along(context, mist, report, raised, [snow, wind], (bodies, count), [time, dt])
     }
 }
 
@@ -95,12 +87,7 @@ pub unsafe extern "C" fn frz_mist_step_paths(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or the caller's.
     unsafe {
-        stepped(context, mist, report, |ctx, air| {
-            let snow = read_some(snow)?;
-            let snow = snow.as_deref().map(Grid::floats).transpose()?;
-            snow.map_or(Ok(()), |snow| check_snow("snow", snow))?;
-            let wind = read_some(wind)?;
-            let wind = wind.as_deref().map(Grid::vectors).transpose()?;
+        let raised = || {
             let starts =
                 points(("positions_before", positions_before), ("velocities_before", velocities_before))?;
             let ends = points(("positions", positions), ("velocities", velocities))?;
@@ -109,8 +96,34 @@ pub unsafe extern "C" fn frz_mist_step_paths(
                 let text = format!("positions_before: {before} elements, but there are {after} positions");
                 return Err(Failure::argument(text));
             }
-            let sources = sources(&ends, Some(&starts), radius)?;
-            air.step(ctx, &sources, &Scene { snow, wind, bodies: (bodies, count), time, dt })
+            sources(&ends, Some(&starts), radius)
+        };
+        step_along(context, mist, report, raised, [snow, wind], (bodies, count), [time, dt])
+    }
+}
+
+/// Moves mist through a step with what points raise.
+///
+/// # Safety
+/// As the functions above.
+unsafe fn step_along(
+    context: *mut frz_context,
+    mist: *mut frz_mist,
+    report: *mut frz_mist_report,
+    raised: impl FnOnce() -> Outcome<Vec<Source>>,
+    [snow, wind]: [*const frz_grid; 2],
+    bodies: (*const frz_body, usize),
+    [time, dt]: [f64; 2],
+) -> frz_status {
+    // SAFETY: the caller's promise.
+    unsafe {
+        stepped(context, mist, report, |ctx, air| {
+            let snow = read_some(snow)?;
+            let snow = snow.as_deref().map(Grid::floats).transpose()?;
+            snow.map_or(Ok(()), |snow| check_snow("snow", snow))?;
+            let wind = read_some(wind)?;
+            let wind = wind.as_deref().map(Grid::vectors).transpose()?;
+            air.step(ctx, &raised()?, &Scene { snow, wind, bodies, time, dt })
         })
     }
 }
