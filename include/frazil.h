@@ -3984,7 +3984,7 @@ frz_status frz_mist_set_params(frz_mist *mist,
                                const frz_mist_params *params);
 
 /**
- * Moves mist through a step, with what fast grains raise on their way in it.
+ * Moves mist through a step, with what fast grains raise along their paths in it.
  *
  * Mist is raised along the paths of the grains from where their last step began, or where it created them: it is the same at every
  * frame rate.
@@ -4047,7 +4047,7 @@ frz_status frz_mist_save(frz_context *context,
                          size_t *size);
 
 /**
- * Moves mist through a step, with what points raise on their way in it: as frz_mist_step, for a host whose grains or base
+ * Moves mist through a step, with what points raise along their paths in it: as frz_mist_step, for a host whose grains or base
  * layer are its own, or that has their files only.
  *
  * Each point is taken to have moved at its velocity after the step for all of dt, also where it was hit or born in it: more mist is

@@ -210,7 +210,7 @@ pub unsafe extern "C" fn frz_mist_set_params(
     })
 }
 
-/// Moves mist through a step, with what fast grains raise on their way in it.
+/// Moves mist through a step, with what fast grains raise along their paths in it.
 ///
 /// Mist is raised along the paths of the grains from where their last step began, or where it created them: it is the same at every
 /// frame rate.

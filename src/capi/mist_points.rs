@@ -10,7 +10,7 @@ use super::mist::{Scene, frz_mist, frz_mist_report, stepped};
 use super::views::{frz_view, within};
 use crate::snow::mist::{Source, Start};
 
-/// Moves mist through a step, with what points raise on their way in it: as frz_mist_step, for a host whose grains or base
+/// Moves mist through a step, with what points raise along their paths in it: as frz_mist_step, for a host whose grains or base
 /// layer are its own, or that has their files only.
 ///
 /// Each point is taken to have moved at its velocity after the step for all of dt, also where it was hit or born in it: more mist is
