@@ -82,11 +82,14 @@ impl Harness {
         Ok(Self { done: vec![false; gates.len()], gates, only, short: false })
     }
 
-    /// Whether any gate whose name begins so is wanted.
+    /// Whether the gate of this name is wanted, or, where there is none, any whose name begins so.
     ///
     /// # Panics
     /// When there is no such gate.
     pub fn wants(&self, name: &str) -> bool {
+        if let Some(gate) = self.gates.iter().find(|gate| gate.name == name) {
+            return self.is_asked(gate);
+        }
         let mut named = self.gates.iter().filter(|gate| gate.name.starts_with(name)).peekable();
         assert!(named.peek().is_some(), "list.rs has no gate {name}");
         named.any(|gate| self.is_asked(gate))

@@ -523,5 +523,14 @@ pub const GATES: &[Gate] = &[
     none("reliability.soup_silent", "runs"),
     none("reliability.soup_warned", "runs"),
     // Steps of every step function with random settings, 10,000 each, that take over 20 times the median and do not end within 0.2 s of a cancel.
-    none("reliability.step_calls", "steps"),
+    none("reliability.step_calls.shallow_step", "steps"),
+    none("reliability.step_calls.shallow_replay", "steps"),
+    none("reliability.step_calls.shallow_detail_step", "steps"),
+    none("reliability.step_calls.grains_step", "steps"),
+    none("reliability.step_calls.mist_step_points", "steps"),
+    none("reliability.step_calls.base_step", "steps"),
+    none("reliability.step_calls.grains_step_grids", "steps"),
+    none("reliability.step_calls.mist_step", "steps"),
+    none("reliability.step_calls.tracker_step", "steps"),
+    none("reliability.step_calls.tracker_read_eased", "steps"),
 ];

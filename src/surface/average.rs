@@ -1,9 +1,11 @@
 //! The implicit function of Solenthaler, Schläfli and Pajarola (2007; thesis 2.3.1) at single nodes: phi(x) = |x - a(x)| - r f,
 //! where a is the weighted mean of the particles' places around x and r their spacing. f is 1, and less where the mean moves
-//! too fast with x: between particles far apart, where there is no liquid.
+//! too fast with x: between particles far apart, where there is no liquid. Where liquid is thinner than 2 r, half of its
+//! thickness is the most that r f can be (`thickness.rs`).
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
+use super::thickness::Spread;
 use crate::base::cpu::dispatch;
 use crate::base::lanes::{LANES, Lanes};
 
@@ -89,8 +91,21 @@ fn value(sums: &Sums, lane: usize, spacing: f64) -> f64 {
         let entry = scale * (of(sum) - 0.5 * (mean[a] * slope[b] + mean[b] * slope[a]));
         (rate[(a, b)], rate[(b, a)]) = (entry, entry);
     }
-    let away = mean.iter().map(|x| x * x).sum::<f64>().sqrt();
-    away - spacing * share(&rate)
+    let (offset, away) = spread(sums, lane, radius).offset(mean.into(), spacing);
+    away - offset.min(spacing * share(&rate))
+}
+
+/// How the particles around a node lie.
+fn spread(sums: &Sums, lane: usize, radius: f64) -> Spread {
+    let of = |lanes: &Lanes| f64::from(lanes.0[lane]);
+    let mut square = Matrix3::zeros();
+    for (sum, [a, b]) in sums.square.iter().zip(PAIRS) {
+        (square[(a, b)], square[(b, a)]) = (of(sum), of(sum));
+    }
+    // q^3 is q^2 less q^2 d^2 / R^2.
+    let weight = of(&sums.weight) + square.trace() / (radius * radius);
+    let mean = Vector3::from(sums.slope.each_ref().map(of)) / weight;
+    Spread { weight, covariance: square / weight - mean * mean.transpose() }
 }
 
 /// The factor f for a rate at which the mean moves.
@@ -137,15 +152,15 @@ mod tests {
     }
 
     #[test]
-    fn a_single_particle_is_a_sphere() {
+    fn a_single_particle_is_a_sphere_of_about_its_volume() {
         let near = Near { places: vec![[0.5, 0.25, 0.0]] };
         let mut nodes = [[0.0; LANES]; 3];
-        nodes[0] = [0.5, 1.5, 2.5, 3.5, 4.5, 8.0, 9.0, 20.0];
+        nodes[0] = [0.5, 1.0, 1.6, 2.1, 2.5, 8.0, 9.0, 20.0];
         nodes[1] = [0.25; LANES];
         let phi = values(&near, &nodes, 2.0);
-        for (at, expected) in [-2.0, -1.0, 0.0, 1.0, 2.0].into_iter().enumerate() {
-            assert!((phi[at] - expected).abs() < 1e-5, "{phi:?}");
-        }
+        assert!((0..4).all(|at| phi[at] < phi[at + 1]), "{phi:?}");
+        // A ball of 8 cells^3 has a radius of 1.24.
+        assert!(phi[2] < 0.0 && phi[3] > 0.0, "{phi:?}");
         assert_eq!(phi[7], 8.0);
     }
 }

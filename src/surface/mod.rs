@@ -71,6 +71,7 @@ mod specks;
 #[cfg(feature = "vdb")]
 mod spheres;
 mod state;
+mod thickness;
 mod tracker;
 mod transfer;
 mod uncrossed;

@@ -85,7 +85,8 @@ pub fn ball(radius: f64, n: usize, detail: f64) -> Ball {
     Ball { spacing, places, mesh }
 }
 
-/// The function of Solenthaler et al. (2007) at a place (m), summed over all particles.
+/// The function of Solenthaler et al. (2007) at a place (m), with the thickness of thin liquids, summed over all particles; for
+/// cells of half a spacing.
 pub fn plain_phi(places: &[DVec3], spacing: f64, at: DVec3) -> f64 {
     let radius = SUPPORT * spacing;
     let mean = |at: DVec3| {
@@ -104,7 +105,54 @@ pub fn plain_phi(places: &[DVec3], spacing: f64, at: DVec3) -> f64 {
     let most = ((rate + rate.transpose()) * 0.5).symmetric_eigenvalues().max();
     let g = ((3.5 - most) / 3.1).clamp(0.0, 1.0);
     let share = if most < 0.4 { 1.0 } else { g.powi(3) - 3.0 * g * g + 3.0 * g };
-    (at - mean(at)).norm() - spacing * share
+    let (offset, away) = plain_offset(places, spacing, at, mean(at) - at);
+    away - offset.min(spacing * share)
+}
+
+/// How far from the mean the surface of a thin liquid lies at a place, and how far that mean is if the way along a sheet counts less (m).
+fn plain_offset(places: &[DVec3], spacing: f64, at: DVec3, mean: DVec3) -> (f64, f64) {
+    // Farther than a cell from any surface.
+    if mean.norm() > 1.5 * spacing {
+        return (spacing, mean.norm());
+    }
+    let square = (SUPPORT * spacing).powi(2);
+    let near: Vec<(f64, DVec3)> = places
+        .iter()
+        .map(|place| place - at)
+        .filter(|d| d.norm_squared() < square)
+        .map(|d| ((1.0 - d.norm_squared() / square).powi(2), d))
+        .collect();
+    let weight: f64 = near.iter().map(|(weight, _)| weight).sum();
+    let middle = near.iter().map(|(weight, d)| d * *weight).sum::<DVec3>() / weight;
+    let covariance = near
+        .iter()
+        .map(|(weight, d)| (d - middle) * (d - middle).transpose() * *weight)
+        .sum::<nalgebra::Matrix3<f64>>()
+        / weight;
+    let eigen = covariance.symmetric_eigen();
+    let mut along: Vec<f64> = eigen.eigenvalues.iter().map(|x| x.max(spacing * spacing / 12.0)).collect();
+    along.sort_unstable_by(f64::total_cmp);
+    let q = 1.0 - mean.norm_squared() / square;
+    // A full sheet of thickness 1 has this weight, and these variances along it.
+    let (sheet, full) = (std::f64::consts::PI * square * q.powi(3) / 3.0, square * q / 8.0);
+    let thick = weight * spacing.powi(3) / sheet * full / (along[1] * along[2]).sqrt();
+    // Of cells of half a spacing.
+    let half = |variance: &f64| {
+        (thick.max((12.0 * variance.max(0.0)).sqrt()) / 2.0).clamp(0.125f64.sqrt() * spacing, spacing)
+    };
+    let halves: Vec<f64> = eigen.eigenvalues.iter().map(half).collect();
+    let least = halves.iter().copied().fold(spacing, f64::min);
+    if least == spacing {
+        return (spacing, mean.norm());
+    }
+    let [across, along] = [spacing, least].map(|other| {
+        let of = |axis: usize| {
+            let part = eigen.eigenvectors.column(axis).dot(&mean) / halves[axis];
+            part * part * ((halves[axis] - other) / (spacing - least)).abs()
+        };
+        (0..3).map(of).sum::<f64>()
+    });
+    (least, least * (across + along.powf(spacing / least)).sqrt())
 }
 
 /// Two clouds of trembling particles with a gap between them, where the mean of the places around moves fast.

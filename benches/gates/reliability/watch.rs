@@ -100,10 +100,14 @@ impl<'a> Tried<'a> {
 
     /// How many went on for too long, and a note on all of them.
     pub fn judged(&self) -> (usize, String) {
-        let Self { name, median, cancelled, .. } = self;
+        let Self { median, cancelled, .. } = self;
         let slow = self.late.iter().filter(|took| **took > TIMES * median).count();
         let slowest = self.slowest.max(0.0);
-        (slow, format!("{name} {:.2} ms, {cancelled} cancelled, {slowest:.3} s", 1e3 * median))
+        let note = format!(
+            "{STEPS} steps, median {:.2} ms; {cancelled} cancelled, which ended within {slowest:.3} s",
+            1e3 * median
+        );
+        (slow, note)
     }
 
     /// The context that steps are made with.

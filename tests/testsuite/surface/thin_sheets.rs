@@ -1,22 +1,22 @@
-//! A sheet of liquid that is drawn out until it is thinner than its particles are apart: the mesh has the volume of the particles' surface,
-//! which lies one spacing off the sheet on both sides.
+//! Sheets and threads of liquid that are drawn out until they are thinner than their particles are apart: the surface encloses their mass.
 
 use frazil::base::DVec3;
 use frazil::surface::{Params, Tracker};
+use nalgebra::{Rotation3, Unit};
 
-use crate::common::liquids::{context, filled, numbered, own_surface};
+use crate::common::liquids::{Random, context, filled, numbered, own_surface};
 
 const FRAMES: usize = 24;
 /// Half of the sheet's width at first (spacings).
 const HALF: f64 = 9.0;
 
 #[test]
-fn a_sheet_that_thins_has_the_volume_of_the_particles_own_surface() {
+fn a_mesh_keeps_its_volume_while_its_sheet_thins() {
     let ctx = context(2);
     let first = filled(1.0, 0.1, HALF, |at| at.abs().max() < HALF && at.y.abs() < 2.0);
-    // From 4 spacings to 1.
+    // From 4 spacings to a half.
     let at = |frame: usize| {
-        let wide = libm::exp2(frame as f64 / FRAMES as f64);
+        let wide = libm::exp2(1.5 * frame as f64 / FRAMES as f64);
         numbered(first.iter().map(|at| DVec3::new(at.x * wide, at.y / (wide * wide), at.z * wide)).collect())
     };
     let own = |frame: usize| own_surface(&ctx, &at(frame).places, 1.0);
@@ -27,12 +27,40 @@ fn a_sheet_that_thins_has_the_volume_of_the_particles_own_surface() {
         let to = at(frame);
         tracker.step(&ctx, &from, &to, 1.0 / 24.0).expect("a step");
         from = to;
-        let ratio = tracker.mesh().volume() / own(frame).volume();
-        assert!((ratio - 1.0).abs() < 0.01, "frame {frame}: {ratio}");
+        let volume = tracker.mesh().volume();
+        let [of_surface, of_mass] = [own(frame).volume(), first.len() as f64].map(|own| volume / own);
+        assert!((of_surface - 1.0).abs() < 0.08, "frame {frame}: {of_surface}");
+        assert!((0.85..1.5).contains(&of_mass), "frame {frame}: {of_mass}");
     }
-    // All that is within a spacing of a plate of the particles, which stand for half as much.
-    let (volume, edge) = (tracker.mesh().volume(), 4.0 * HALF - 2.0);
-    let expected = 2.0 * edge * edge + 2.0 * std::f64::consts::PI * edge;
-    assert!((volume / expected - 1.0).abs() < 0.1, "{volume} of {expected}");
-    assert!(volume > 1.8 * first.len() as f64, "{volume} of {} particles", first.len());
+}
+
+#[test]
+fn sheets_and_threads_of_any_thickness_and_direction_have_the_volume_of_their_particles() {
+    let ctx = context(2);
+    let mut random = Random(5);
+    for round in 0..8 {
+        let is_thread = round % 2 == 1;
+        let half = if is_thread { 40.0 } else { 14.0 };
+        let is_inside = |at: DVec3| {
+            at.abs().max() < half && if is_thread { at.y.hypot(at.z) < 1.8 } else { at.y.abs() < 2.0 }
+        };
+        let first = filled(1.0, 0.3, half, is_inside);
+        // Sheets to half a spacing, threads to a radius of 0.8.
+        let wide = libm::exp2(f64::from(round / 2) * if is_thread { 0.75 } else { 0.5 });
+        let axis = Unit::new_normalize(random.vector(1.0));
+        let turn = Rotation3::from_axis_angle(&axis, 2.0 * random.next());
+        let drawn = |(n, at): (usize, &DVec3)| {
+            // Columns and layers are not in step.
+            let at = at + DVec3::new(n as f64 * 0.618 % 1.0 - 0.5, 0.0, 0.0);
+            let thin = if is_thread { 1.0 / wide.sqrt() } else { 1.0 / (wide * wide) };
+            let across = if is_thread { thin } else { wide };
+            turn * DVec3::new(at.x * wide, at.y * thin, at.z * across)
+        };
+        let places: Vec<DVec3> = first.iter().enumerate().map(drawn).collect();
+        let mesh = own_surface(&ctx, &places, 1.0);
+        let volume = mesh.volume() / places.len() as f64;
+        let least = if is_thread { 0.6 } else { 0.85 };
+        assert!((least..1.45).contains(&volume), "round {round}: {volume}");
+        assert_eq!(mesh.euler_characteristic(), 2, "round {round}: a hole, or pieces");
+    }
 }
