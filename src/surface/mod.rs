@@ -1,12 +1,12 @@
 //! A detailed triangle mesh follows a particle liquid and keeps its detail where that neither breaks nor stretches (thesis chapter 2).
 //!
-//! Each frame the mesh is carried along by the particles (`advect.rs`), then moved so that each vertex is as far from the
-//! surface of the particles as it was at the first frame (`project.rs`). That surface is where an implicit function of the
-//! particles is 0 (`implicit.rs`), turned into signed distances (`band.rs`). Vertices that this would move too far are where
-//! the liquid has merged or split: they are flagged, and so are those beside which the mesh does not cover the surface (`coverage.rs`).
+//! Each frame the mesh is carried along by the particles (`track/advect.rs`), then moved so that each vertex is as far from the
+//! surface of the particles as it was at the first frame (`track/project.rs`). That surface is where an implicit function of the
+//! particles is 0 (`level_set/implicit.rs`), turned into signed distances (`level_set/band.rs`). Vertices that this would move too far are where
+//! the liquid has merged or split: they are flagged, and so are those beside which the mesh does not cover the surface (`topology/coverage.rs`).
 //!
-//! There the mesh is changed (`change.rs`): its own signed distances take the topology of phi (`gamma.rs`, `matching/`), and it is cut and
-//! rebuilt in the cells where it no longer fits (`repair/`). Parts without liquid go (`dry.rs`), edges that were stretched or pressed are
+//! There the mesh is changed (`topology/change.rs`): its own signed distances take the topology of phi (`topology/mesh_distance.rs`, `matching/`), and it is cut and
+//! rebuilt in the cells where it no longer fits (`repair/`). Parts without liquid go (`topology/dry_parts.rs`), edges that were stretched or pressed are
 //! split or collapse (`improve/`).
 //!
 //! # Glossary
@@ -27,90 +27,53 @@
 // Kernels index several arrays by one lane or axis.
 #![allow(clippy::needless_range_loop)]
 
-mod advect;
-mod agreement;
-mod ahead;
-mod apart;
-mod average;
 #[cfg(test)]
 pub(crate) mod balls;
-mod band;
-mod cells;
-mod change;
-mod coverage;
-mod cubes;
-mod deep;
-mod drift;
-mod dry;
-mod easing;
-mod empty;
-mod enclosed;
-mod fade;
-mod fit;
-mod gamma;
-mod hidden;
-mod implicit;
-mod improve;
-mod isosurface;
-#[cfg(feature = "vdb")]
 mod level_set;
-mod lost;
-mod matching;
-mod outlook;
 mod params;
-mod paths;
-mod project;
+mod particles;
+mod remesh;
 mod repair;
 mod report;
-mod resculpt;
-mod rest;
-mod sample;
-mod smooth;
-mod spacing;
-mod specks;
-#[cfg(feature = "vdb")]
-mod spheres;
 mod state;
-mod thickness;
+mod topology;
+mod track;
 mod tracker;
-mod transfer;
-mod uncrossed;
-mod unfit;
 
-pub use advect::{Weighting, carried};
-pub use agreement::{Mismatch, disagreement};
-pub use apart::Apart;
-pub use average::SUPPORT;
-pub use band::Distances;
-pub use cells::TOO_FAR;
-pub use change::Change;
+pub use level_set::band::Distances;
+pub use level_set::implicit::Implicit;
+pub use level_set::isosurface::Isosurface;
+pub use level_set::kernel::SUPPORT;
 #[doc(hidden)]
-pub use cubes::cases as cube_cases;
-pub use easing::{Eased, Leads, eased};
-pub use implicit::Implicit;
-pub use improve::Improvements;
-pub use isosurface::Isosurface;
+pub use level_set::marching_cubes::cases as cube_cases;
 #[cfg(feature = "vdb")]
-pub use level_set::{HALF_WIDTH, level_set};
-pub use matching::{Matched, Matching, Node, Solver, match_topology};
-pub use outlook::{Outlook, displaced};
+pub use level_set::openvdb::{HALF_WIDTH, level_set};
+pub use level_set::sampler::Sampler;
+pub use level_set::smooth::smooth;
+#[cfg(feature = "vdb")]
+pub use level_set::spheres::{is_sphere_radius, spheres};
 pub use params::Params;
-pub use paths::interpolate;
-pub use project::{Foot, foot};
+pub use particles::agreement::{Mismatch, disagreement};
+pub use particles::grid::TOO_FAR;
+pub use particles::paths::interpolate;
+pub use particles::rest_position::Rest;
+pub use particles::spacing::{estimate as estimate_spacing, rough as rough_spacing};
+pub use particles::specks::specks;
+pub use particles::transfer::transfer;
+pub use remesh::Improvements;
 pub use repair::{
     Losses, Prepared, RepairReport, Repaired, Source, Traced, carried as carry_attributes, repair,
 };
 pub use report::StepReport;
-pub use rest::Rest;
-pub use sample::Sampler;
-pub use smooth::smooth;
-pub use spacing::{estimate as estimate_spacing, rough as rough_spacing};
-pub use specks::specks;
-#[cfg(feature = "vdb")]
-pub use spheres::{is_sphere_radius, spheres};
+pub use topology::change::Change;
+pub use topology::matching::{Matched, Matching, Node, Solver, match_topology};
+pub use topology::uncovered_parts::Apart;
+pub use track::advect::{Weighting, carried};
+pub use track::easing::{Eased, Leads, eased};
+pub use track::easing_limit::{Displaced, uncrossed};
+pub use track::lookahead::{Outlook, displaced};
+pub use track::project::{Foot, foot};
 pub use tracker::Tracker;
-pub use transfer::transfer;
-pub use uncrossed::{Displaced, uncrossed};
 
 use crate::base::DVec3;
 use crate::error::{Error, Result};

@@ -1,6 +1,6 @@
 //! How a mesh follows particles.
 
-use super::advect::Weighting;
+use super::track::advect::Weighting;
 use crate::error::{Error, Result};
 
 /// How a mesh follows particles.

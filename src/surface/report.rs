@@ -1,7 +1,7 @@
 //! What a step of a tracker did.
 
-use super::apart::Apart;
-use super::change::Change;
+use super::topology::change::Change;
+use super::topology::uncovered_parts::Apart;
 use crate::context::PhaseTime;
 
 /// What a step did.

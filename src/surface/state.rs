@@ -2,10 +2,10 @@
 
 use xxhash_rust::xxh3::xxh3_128;
 
-use super::ahead::Ahead;
-use super::drift::{Drift, WINDOW};
-use super::improve::sizes;
 use super::params::Params;
+use super::remesh::drift::{Drift, WINDOW};
+use super::remesh::sizes;
+use super::track::prefetch::Ahead;
 use super::tracker::Tracker;
 use crate::base::bytes::{Reader, Writer};
 use crate::base::packed::{self, Magic};

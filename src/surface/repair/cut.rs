@@ -12,7 +12,7 @@ use super::polygon;
 use super::region::CellSet;
 use crate::base::DVec3;
 use crate::distance::lattice::Fixed;
-use crate::surface::cells::Coord;
+use crate::surface::particles::grid::Coord;
 
 /// Triangles a task looks at.
 const GRAIN: usize = 1024;

@@ -7,7 +7,7 @@
 use crate::base::DVec3;
 use crate::distance::lattice::{Fixed, UNITS};
 use crate::distance::winding::{Axis, passes_left};
-use crate::surface::cells::Coord;
+use crate::surface::particles::grid::Coord;
 
 /// An edge of the grid: its axis and its lesser node.
 pub type GridEdge = (usize, Coord);

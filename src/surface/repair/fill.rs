@@ -1,14 +1,14 @@
 //! The surface inside of a set of cells: marching cubes, sewn to the cut around it.
 //!
-//! On a face between two cells of the set the surface runs as in [`crate::surface::cubes`]; on an outer face it runs where the cut
+//! On a face between two cells of the set the surface runs as in [`crate::surface::level_set::marching_cubes`]; on an outer face it runs where the cut
 //! does, point by point. In each cell these ways join to rings, which triangles fill. Two cells have the same points on the face
 //! between them, and cells and cut those on outer faces: what comes out is closed.
 
 use super::cut::{Cut, Shape, Trouble};
 use super::exact::{GridEdge, GridFace, Point, around};
 use super::region::{CellSet, Inside};
-use crate::surface::cells::Coord;
-use crate::surface::cubes::{Edge, FACES, cases, filled, lines};
+use crate::surface::level_set::marching_cubes::{Edge, FACES, cases, filled, lines};
+use crate::surface::particles::grid::Coord;
 
 /// How near to a node a rebuilt surface may pass an edge of the grid (cells): nearer, triangles would be slivers.
 const NEAR: f64 = 0.02;

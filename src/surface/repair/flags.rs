@@ -11,7 +11,7 @@ use crate::base::topology::{bodies, faulty};
 use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::Result;
-use crate::surface::cells::Coord;
+use crate::surface::particles::grid::Coord;
 
 /// Pierces so near to each other are at one place (cells).
 const TOGETHER: f64 = 1e-6;

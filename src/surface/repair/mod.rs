@@ -46,7 +46,7 @@ use self::draft::{Draft, sewn};
 use self::fill::{Rim, fill};
 use self::prepare::{Closed, prepare};
 use self::region::grow;
-use super::cells::Coord;
+use super::particles::grid::Coord;
 use crate::base::topology::Topology;
 use crate::base::{DVec3, TriMesh, Vec3};
 use crate::context::Context;

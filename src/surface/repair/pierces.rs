@@ -6,7 +6,7 @@ use super::exact::{GridEdge, cell_of};
 use crate::distance::Face;
 use crate::distance::lattice::Fixed;
 use crate::distance::winding::{Axis, each_crossing};
-use crate::surface::cells::Coord;
+use crate::surface::particles::grid::Coord;
 
 /// Triangles a task looks at.
 const GRAIN: usize = 2048;

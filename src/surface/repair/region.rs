@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use super::exact::{GridEdge, around, end};
 use super::pierces::Pierces;
 use crate::base::blocks::{Mask, origin_of};
-use crate::surface::cells::Coord;
+use crate::surface::particles::grid::Coord;
 
 /// A set of cells, in blocks of 8 x 8 x 8.
 #[derive(Debug, Clone, Default)]

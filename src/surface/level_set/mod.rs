@@ -1,0 +1,14 @@
+//! The particles' surface: an implicit function of them, signed distances from where it is 0, and its triangles.
+
+pub(in crate::surface) mod band;
+pub(in crate::surface) mod implicit;
+pub(in crate::surface) mod isosurface;
+pub(in crate::surface) mod kernel;
+pub(in crate::surface) mod marching_cubes;
+#[cfg(feature = "vdb")]
+pub(in crate::surface) mod openvdb;
+pub(in crate::surface) mod sampler;
+pub(in crate::surface) mod smooth;
+#[cfg(feature = "vdb")]
+pub(in crate::surface) mod spheres;
+mod thickness;

@@ -1,0 +1,264 @@
+//! Smoothing that keeps volume (Taubin 1995, "A signal processing approach to fair surface design"): vertices go toward the mean of
+//! their neighbours, then a little farther back. Lumps a few edges long go first, shapes that are longer stay.
+//!
+//! That pair of steps still shrinks drops of a few triangles, so each connected part gets its volume back after every pass. A small
+//! one may lose some of its axes faster than others, and would become a needle or a plate by that: it stops before.
+
+use rayon::prelude::*;
+
+use crate::base::{DVec3, TriMesh};
+use crate::context::Context;
+use crate::error::Result;
+use crate::surface::particles::specks::root;
+
+/// Frequency (0 to 2; 0 is a constant) up to which a pass takes nothing away: k_PB.
+const PASS_BAND: f64 = 0.01;
+/// Share of the way to the mean of the neighbours: lambda.
+const SHRINK: f64 = 0.63;
+/// The way back: mu, of 1 / lambda + 1 / mu = k_PB.
+const GROW: f64 = 1.0 / (PASS_BAND - 1.0 / SHRINK);
+/// Largest factor by which a pass may stretch a part; one that lost more is degenerate.
+const MOST: f64 = 4.0;
+/// How far from its centre a part may reach, of how far it did at the start.
+const FARTHEST: f64 = 1.1;
+/// Vertices of a task.
+const PIECE: usize = 1024;
+
+/// Smooths a closed mesh in `passes` passes; each of its connected parts keeps its volume. A part that a pass would
+/// take farther from its centre than 1.1 times what it reached at the start stays as it was before that pass: it is as smooth as it
+/// gets. Triangles stay as they are.
+///
+/// # Errors
+/// Cancel.
+pub fn smooth(ctx: &Context, mesh: &mut TriMesh, passes: u32) -> Result<()> {
+    let rings = Rings::of(mesh);
+    let parts = Parts::of(mesh);
+    let mut places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
+    let volumes = parts.volumes(&places, &mesh.triangles, &parts.centres(&places));
+    let reaches = parts.reaches(&places);
+    let mut is_done = vec![false; reaches.len()];
+    for _ in 0..passes {
+        ctx.check()?;
+        let mut moved = rings.moved(&rings.moved(&places, SHRINK), GROW);
+        parts.restore(&mut moved, &mesh.triangles, &volumes);
+        for (is_done, (now, first)) in is_done.iter_mut().zip(parts.reaches(&moved).iter().zip(&reaches)) {
+            *is_done |= *now > FARTHEST * first;
+        }
+        parts.take(&mut places, &moved, &is_done);
+    }
+    mesh.positions = places.iter().map(|place| place.cast()).collect();
+    Ok(())
+}
+
+/// The neighbours of each vertex, one vertex after another.
+struct Rings {
+    /// For each vertex its first neighbour; then the count of all.
+    starts: Vec<u32>,
+    neighbours: Vec<u32>,
+}
+
+impl Rings {
+    /// In a closed mesh each edge is run along both ways: every vertex has each of its neighbours once.
+    fn of(mesh: &TriMesh) -> Self {
+        let edges = || mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let mut starts = vec![0u32; mesh.positions.len() + 1];
+        edges().for_each(|[from, _]| starts[from as usize + 1] += 1);
+        for vertex in 1..starts.len() {
+            starts[vertex] += starts[vertex - 1];
+        }
+        let mut ends = starts.clone();
+        let mut neighbours = vec![0; mesh.triangles.len() * 3];
+        for [from, to] in edges() {
+            let end = &mut ends[from as usize];
+            neighbours[*end as usize] = to;
+            *end += 1;
+        }
+        Self { starts, neighbours }
+    }
+
+    /// Places after a step of a share of the way toward the means of the neighbours.
+    fn moved(&self, places: &[DVec3], share: f64) -> Vec<DVec3> {
+        let step = |(vertex, here): (usize, &DVec3)| {
+            let ring = &self.neighbours[self.starts[vertex] as usize..self.starts[vertex + 1] as usize];
+            if ring.is_empty() {
+                return *here;
+            }
+            let sum: DVec3 = ring.iter().map(|&at| places[at as usize]).sum();
+            here + (sum / ring.len() as f64 - here) * share
+        };
+        places.par_iter().enumerate().with_min_len(PIECE).map(step).collect()
+    }
+}
+
+/// The connected parts of a mesh.
+struct Parts {
+    /// The part of each vertex, counted in the order of their first vertices.
+    of: Vec<u32>,
+    count: usize,
+}
+
+impl Parts {
+    fn of(mesh: &TriMesh) -> Self {
+        let mut parent: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+        for &[a, b, c] in &mesh.triangles {
+            for other in [b, c] {
+                let [one, two] = [a, other].map(|vertex| root(&mut parent, vertex));
+                // The lesser is the root: it comes first.
+                parent[one.max(two) as usize] = one.min(two);
+            }
+        }
+        let mut of = vec![0; parent.len()];
+        let mut count = 0;
+        for vertex in 0..parent.len() {
+            let root = root(&mut parent, vertex as u32) as usize;
+            of[vertex] = if root == vertex { count } else { of[root] };
+            count += u32::from(root == vertex);
+        }
+        Self { of, count: count as usize }
+    }
+
+    /// The mean of each part's vertices.
+    fn centres(&self, places: &[DVec3]) -> Vec<DVec3> {
+        let mut sums = vec![(DVec3::zeros(), 0.0); self.count];
+        for (place, &part) in places.iter().zip(&self.of) {
+            let (sum, count) = &mut sums[part as usize];
+            *sum += place;
+            *count += 1.0;
+        }
+        sums.into_iter().map(|(sum, count)| sum / count).collect()
+    }
+
+    /// Greatest distance (m) of each part's vertices from its centre.
+    fn reaches(&self, places: &[DVec3]) -> Vec<f64> {
+        let centres = self.centres(places);
+        let mut squares = vec![0.0f64; centres.len()];
+        for (place, &part) in places.iter().zip(&self.of) {
+            let square = &mut squares[part as usize];
+            *square = square.max((place - centres[part as usize]).norm_squared());
+        }
+        squares.into_iter().map(f64::sqrt).collect()
+    }
+
+    /// Moves the parts that are not done.
+    fn take(&self, places: &mut [DVec3], moved: &[DVec3], is_done: &[bool]) {
+        for ((place, moved), &part) in places.iter_mut().zip(moved).zip(&self.of) {
+            if !is_done[part as usize] {
+                *place = *moved;
+            }
+        }
+    }
+
+    /// Volume that each part encloses (m3), by the divergence theorem about its centre; that of a cavity is below 0.
+    fn volumes(&self, places: &[DVec3], triangles: &[[u32; 3]], centres: &[DVec3]) -> Vec<f64> {
+        let mut volumes = vec![0.0; self.count];
+        for triangle in triangles {
+            let part = self.of[triangle[0] as usize] as usize;
+            let [a, b, c] = triangle.map(|vertex| places[vertex as usize] - centres[part]);
+            volumes[part] += a.dot(&b.cross(&c)) / 6.0;
+        }
+        volumes
+    }
+
+    /// Scales each part about its centre to a volume (m3).
+    fn restore(&self, places: &mut [DVec3], triangles: &[[u32; 3]], volumes: &[f64]) {
+        let centres = self.centres(places);
+        let now = self.volumes(places, triangles, &centres);
+        let scale = |(before, now): (&f64, &f64)| {
+            let scale = libm::cbrt(before / now);
+            if (1.0 / MOST..=MOST).contains(&scale) { scale } else { 1.0 }
+        };
+        let scales: Vec<f64> = volumes.iter().zip(&now).map(scale).collect();
+        for (place, &part) in places.iter_mut().zip(&self.of) {
+            let centre = centres[part as usize];
+            *place = centre + (*place - centre) * scales[part as usize];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Vec3;
+    use crate::context::Pool;
+
+    /// An octahedron with its corners so far from a centre (m).
+    fn octahedron(centre: [f32; 3], size: f32) -> TriMesh {
+        let corners = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]];
+        let position =
+            |corner: [i32; 3]| Vec3::from([0, 1, 2].map(|axis| centre[axis] + size * corner[axis] as f32));
+        let triangle = |n: u32| {
+            let [a, b, c] = [0, 1, 2].map(|axis| axis + 3 * (n >> axis & 1));
+            if n.count_ones().is_multiple_of(2) { [a, b, c] } else { [a, c, b] }
+        };
+        TriMesh {
+            positions: corners.into_iter().map(position).collect(),
+            triangles: (0..8).map(triangle).collect(),
+        }
+    }
+
+    /// A drop (m): rings of corners around y between two ends, longer along x than along z.
+    fn spindle(rings: u32, sides: u32) -> TriMesh {
+        let end = 1 + rings * sides;
+        let ring = |n: u32| {
+            let (ring, side) = (n / sides, n % sides);
+            let angle = std::f64::consts::TAU * f64::from(side) / f64::from(sides);
+            let height = 0.7 * ((2 * ring + 1) as f32 / rings as f32 - 1.0);
+            Vec3::new(1.1 * libm::cos(angle) as f32, height, 0.9 * libm::sin(angle) as f32) * 0.01
+        };
+        let mut positions = vec![Vec3::new(0.0, -0.01, 0.0)];
+        positions.extend((0..rings * sides).map(ring));
+        positions.push(Vec3::new(0.0, 0.01, 0.0));
+        let mut triangles = Vec::new();
+        for side in 0..sides {
+            let at = |ring: u32, step: u32| 1 + ring * sides + (side + step) % sides;
+            triangles.push([0, at(0, 0), at(0, 1)]);
+            for ring in 1..rings {
+                let [a, b, c, d] = [at(ring - 1, 0), at(ring - 1, 1), at(ring, 0), at(ring, 1)];
+                triangles.extend([[a, d, b], [a, c, d]]);
+            }
+            triangles.push([at(rings - 1, 0), end, at(rings - 1, 1)]);
+        }
+        TriMesh { positions, triangles }
+    }
+
+    #[test]
+    fn a_small_drop_and_a_small_cavity_become_no_needles() {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        for (mut mesh, corners) in [(spindle(1, 6).reversed(), 8), (spindle(2, 4), 10)] {
+            assert!(mesh.is_closed() && mesh.positions.len() == corners);
+            let far = |mesh: &TriMesh| {
+                let middle = mesh.positions.iter().sum::<Vec3>() / corners as f32;
+                mesh.positions.iter().map(|place| (place - middle).norm()).fold(0.0, f32::max)
+            };
+            let (reach, volume) = (far(&mesh), mesh.volume());
+            smooth(&ctx, &mut mesh, 100).unwrap();
+            assert!(far(&mesh) < 1.101 * reach, "{corners} corners: {} of {reach}", far(&mesh));
+            assert!((mesh.volume() / volume - 1.0).abs() < 1e-3, "{} is not {volume}", mesh.volume());
+        }
+    }
+
+    #[test]
+    fn the_smallest_drop_and_its_larger_neighbour_keep_their_volumes() {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        let mut mesh = octahedron([0.0; 3], 0.01);
+        mesh.append(&octahedron([5.0, 1.0, 0.0], 0.02));
+        // A corner that sticks out.
+        mesh.positions[6].x += 0.01;
+        let volume = |mesh: &TriMesh, range: std::ops::Range<usize>| {
+            TriMesh { positions: mesh.positions.clone(), triangles: mesh.triangles[range].to_vec() }.volume()
+        };
+        let before = [volume(&mesh, 0..8), volume(&mesh, 8..16)];
+        assert!(before[0] > 0.0 && before[1] > before[0]);
+        smooth(&ctx, &mut mesh, 20).unwrap();
+        let after = [volume(&mesh, 0..8), volume(&mesh, 8..16)];
+        for (before, after) in before.into_iter().zip(after) {
+            assert!((after / before - 1.0).abs() < 1e-3, "{after} is not {before}");
+        }
+        // What stuck out has gone: opposite corners are about as far from the middle.
+        let far = |vertex: usize| {
+            let middle = mesh.positions[6..].iter().sum::<Vec3>() / 6.0;
+            (mesh.positions[vertex] - middle).norm()
+        };
+        assert!((far(6) / far(9) - 1.0).abs() < 0.2, "{} is not {}", far(6), far(9));
+    }
+}

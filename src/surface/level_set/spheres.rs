@@ -1,0 +1,120 @@
+//! The union of spheres around particles: what surfacers made before there were smooth ones, and the fastest look at a liquid.
+
+use rayon::prelude::*;
+
+use super::openvdb::HALF_WIDTH;
+use crate::base::DVec3;
+use crate::base::blocks::{DIM, VOXELS};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::vdb::FloatGrid;
+use crate::vdb::level_set::from_particles;
+
+/// Least radius (cells): OpenVDB leaves smaller spheres out, as they may lie between nodes.
+const LEAST: f64 = 1.5;
+/// Greatest radius (cells): the inside of each sphere is filled node by node.
+const MOST: f64 = 100.0;
+/// Room for rounding: OpenVDB gets radii of 32 bits.
+const ROUNDING: f64 = 1e-6;
+/// Farthest node from the origin, on each axis.
+const FARTHEST: f64 = (1 << 29) as f64;
+/// Bytes of a block: its nodes, in the grid and in a thread's part of it.
+const BYTES: u64 = 2 * (4 * VOXELS as u64 + 100);
+/// What needs the memory, for messages.
+const WHAT: &str = "the spheres around particles (larger cells need less)";
+
+/// Whether spheres of a radius (m) can be made on cells of an edge (m): 1.5 to 100 cells are.
+pub fn is_sphere_radius(radius: f64, cell: f64) -> bool {
+    (LEAST * (1.0 - ROUNDING)..=MOST).contains(&(radius / cell))
+}
+
+/// Level set (m) of the union of spheres of a radius (m) around places (m), on cells of `cell` (m), with a band of three of them on
+/// each side. Where spheres overlap, values inside are nearer to 0 than the true distance.
+///
+/// # Errors
+/// A radius that is not within 1.5 to 100 cells; a place that is not finite or too far from the origin; more memory than the
+/// context allows; cancel.
+pub fn spheres(ctx: &Context, places: &[DVec3], radius: f64, cell: f64) -> Result<FloatGrid> {
+    let cells = radius / cell;
+    if !is_sphere_radius(radius, cell) {
+        return Err(Error::argument(format!(
+            "spheres of {radius} m have a radius of {cells:.3} cells of {cell} m: it must be 1.5 to 100"
+        )));
+    }
+    let is_near = |place: &DVec3| place.iter().all(|x| x.abs() + radius < FARTHEST * cell);
+    if let Some(far) = places.iter().position(|place| !is_near(place)) {
+        return Err(Error::argument(format!(
+            "particle {} is not finite, or too far from the origin for cells of {cell} m",
+            far + 1
+        )));
+    }
+    ctx.allow(WHAT, most_blocks(places, cells + f64::from(HALF_WIDTH), cell).saturating_mul(BYTES))?;
+    let radius = radius.max(LEAST * cell * (1.0 + ROUNDING)) as f32;
+    let mut grid = from_particles(ctx, places, &vec![radius; places.len()], cell, HALF_WIDTH)?;
+    grid.set_name("surface")?;
+    Ok(grid)
+}
+
+/// At most so many blocks are within `reach` (cells) of places (m): cubes of whole blocks that are as long as that, and those
+/// beside them.
+fn most_blocks(places: &[DVec3], reach: f64, cell: f64) -> u64 {
+    let blocks = (reach / DIM as f64).ceil();
+    let edge = blocks * DIM as f64 * cell;
+    let cube = |place: &DVec3| [0, 1, 2].map(|axis| (place[axis] / edge).floor() as i32);
+    let mut cubes: Vec<[i32; 3]> = places.par_iter().map(cube).collect();
+    cubes.par_sort_unstable();
+    cubes.dedup();
+    let around =
+        |[x, y, z]: [i32; 3]| (0..27).map(move |n| [x + n / 9 - 1, y + n / 3 % 3 - 1, z + n % 3 - 1]);
+    let mut cubes: Vec<[i32; 3]> = cubes.into_iter().flat_map(around).collect();
+    cubes.par_sort_unstable();
+    cubes.dedup();
+    cubes.len() as u64 * (blocks as u64).pow(3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::Pool;
+    use crate::vdb::level_set::{measure, to_mesh};
+
+    fn context() -> Context {
+        Context::new(Pool::new(2).unwrap())
+    }
+
+    #[test]
+    fn a_sphere_has_its_volume_and_two_apart_have_twice_that() {
+        let ctx = context();
+        let ball = 4.0 / 3.0 * std::f64::consts::PI * 0.2f64.powi(3);
+        for (places, count) in
+            [(vec![DVec3::repeat(0.013)], 1.0), (vec![DVec3::zeros(), DVec3::new(0.5, 0.0, 0.0)], 2.0)]
+        {
+            let grid = spheres(&ctx, &places, 0.2, 0.0125).unwrap();
+            let volumes =
+                [measure(&ctx, &grid).unwrap().volume, to_mesh(&ctx, &grid, 0.0, 0.0).unwrap().volume()];
+            for volume in volumes {
+                assert!((volume / (count * ball) - 1.0).abs() < 0.02, "{volume} is not {count} of {ball}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_least_sphere_is_there_and_what_is_out_of_range_is_refused() {
+        let ctx = context();
+        // A quotient of 1.5 that rounding takes below it.
+        for cell in [0.05, 0.0333, 0.7] {
+            let grid = spheres(&ctx, &[DVec3::zeros()], 1.5 * cell, cell).unwrap();
+            assert!(grid.value([0; 3]) < 0.0, "{cell}");
+        }
+        let said = |places: &[DVec3], radius: f64, ctx: &Context| {
+            spheres(ctx, places, radius, 0.1).err().unwrap().to_string()
+        };
+        assert!(said(&[DVec3::zeros()], 0.14, &ctx).contains("1.5 to 100"));
+        assert!(said(&[DVec3::zeros()], 11.0, &ctx).contains("1.5 to 100"));
+        assert!(said(&[DVec3::zeros(), DVec3::repeat(1e9)], 0.2, &ctx).contains("particle 2"));
+        assert!(said(&[DVec3::repeat(f64::NAN)], 0.2, &ctx).contains("particle 1"));
+        let small = context();
+        small.set_memory_limit(1 << 16);
+        assert!(said(&[DVec3::zeros()], 0.2, &small).contains("limit"));
+    }
+}

@@ -1,0 +1,140 @@
+//! How thick the liquid is around a node, so that sheets and threads thinner than particles are apart keep their volume.
+//!
+//! Solenthaler et al. (2007) put the surface where the particles' mean is one spacing r away. That is right above a body, whose mean lies
+//! r deep. The mean of a sheet lies in its middle, and its surface would be r from there however thin the sheet is. Half of its
+//! thickness takes the place of r where that is less.
+//!
+//! The thickness is told by the particles' mass, r^3 each, and by how they spread: in a sheet of thickness w the sum of q^2 (q = 1 - d^2 / R^2)
+//! is w pi R^2 Q^3 / 3 / r^3, Q being q at the sheet's middle, and the variance along the sheet is R^2 Q / 8. Where they spread less than that,
+//! at rims, in ribbons and threads, they fill less of the sheet, and it is thicker by as much.
+
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+
+use super::kernel::SUPPORT;
+
+/// The least distance of a surface from a sheet's middle (cells). Nodes inside of a sheet must be neighbours along edges of the grid, or
+/// marching cubes cut it to pieces: whatever its direction, its sides must be apart by a diagonal of a cell's face.
+const LEAST: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// Sums over the particles around a node, weighted by q^2; lengths are in cells.
+#[derive(Debug)]
+pub struct Spread {
+    /// Of weights.
+    pub weight: f64,
+    /// Variances and covariances of places (cells^2).
+    pub covariance: Matrix3<f64>,
+}
+
+impl Spread {
+    /// How far from the mean the surface lies, and how far a node is from the mean (cells); `mean` is the way to it (cells), `spacing` r (cells).
+    /// In a sheet the way across counts as it is. The way along it counts less, up to r, where its rim is.
+    pub fn offset(&self, mean: Vector3<f64>, spacing: f64) -> (f64, f64) {
+        let thick = (spacing, mean.norm());
+        // Farther than a cell from where a surface can be, or no sheet.
+        if mean.norm() > spacing + 1.0 || self.is_thick(mean, spacing) {
+            return thick;
+        }
+        let SymmetricEigen { eigenvalues: variances, eigenvectors: axes } = self.covariance.symmetric_eigen();
+        let least = variances.imin();
+        let [a, b] = [1, 2].map(|next| variances[(least + next) % 3]);
+        let thickness = self.thickness(mean, spacing, a, b);
+        let halves = variances.map(|variance| {
+            let width = thickness.max((12.0 * variance.max(0.0)).sqrt());
+            (0.5 * width).max(LEAST).min(spacing)
+        });
+        let half = halves[least];
+        if half >= spacing {
+            return thick;
+        }
+        let mean = axes.transpose() * mean;
+        let (mut across, mut along) = (0.0, 0.0);
+        for axis in 0..3 {
+            let square = (mean[axis] / halves[axis]).powi(2);
+            let is_along = (halves[axis] - half) / (spacing - half);
+            across += (1.0 - is_along) * square;
+            along += is_along * square;
+        }
+        // As blunt at the rim as it is thin: with squares of both it would be an ellipse, whose middle wanders where particles are few.
+        (half, half * (across + libm::pow(along, spacing / half)).sqrt())
+    }
+
+    /// Whether the liquid is thicker than twice the spacing without doubt.
+    fn is_thick(&self, mean: Vector3<f64>, spacing: f64) -> bool {
+        let trace = self.covariance.trace();
+        // The least variance is the determinant by the product of the others, which is at most that of their mean.
+        if 4.0 * self.covariance.determinant() * 12.0 >= trace * trace * 4.0 * spacing * spacing {
+            return trace > 0.0;
+        }
+        self.thickness(mean, spacing, 0.5 * trace, 0.5 * trace) >= 2.0 * spacing
+    }
+
+    /// The thickness of a sheet along which variances are these (cells).
+    fn thickness(&self, mean: Vector3<f64>, spacing: f64, a: f64, b: f64) -> f64 {
+        let square = (SUPPORT * spacing).powi(2);
+        let q = 1.0 - mean.norm_squared() / square;
+        // Not less than that of one particle's cube.
+        let own = spacing * spacing / 12.0;
+        let filled = (a.max(own) * b.max(own)).sqrt() / (square * q / 8.0);
+        let area = std::f64::consts::PI * square * q.powi(3) / 3.0;
+        self.weight * spacing.powi(3) / (area * filled)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a node sees that is a way from the middle of particles that stand for a volume each, of which one is `spread` long.
+    fn seen(places: impl Iterator<Item = Vector3<f64>>) -> (Spread, Vector3<f64>) {
+        let (mut weight, mut heavy) = (0.0, 0.0);
+        let (mut mean, mut middle, mut square) = (Vector3::zeros(), Vector3::zeros(), Matrix3::zeros());
+        for d in places {
+            let q = (1.0 - d.norm_squared() / (SUPPORT * SUPPORT)).max(0.0);
+            weight += q * q;
+            heavy += q * q * q;
+            middle += d * q * q;
+            mean += d * q * q * q;
+            square += d * d.transpose() * (q * q);
+        }
+        let middle = middle / weight;
+        (Spread { weight, covariance: square / weight - middle * middle.transpose() }, mean / heavy)
+    }
+
+    #[test]
+    fn a_sheet_of_any_thickness_is_as_thick_as_its_mass() {
+        for thick in [0.65, 0.8, 1.0, 1.3, 1.7] {
+            for height in [0.0, 0.2, 0.5, 1.0] {
+                // Eight layers, drawn out until each particle has a volume of 1.
+                let apart = (8.0f64 / thick).sqrt();
+                let layer = |n: i32| (f64::from(n) + 0.5) / 8.0 * thick - 0.5 * thick - height;
+                let at = |n: i32| (f64::from(n) + 0.31) * apart;
+                let places = (0..8).flat_map(|y| {
+                    (-6..6).flat_map(move |x| {
+                        (-6..6).map(move |z| {
+                            Vector3::new(at(x) + 0.4 * f64::from(y), layer(y), at(z) + 0.7 * f64::from(y))
+                        })
+                    })
+                });
+                let (spread, mean) = seen(places);
+                let (offset, _) = spread.offset(mean, 1.0);
+                let expected = f64::max(0.5 * thick, LEAST);
+                assert!(
+                    (offset / expected - 1.0).abs() < 0.06,
+                    "{thick} at {height}: {offset} of {expected}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_body_has_the_surface_that_it_would_have_had() {
+        for height in [0.0, 0.2, 0.4, 0.6] {
+            let on = |from: i32, to: i32| (from..to).map(|n| f64::from(n) + 0.37);
+            let places = on(-6, 6).flat_map(|x| {
+                on(-6, 0).flat_map(move |y| on(-6, 6).map(move |z| Vector3::new(x, y + 0.13 - height, z)))
+            });
+            let (spread, mean) = seen(places);
+            assert_eq!(spread.offset(mean, 1.0), (1.0, mean.norm()), "{height}");
+        }
+    }
+}

@@ -1,0 +1,298 @@
+//! Whether ids, velocities and positions of two frames of particles agree: ids may be row numbers, which name other particles in
+//! every frame, and velocities may be in another unit.
+
+use std::collections::{HashMap, HashSet};
+
+use super::grid::{Coord, cell_of};
+use super::paths::Paths;
+use crate::base::DVec3;
+use crate::error::Result;
+use crate::surface::Particles;
+use crate::surface::report::StepReport;
+
+/// Particles that are sampled.
+const SAMPLES: usize = 2000;
+/// Particles beside each other that go apart by more than this in a frame (spacings), in the median, are not the same ones: in a dam
+/// break that splashes it is 0.2.
+const TORN: f64 = 1.0;
+/// Particles beside each other (spacings).
+const BESIDE: f64 = 1.5;
+/// Share of particles without another where their velocities take them, from which on velocities are not right.
+const MISSED: f64 = 0.5;
+/// Share from which on another factor is looked for, and how much better it must be.
+const SOME_MISSED: [f64; 2] = [0.05, 4.0];
+/// Factors between units: feet, ten, inches, centimetres and millimetres. The first of those that miss as few: with velocities that are
+/// too small, particles stay within the liquid too.
+const FACTORS: [f64; 10] =
+    [0.3048, 1.0 / 0.3048, 0.1, 10.0, 0.0254, 1.0 / 0.0254, 0.01, 100.0, 0.001, 1000.0];
+
+/// Where the particles of a frame go by their ids, and where by their velocities (m, medians over the particles).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mismatch {
+    /// How far they go by their ids.
+    pub by_ids: f64,
+    /// How far by their velocities.
+    pub by_velocities: f64,
+    /// How far apart both ends are.
+    pub apart: f64,
+    /// Cosine of the angle between both.
+    pub cosine: f64,
+}
+
+impl Mismatch {
+    /// Displacements shorter than this (spacings) are the trembling of particles at rest.
+    const STILL: f64 = 0.5;
+    /// Both point the same way from this cosine on.
+    const ALIGNED: f64 = 0.9;
+
+    /// A warning for particles of a spacing (m); none where both agree closely enough.
+    pub fn sentence(&self, spacing: f64) -> Option<String> {
+        if self.apart <= Self::STILL * spacing {
+            return None;
+        }
+        let [ids, velocities] = [self.by_ids, self.by_velocities].map(|length| length / spacing);
+        let why = if self.cosine > Self::ALIGNED {
+            format!(
+                "velocities are {:.3} times as large as they should be: is their unit, or the frame rate, another?",
+                self.by_velocities / self.by_ids.max(f64::MIN_POSITIVE)
+            )
+        } else {
+            "are ids row numbers, which name other particles in each frame?".to_string()
+        };
+        Some(format!(
+            "ids and velocities contradict each other: in the median particles go {ids:.2} spacings in a frame by their ids, and \
+             {velocities:.2} by their velocities; {why}"
+        ))
+    }
+}
+
+/// What contradicts itself in the particles, of a spacing (m), of two frames that are `dt` (s) apart: a sentence. None where nothing
+/// does, and where a frame has no particles.
+///
+/// # Errors
+/// Neither ids in both frames nor velocities in the first.
+pub fn disagreement(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> Result<Option<String>> {
+    if from.places.is_empty() || to.places.is_empty() {
+        return Ok(None);
+    }
+    let paths = Paths::between(from, to, dt)?;
+    if let Some(warning) = paths.mismatch.and_then(|mismatch| mismatch.sentence(spacing)) {
+        return Ok(Some(warning));
+    }
+    if from.ids.is_empty() || to.ids.is_empty() {
+        return Ok(velocities_miss(from, to, dt, spacing));
+    }
+    Ok(torn(&paths, spacing).filter(|apart| *apart > TORN).map(|apart| {
+        format!(
+            "by their ids, particles beside each other go {apart:.2} spacings apart in a frame, in the median: are ids row numbers, \
+             which name other particles in each frame?"
+        )
+    }))
+}
+
+/// Adds to a step's report that over half of the mesh was lost or made anew, and what in the particles may be the reason: `lost` of its
+/// vertices, of `all`, did not find the particles' surface. Where much of the liquid itself is gone or new, the mesh is right to be.
+///
+/// # Errors
+/// As [`disagreement`].
+pub(in crate::surface) fn warn_of_tears(
+    report: &mut StepReport,
+    (lost, all): (usize, usize),
+    (from, to, dt): (&Particles, &Particles, f64),
+    spacing: f64,
+) -> Result<()> {
+    let [old, new] = [from, to].map(|frame| frame.places.len());
+    let warnings = &mut report.mesh_warnings;
+    if 2 * lost > all && 2 * report.died <= old && 3 * new >= 2 * old {
+        warnings.push(format!("{lost} of the mesh's {all} vertices did not find the particles' surface"));
+    }
+    if let Some(change) = report.change.as_ref().filter(|_| 2 * report.born <= new && 2 * new <= 3 * old) {
+        let (made, triangles) = (change.rebuilt_triangles(), change.triangles.len());
+        if 2 * made > triangles {
+            warnings.push(format!("{made} of the mesh's {triangles} triangles were made anew"));
+        }
+    }
+    if !warnings.is_empty() && report.particle_warning.is_none() {
+        report.particle_warning = disagreement(from, to, dt, spacing)?;
+    }
+    Ok(())
+}
+
+/// By how much (spacings) particles beside each other go apart, in the median.
+fn torn(paths: &Paths, spacing: f64) -> Option<f64> {
+    let (mut from, mut to) = (Vec::new(), Vec::new());
+    paths.at(0.0, &mut from);
+    paths.at(1.0, &mut to);
+    let edge = BESIDE * spacing;
+    let bin = |place: &DVec3| cell_of(&(place / edge));
+    let sampled = samples(from.len());
+    let mut near: HashMap<Coord, Vec<usize>> =
+        sampled.clone().flat_map(|at| around(bin(&from[at]))).map(|cell| (cell, Vec::new())).collect();
+    for (at, place) in from.iter().enumerate() {
+        if let Some(list) = near.get_mut(&bin(place)) {
+            list.push(at);
+        }
+    }
+    let apart = |at: usize| {
+        let others = around(bin(&from[at])).into_iter().filter_map(|cell| near.get(&cell)).flatten();
+        let beside = others
+            .filter(|other| **other != at)
+            .map(|other| ((from[*other] - from[at]).norm(), *other))
+            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+            .filter(|(distance, _)| *distance <= edge)?;
+        Some(((to[at] - from[at]) - (to[beside.1] - from[beside.1])).norm() / spacing)
+    };
+    let mut all: Vec<f64> = sampled.filter_map(apart).collect();
+    if all.is_empty() {
+        return None;
+    }
+    let middle = all.len() / 2;
+    Some(*all.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// A warning that velocities take particles to where no others are.
+fn velocities_miss(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> Option<String> {
+    let bin = |place: &DVec3| cell_of(&(place / spacing));
+    let filled = |frame: &Particles| -> HashSet<Coord> { frame.places.iter().map(bin).collect() };
+    let (old, new) = (filled(from), filled(to));
+    // Where the liquid goes there must be some, and where it is some must have come from.
+    let missed = |frame: &Particles, other: &HashSet<Coord>, time: f64| {
+        let goes = |at: usize| frame.places[at] + DVec3::from(frame.velocities[at].map(f64::from)) * time;
+        let is_missed = |at: &usize| !around(bin(&goes(*at))).iter().any(|cell| other.contains(cell));
+        let sampled = samples(frame.places.len());
+        sampled.clone().filter(is_missed).count() as f64 / sampled.count() as f64
+    };
+    let share = |factor: f64| {
+        let ahead = missed(from, &new, factor * dt);
+        let back = if to.velocities.is_empty() { ahead } else { missed(to, &old, -factor * dt) };
+        ahead.max(back)
+    };
+    let own = share(1.0);
+    if own <= SOME_MISSED[0] {
+        return None;
+    }
+    let (best, factor) =
+        FACTORS.map(|factor| (share(factor), factor)).into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let percent = 100.0 * own;
+    if best * SOME_MISSED[1] < own {
+        return Some(format!(
+            "velocities take {percent:.0} % of the particles to where no others are a frame later; {:.0} % with velocities {factor:.4} \
+             times as large: is their unit another?",
+            100.0 * best
+        ));
+    }
+    (own > MISSED).then(|| {
+        format!(
+            "velocities take {percent:.0} % of the particles to where no others are a frame later: is their unit, or the frame rate, \
+             another?"
+        )
+    })
+}
+
+/// Some of so many particles, evenly.
+fn samples(count: usize) -> impl Iterator<Item = usize> + Clone {
+    (0..count).step_by(count.div_ceil(SAMPLES).max(1))
+}
+
+/// A cell and those beside it.
+fn around(cell: Coord) -> [Coord; 27] {
+    std::array::from_fn(|n| {
+        let n = n as i32;
+        [cell[0] + n / 9 - 1, cell[1] + n / 3 % 3 - 1, cell[2] + n % 3 - 1]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::balls::shell;
+
+    const DT: f64 = 1.0 / 24.0;
+
+    /// A ball of particles, 0.1 m apart, that falls and turns at a frame, with its velocities times a factor.
+    fn ball(frame: i32, factor: f64) -> Particles {
+        let time = f64::from(frame) * DT;
+        let (turn, fall) = (2.0 * time, DVec3::new(0.3, -1.0 - 4.9 * time, 0.0) * time);
+        let (s, c) = (libm::sin(turn), libm::cos(turn));
+        let turned = |p: DVec3| DVec3::new(c * p.x + s * p.z, p.y, c * p.z - s * p.x);
+        let first = shell(DVec3::zeros(), 0.0, 6.3);
+        let places: Vec<DVec3> = first.iter().map(|p| turned(p * 0.1) + fall).collect();
+        let speed = |p: &DVec3| {
+            let arm = p - fall;
+            (DVec3::new(2.0 * arm.z, 0.0, -2.0 * arm.x) + DVec3::new(0.3, -1.0 - 9.8 * time, 0.0)) * factor
+        };
+        let velocities = places.iter().map(|p| speed(p).cast::<f32>().into()).collect();
+        Particles { ids: (0..places.len() as i64).collect(), places, velocities }
+    }
+
+    fn warning(from: &Particles, to: &Particles) -> Option<String> {
+        disagreement(from, to, DT, 0.1).unwrap()
+    }
+
+    fn without_ids(particles: &Particles) -> Particles {
+        Particles { ids: Vec::new(), ..particles.clone() }
+    }
+
+    fn without_velocities(particles: &Particles) -> Particles {
+        Particles { velocities: Vec::new(), ..particles.clone() }
+    }
+
+    #[test]
+    fn particles_that_agree_raise_no_warning() {
+        for frame in 0..12 {
+            let (from, to) = (ball(frame, 1.0), ball(frame + 1, 1.0));
+            assert_eq!(warning(&from, &to), None);
+            assert_eq!(warning(&without_ids(&from), &without_ids(&to)), None);
+            assert_eq!(warning(&without_velocities(&from), &without_velocities(&to)), None);
+            assert_eq!(warning(&from, &Particles::default()), None);
+        }
+    }
+
+    #[test]
+    fn velocities_in_another_unit_are_reported_with_their_factor() {
+        for factor in [100.0, 0.01, 3.28084] {
+            let (from, to) = (ball(3, factor), ball(4, factor));
+            let what = warning(&from, &to).unwrap();
+            let (before, _) = what.split_once(" times as large").unwrap();
+            let factor_found: f64 = before.rsplit(' ').next().unwrap().parse().unwrap();
+            // Paths of particles that turn are curved.
+            assert!(
+                (factor_found / factor - 1.0).abs() < 1e-3 || (factor_found - factor).abs() < 6e-4,
+                "{what}"
+            );
+        }
+        for (factor, words) in [(100.0, "0.0100 times"), (1000.0, "0.0010 times")] {
+            let what = warning(&without_ids(&ball(3, factor)), &without_ids(&ball(4, factor))).unwrap();
+            assert!(what.contains(words), "{what}");
+        }
+    }
+
+    #[test]
+    fn ids_that_are_rows_are_reported() {
+        // Those in the first rows go, so that all others move up, or rows come in any order.
+        let rows = |from: &Particles, to: &Particles| {
+            let shifted = |frame: &Particles, by: usize| {
+                let count = frame.places.len() - by;
+                Particles {
+                    places: frame.places[by..].to_vec(),
+                    velocities: frame.velocities.get(by..).unwrap_or_default().to_vec(),
+                    ids: (0..count as i64).collect(),
+                }
+            };
+            let mixed = |frame: &Particles| {
+                let count = frame.places.len();
+                let row = |n: usize| (n * 7919 + 13) % count;
+                Particles { places: (0..count).map(|n| frame.places[row(n)]).collect(), ..frame.clone() }
+            };
+            [(shifted(from, 0), shifted(to, 29)), (from.clone(), mixed(to))]
+        };
+        let (from, to) = (ball(3, 1.0), ball(4, 1.0));
+        for (from, to) in rows(&from, &to) {
+            let what = warning(&from, &to).unwrap();
+            assert!(what.contains("row numbers"), "{what}");
+        }
+        let (_, mixed) = &rows(&without_velocities(&from), &without_velocities(&to))[1];
+        let what = warning(&without_velocities(&from), mixed).unwrap();
+        assert!(what.contains("row numbers"), "{what}");
+    }
+}

@@ -1,0 +1,270 @@
+//! The way of each particle from one frame to the next.
+//!
+//! Particles are matched by id: files hold them in another order in each frame. With velocities a way is a cubic that begins and ends
+//! with these (Hermite), otherwise a line. Without ids it is the velocity times the time.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::agreement::Mismatch;
+use crate::base::DVec3;
+use crate::error::{Error, Result};
+use crate::surface::Particles;
+
+/// The ways of particles that are there in both frames.
+#[derive(Debug, Default)]
+pub struct Paths {
+    from: Vec<DVec3>,
+    to: Vec<DVec3>,
+    /// Velocities times the time between the frames (m), at both ends; none: ways are lines.
+    speeds: Vec<[DVec3; 2]>,
+    /// What tells particles at the same place apart.
+    ranks: Vec<i64>,
+    /// What velocities say where that is not what places say: they are then left out.
+    pub mismatch: Option<Mismatch>,
+    /// Particles of the first frame that end, and of the second that are new.
+    pub died: usize,
+    /// See `died`.
+    pub born: usize,
+}
+
+/// Ways are cubics if the velocities say, in the median, where particles go up to this share of the way.
+const TRUSTED: f64 = 0.5;
+
+impl Paths {
+    /// From one frame to the next, `dt` (s) later. Where the second has no particles, those of the first go on with their velocities, if
+    /// they have any.
+    ///
+    /// # Errors
+    /// Neither ids in both frames nor velocities in the first.
+    pub fn between(from: &Particles, to: &Particles, dt: f64) -> Result<Self> {
+        let (died, born) = (from.places.len(), to.places.len());
+        if died == 0 || born == 0 && from.velocities.is_empty() {
+            return Ok(Self { died, born, ..Self::default() });
+        }
+        if born == 0 {
+            return Ok(Self { died, ..Self::by_velocity(from, dt)? });
+        }
+        if from.ids.is_empty() || to.ids.is_empty() {
+            return Self::by_velocity(from, dt);
+        }
+        let sorted = |ids: &[i64]| {
+            let mut order: Vec<(i64, u32)> = ids.iter().copied().zip(0..).collect();
+            order.par_sort_unstable();
+            order
+        };
+        let (old, new) = (sorted(&from.ids), sorted(&to.ids));
+        let mut out = Self::default();
+        let has_speeds = !from.velocities.is_empty() && !to.velocities.is_empty();
+        let speed =
+            |frame: &Particles, at: u32| DVec3::from(frame.velocities[at as usize].map(f64::from)) * dt;
+        let mut next = 0;
+        for (id, at) in old {
+            while new.get(next).is_some_and(|(other, _)| *other < id) {
+                next += 1;
+            }
+            let Some((_, then)) = new.get(next).filter(|(other, _)| *other == id) else {
+                out.died += 1;
+                continue;
+            };
+            out.from.push(from.places[at as usize]);
+            out.to.push(to.places[*then as usize]);
+            out.ranks.push(id);
+            if has_speeds {
+                out.speeds.push([speed(from, at), speed(to, *then)]);
+            }
+        }
+        out.born = to.places.len() - out.from.len();
+        out.mismatch = out.mismatched();
+        if out.mismatch.is_some() {
+            out.speeds.clear();
+        }
+        Ok(out)
+    }
+
+    fn by_velocity(from: &Particles, dt: f64) -> Result<Self> {
+        if from.velocities.is_empty() {
+            return Err(Error::argument(
+                "particles have neither ids in both frames nor velocities: what moves where is not known",
+            ));
+        }
+        let ways = from.velocities.iter().map(|speed| DVec3::from(speed.map(f64::from)) * dt);
+        let to = from.places.iter().zip(ways).map(|(place, way)| place + way).collect();
+        let ranks = vec![0; from.places.len()];
+        Ok(Self { from: from.places.clone(), to, ranks, ..Self::default() })
+    }
+
+    /// What velocities say where they are not in the unit and at the time that the places say.
+    fn mismatched(&self) -> Option<Mismatch> {
+        let speed = |n: usize| (self.speeds[n][0] + self.speeds[n][1]) * 0.5;
+        let way = |n: usize| self.to[n] - self.from[n];
+        let median = |of: &dyn Fn(usize) -> f64| {
+            let mut all: Vec<f64> = (0..self.speeds.len()).map(of).collect();
+            let middle = all.len() / 2;
+            if all.is_empty() { 0.0 } else { *all.select_nth_unstable_by(middle, f64::total_cmp).1 }
+        };
+        let apart = median(&|n| (speed(n) - way(n)).norm());
+        let by_ids = median(&|n| way(n).norm());
+        if apart <= TRUSTED * by_ids {
+            return None;
+        }
+        let by_velocities = median(&|n| speed(n).norm());
+        let cosine = median(&|n| {
+            let lengths = speed(n).norm() * way(n).norm();
+            if lengths > 0.0 { speed(n).dot(&way(n)) / lengths } else { 0.0 }
+        });
+        Some(Mismatch { by_ids, by_velocities, apart, cosine })
+    }
+
+    /// Count of ways.
+    pub fn count(&self) -> usize {
+        self.from.len()
+    }
+
+    /// What tells particles at the same place apart.
+    pub fn rank(&self, path: u32) -> i64 {
+        self.ranks[path as usize]
+    }
+
+    /// Greatest distance (m) that a particle moves.
+    pub fn farthest(&self) -> f64 {
+        let each = (0..self.count()).into_par_iter().with_min_len(4096);
+        each.map(|n| {
+            let way = (self.to[n] - self.from[n]).norm();
+            self.speeds.get(n).map_or(way, |[a, b]| way.max(a.norm()).max(b.norm()))
+        })
+        .reduce(|| 0.0, f64::max)
+    }
+
+    /// Places (m) at a share 0..=1 of the time.
+    pub fn at(&self, share: f64, out: &mut Vec<DVec3>) {
+        let place = |n: usize| {
+            let (from, to) = (self.from[n], self.to[n]);
+            match self.speeds.get(n) {
+                // The ends are exact.
+                _ if share <= 0.0 => from,
+                _ if share >= 1.0 => to,
+                None => from + (to - from) * share,
+                Some([a, b]) => {
+                    let (s, s2, s3) = (share, share * share, share * share * share);
+                    from + (to - from) * (3.0 * s2 - 2.0 * s3) + a * (s3 - 2.0 * s2 + s) + b * (s3 - s2)
+                }
+            }
+        };
+        (0..self.count()).into_par_iter().with_min_len(4096).map(place).collect_into_vec(out);
+    }
+}
+
+/// The particles between two frames of a cache that are `dt` (s) apart, at a share 0..1 of the time: those that are there in both, and
+/// those of the first that end.
+///
+/// # Errors
+/// Neither ids in both frames nor velocities in the first.
+pub fn interpolate(from: &Particles, to: &Particles, dt: f64, share: f64) -> Result<Particles> {
+    if from.places.is_empty() {
+        return Ok(Particles::default());
+    }
+    if to.places.is_empty() && from.velocities.is_empty() {
+        return Ok(from.clone());
+    }
+    if from.ids.is_empty() || to.ids.is_empty() {
+        let mut places = Vec::new();
+        Paths::by_velocity(from, dt)?.at(share, &mut places);
+        return Ok(Particles { places, ..from.clone() });
+    }
+    let paths = Paths::between(from, to, dt)?;
+    let mut out = Particles { ids: paths.ranks.clone(), ..Particles::default() };
+    paths.at(share, &mut out.places);
+    let row = |frame: &Particles| -> HashMap<i64, usize> { frame.ids.iter().copied().zip(0..).collect() };
+    let (old, new) = (row(from), row(to));
+    if !from.velocities.is_empty() && !to.velocities.is_empty() {
+        let speed = |id: &i64| {
+            let (a, b) = (from.velocities[old[id]], to.velocities[new[id]]);
+            [0, 1, 2].map(|axis| a[axis] + (b[axis] - a[axis]) * share as f32)
+        };
+        out.velocities = paths.ranks.iter().map(speed).collect();
+    }
+    for (row, id) in from.ids.iter().enumerate().filter(|(_, id)| !new.contains_key(id)) {
+        let speed = from.velocities.get(row).copied().unwrap_or_default();
+        out.places.push(from.places[row] + DVec3::from(speed.map(f64::from)) * (dt * share));
+        out.ids.push(*id);
+        if !out.velocities.is_empty() {
+            out.velocities.push(speed);
+        }
+    }
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(ids: &[i64], x: &[f64], speed: f32) -> Particles {
+        Particles {
+            places: x.iter().map(|x| DVec3::new(*x, 0.0, 0.0)).collect(),
+            velocities: vec![[speed, 0.0, 0.0]; x.len()],
+            ids: ids.to_vec(),
+        }
+    }
+
+    #[test]
+    fn particles_are_matched_by_id() {
+        let from = frame(&[7, 3, 9], &[0.0, 1.0, 2.0], 10.0);
+        let to = frame(&[9, 5, 7], &[3.0, 0.0, 1.0], 10.0);
+        let paths = Paths::between(&from, &to, 0.1).unwrap();
+        assert_eq!((paths.count(), paths.died, paths.born), (2, 1, 1));
+        let mut places = Vec::new();
+        paths.at(0.5, &mut places);
+        assert!((places[0].x - 0.5).abs() < 1e-12 && (places[1].x - 2.5).abs() < 1e-12);
+        assert_eq!(paths.farthest(), 1.0);
+    }
+
+    #[test]
+    fn a_frame_may_have_no_particles() {
+        let some = frame(&[7, 3], &[0.0, 1.0], 10.0);
+        let none = Particles::default();
+        let away = Paths::between(&some, &none, 0.1).unwrap();
+        assert_eq!((away.count(), away.died, away.born), (2, 2, 0));
+        assert_eq!(away.farthest(), 1.0, "they go on");
+        let back = Paths::between(&none, &some, 0.1).unwrap();
+        assert_eq!((back.count(), back.died, back.born), (0, 0, 2));
+        let still = Particles { velocities: Vec::new(), ..some.clone() };
+        assert_eq!(Paths::between(&still, &none, 0.1).unwrap().count(), 0);
+        assert_eq!(interpolate(&none, &some, 0.1, 0.5).unwrap(), none);
+        assert_eq!(interpolate(&still, &none, 0.1, 0.5).unwrap(), still);
+        assert_eq!(interpolate(&some, &none, 0.1, 0.5).unwrap().places[1].x, 1.5);
+    }
+
+    #[test]
+    fn without_ids_velocities_count_and_without_both_nothing_does() {
+        let from = frame(&[], &[0.0, 1.0], 10.0);
+        let mut places = Vec::new();
+        Paths::between(&from, &from, 0.1).unwrap().at(1.0, &mut places);
+        assert_eq!(places[1].x, 2.0);
+        let none = Particles { velocities: Vec::new(), ..from };
+        assert!(Paths::between(&none, &none, 0.1).is_err());
+    }
+
+    #[test]
+    fn between_two_frames_all_particles_of_the_first_are_there() {
+        let from = frame(&[7, 3, 9], &[0.0, 1.0, 2.0], 10.0);
+        let to =
+            Particles { velocities: vec![[20.0, 0.0, 0.0]; 3], ..frame(&[9, 5, 7], &[3.0, 0.0, 1.5], 0.0) };
+        let half = interpolate(&from, &to, 0.1, 0.5).unwrap();
+        assert_eq!(half.ids, [7, 9, 3]);
+        assert!((half.places[2].x - 1.5).abs() < 1e-12, "one that ends moves on");
+        assert_eq!(half.velocities, [[15.0, 0.0, 0.0], [15.0, 0.0, 0.0], [10.0, 0.0, 0.0]]);
+        let without = |frame: &Particles| Particles { ids: Vec::new(), ..frame.clone() };
+        let half = interpolate(&without(&from), &without(&to), 0.1, 0.5).unwrap();
+        assert_eq!(half.places[1].x, 1.5);
+    }
+
+    #[test]
+    fn velocities_that_contradict_the_places_are_left_out() {
+        let (from, to) = (frame(&[1], &[0.0], 500.0), frame(&[1], &[1.0], 500.0));
+        let mut places = Vec::new();
+        Paths::between(&from, &to, 0.1).unwrap().at(0.5, &mut places);
+        assert_eq!(places[0].x, 0.5);
+    }
+}

@@ -1,0 +1,340 @@
+//! Where the liquid at a place was at the first frame: the particles around it know, by their ids.
+
+use rayon::prelude::*;
+
+use super::affine_fit::{Near, sums};
+use super::grid::{Cells, Coord};
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::surface::Particles;
+use crate::surface::repair::Source;
+use crate::surface::topology::change::Change;
+use crate::surface::tracker::Tracker;
+
+/// Radius within which particles count (spacings): that of advection's maps. It is doubled, so often at most, where there are none.
+const RADIUS: i32 = 3;
+const DOUBLINGS: u32 = 1;
+/// Cells along a radius.
+const RINGS: i32 = 2;
+/// Particles are of one origin where their first places lie within so many radii, 4 spacings, of that of one of them. Those around a
+/// place on the surface lie little more than a radius from the nearest one, so that liquid that has kept its shape is all of one origin.
+/// What has come together lay at least as far apart as the gap between was wide; where that was less than 4 spacings, places between
+/// the two origins are off by less than the gap. Where the liquid was pressed together by more, only what is nearest counts.
+const TOGETHER: f64 = 4.0 / 3.0;
+/// Places of a task.
+const PIECE: usize = 256;
+/// Particles of a task.
+const GRAIN: usize = 4096;
+/// Farthest cell.
+const LIMIT: f64 = (i32::MAX / 4) as f64;
+
+/// Where each particle was at the first frame.
+#[derive(Debug, Clone)]
+pub struct Rest {
+    /// Ascending.
+    ids: Vec<i64>,
+    /// The particles' places (m), in the order of the ids.
+    places: Vec<DVec3>,
+}
+
+impl Rest {
+    /// Of the particles at the first frame; none where they have no ids.
+    pub fn of(first: &Particles) -> Option<Self> {
+        if first.ids.is_empty() {
+            return None;
+        }
+        let mut all: Vec<(i64, DVec3)> =
+            first.ids.iter().copied().zip(first.places.iter().copied()).collect();
+        all.sort_unstable_by_key(|(id, _)| *id);
+        let (ids, places) = all.into_iter().unzip();
+        Some(Self { ids, places })
+    }
+
+    /// Where the liquid at places (m) was at the first frame (m): from the particles around, which are `now` and whose spacing is
+    /// `spacing` (m). Their ways back are fitted by an affine map, as those of advection are; of particles that came from different
+    /// places only those of one origin count, which weigh most together. None where no particle that was there at the first frame is
+    /// within three spacings (six, where no other one is either), or particles have no ids. A place's answer does not depend on the
+    /// others.
+    ///
+    /// # Errors
+    /// A spacing that is not over 0; particles too far apart; cancel.
+    pub fn places(
+        &self,
+        ctx: &Context,
+        now: &Particles,
+        spacing: f64,
+        at: &[DVec3],
+    ) -> Result<Vec<Option<DVec3>>> {
+        if !(spacing > 0.0 && spacing.is_finite()) {
+            return Err(Error::argument(format!("spacing = {spacing} is not over 0 m")));
+        }
+        if now.ids.len() != now.places.len() {
+            return Ok(vec![None; at.len()]);
+        }
+        ctx.phase("rest", || {
+            let field = Field::of(self, now, spacing, at)?;
+            ctx.check()?;
+            let parts: Vec<Vec<Option<DVec3>>> = at
+                .par_chunks(PIECE)
+                .map(|piece| {
+                    ctx.check()?;
+                    let mut scratch = Scratch::default();
+                    Ok(piece.iter().map(|place| field.first(*place, &mut scratch)).collect())
+                })
+                .collect::<Result<_>>()?;
+            Ok(parts.concat())
+        })
+    }
+
+    /// The same for the vertices of a mesh after a change, at the time of the particles `now`, as far as
+    /// [`Traced`](crate::surface::Traced) needs it: for those of new triangles. None for all others.
+    ///
+    /// # Errors
+    /// As [`Rest::places`].
+    pub fn of_change(
+        &self,
+        ctx: &Context,
+        now: &Particles,
+        spacing: f64,
+        change: &Change,
+    ) -> Result<Vec<Option<DVec3>>> {
+        let made = change.triangles.iter().zip(&change.sources).filter(|(_, from)| **from == Source::New);
+        let mut names: Vec<u32> = made.flat_map(|(names, _)| *names).collect();
+        names.sort_unstable();
+        names.dedup();
+        let at: Vec<DVec3> = names.iter().map(|name| change.vertices[*name as usize]).collect();
+        let mut out = vec![None; change.vertices.len()];
+        for (name, place) in names.into_iter().zip(self.places(ctx, now, spacing, &at)?) {
+            out[name as usize] = place;
+        }
+        Ok(out)
+    }
+
+    fn find(&self, id: i64) -> Option<DVec3> {
+        self.ids.binary_search(&id).ok().map(|at| self.places[at])
+    }
+}
+
+impl Tracker {
+    /// Where the liquid at each vertex was at the first frame (m), from the particles at the end of the last step: see
+    /// [`Rest::places`].
+    ///
+    /// # Errors
+    /// As [`Rest::places`].
+    pub fn rest(&self, ctx: &Context, rest: &Rest, now: &Particles) -> Result<Vec<Option<DVec3>>> {
+        rest.places(ctx, now, self.params.spacing, &self.vertices)
+    }
+}
+
+/// A particle near a place.
+#[derive(Clone, Copy)]
+struct Seen {
+    /// From the corner of the place's cell (cells).
+    offset: [f32; 3],
+    /// Where it is, and was at the first frame (m).
+    now: DVec3,
+    first: DVec3,
+    weight: f64,
+    /// The particle that stands for those of its origin.
+    head: Option<usize>,
+}
+
+/// Working memory of a task.
+#[derive(Default)]
+struct Scratch {
+    seen: Vec<Seen>,
+    near: Near,
+    room: Near,
+}
+
+/// The particles near some places.
+struct Field {
+    cells: Cells,
+    /// Where each is, and was at the first frame if it was there (m), in the order of cells.
+    particles: Vec<(DVec3, Option<DVec3>)>,
+    /// m.
+    spacing: f64,
+}
+
+impl Field {
+    fn of(rest: &Rest, now: &Particles, spacing: f64, at: &[DVec3]) -> Result<Self> {
+        let reach = DVec3::repeat(f64::from(RADIUS << DOUBLINGS) * spacing);
+        let first = at.first().copied().unwrap_or_default();
+        let low = at.iter().fold(first, |low, place| low.inf(place)) - reach;
+        let high = at.iter().fold(first, |high, place| high.sup(place)) + reach;
+        let is_near = |particle: &u32| {
+            let place = now.places[*particle as usize];
+            (0..3).all(|axis| low[axis] <= place[axis] && place[axis] <= high[axis])
+        };
+        let near: Vec<u32> = (0..now.places.len() as u32).filter(is_near).collect();
+        let places: Vec<DVec3> = near.iter().map(|particle| now.places[*particle as usize]).collect();
+        let id = |n: u32| now.ids[near[n as usize] as usize];
+        let cells = Cells::new(&places, f64::from(RADIUS) * spacing / f64::from(RINGS), id)?;
+        let particle = |n: &u32| (places[*n as usize], rest.find(id(*n)));
+        let particles = cells.order.par_iter().with_min_len(GRAIN).map(particle).collect();
+        Ok(Self { cells, particles, spacing })
+    }
+
+    /// Where the liquid at a place (m) was at the first frame (m).
+    fn first(&self, place: DVec3, scratch: &mut Scratch) -> Option<DVec3> {
+        let edge = self.cells.edge();
+        let cell = [0, 1, 2].map(|axis| (place[axis] / edge).floor().clamp(-LIMIT, LIMIT) as i32);
+        let from = place / edge - DVec3::from(cell.map(f64::from));
+        let is_there = |doubling: &u32| self.gather(cell, from, RINGS << *doubling, &mut scratch.seen);
+        let doubling = (0..=DOUBLINGS).find(is_there)?;
+        self.fitted(place, from, RADIUS << doubling, scratch)
+    }
+
+    /// The particles within so many cells of a place, seen from the corner of its cell (cells), that were there at the first frame.
+    /// Returns whether any particle is near, also one that was not.
+    fn gather(&self, cell: Coord, from: DVec3, rings: i32, seen: &mut Vec<Seen>) -> bool {
+        seen.clear();
+        let (mut is_any, square) = (false, f64::from(rings * rings));
+        let [low, high] = [-rings, rings].map(|by| cell.map(|at| at + by));
+        self.cells.near(low, high, cell, |particle, offset| {
+            let d = DVec3::from(offset.map(f64::from)) - from;
+            let q = 1.0 - d.norm_squared() / square;
+            if q > 0.0 {
+                is_any = true;
+                if let (now, Some(first)) = self.particles[particle] {
+                    seen.push(Seen { offset, now, first, weight: q * q * q, head: None });
+                }
+            }
+        });
+        is_any
+    }
+
+    /// What the particles that were gathered within a radius (spacings) of a place (m) say of it, which is seen from the corner of its
+    /// cell (cells).
+    fn fitted(&self, place: DVec3, from: DVec3, radius: i32, scratch: &mut Scratch) -> Option<DVec3> {
+        let Scratch { seen, near, room } = scratch;
+        let most = TOGETHER * f64::from(radius) * self.spacing;
+        let head = heaviest_origin(seen, most)?;
+        let Seen { now, first, .. } = seen[head];
+        let way = first - now;
+        // In spacings. Ways are seen from that of the head: they may be long, and differ by little.
+        let edge = (self.cells.edge() / self.spacing) as f32;
+        near.clear();
+        for one in seen.iter().filter(|one| one.head == Some(head)) {
+            let turn = (one.first - one.now - way) / self.spacing;
+            near.push(one.offset.map(|x| edge * x), [turn.x as f32, turn.y as f32, turn.z as f32]);
+        }
+        let at = [from.x, from.y, from.z].map(|x| edge * x as f32);
+        let to = |turn: DVec3| place + way + turn * self.spacing;
+        let Some(sums) = sums(near, room, at, radius as f32) else { return Some(to(DVec3::zeros())) };
+        let fit = to(sums.map().at(DVec3::zeros()));
+        // What so few particles say that it leads far away is worth no more than their mean.
+        Some(if (fit - first).norm() <= most { fit } else { to(sums.mean()) })
+    }
+}
+
+/// Tells particles apart by where they come from, those within `most` (m) of one, the heaviest that is left, together. Returns the one
+/// that stands for those that weigh most together; none without particles.
+fn heaviest_origin(seen: &mut [Seen], most: f64) -> Option<usize> {
+    let mut left: f64 = seen.iter().map(|one| one.weight).sum();
+    let mut best: Option<(f64, usize)> = None;
+    while best.is_none_or(|(weight, _)| left > weight) {
+        let free = seen.iter().enumerate().filter(|(_, one)| one.head.is_none());
+        let Some((head, _)) = free.max_by(|a, b| a.1.weight.total_cmp(&b.1.weight)) else { break };
+        let (first, mut weight) = (seen[head].first, 0.0);
+        for one in seen.iter_mut().filter(|one| one.head.is_none()) {
+            if (one.first - first).norm() <= most {
+                one.head = Some(head);
+                weight += one.weight;
+            }
+        }
+        left -= weight;
+        if best.is_none_or(|(other, _)| weight > other) {
+            best = Some((weight, head));
+        }
+    }
+    best.map(|(_, head)| head)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::Pool;
+    use crate::surface::balls::numbered;
+
+    /// A block of n^3 places, one apart, from a corner on.
+    fn block(corner: DVec3, n: i32) -> impl Iterator<Item = DVec3> {
+        let on = move |axis: u32| (0..n * n * n).map(move |at| f64::from(at / n.pow(axis) % n));
+        on(0).zip(on(1)).zip(on(2)).map(move |((x, y), z)| corner + DVec3::new(x, y, z))
+    }
+
+    /// Turned by 1 rad about an axis, drawn out, and taken far away.
+    fn moved(place: DVec3) -> DVec3 {
+        let axis = DVec3::new(1.0, 2.0, 0.5).normalize();
+        let p = place.component_mul(&DVec3::new(1.2, 0.95, 0.9));
+        let turned = p * libm::cos(1.0)
+            + axis.cross(&p) * libm::sin(1.0)
+            + axis * (axis.dot(&p) * (1.0 - libm::cos(1.0)));
+        turned + DVec3::new(40.0, -3.0, 7.0)
+    }
+
+    #[test]
+    fn liquid_that_turned_and_stretched_is_found_where_it_was() {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        let spacing = 0.01;
+        let first = numbered(block(DVec3::zeros(), 9).map(|place| place * spacing).collect());
+        let rest = Rest::of(&first).unwrap();
+        // Backwards, and with particles that were born later, far away.
+        let mut now = numbered(block(DVec3::zeros(), 9).map(|place| moved(place) * spacing).collect());
+        now.places.extend(block(DVec3::new(90.0, 0.0, 0.0), 3).map(|place| place * spacing));
+        now.ids.extend(10_000..10_027);
+        now.places.reverse();
+        now.ids.reverse();
+        let wanted = [[4.0, 4.0, 4.0], [4.3, 3.6, 4.1], [-0.5, 4.0, 4.0], [8.4, 8.4, 8.4], [-0.5, -0.5, 4.0]]
+            .map(DVec3::from);
+        let mut at: Vec<DVec3> = wanted.iter().map(|place| moved(*place) * spacing).collect();
+        at.extend([DVec3::new(91.0, 1.0, 1.0), DVec3::new(-50.0, 0.0, 0.0)].map(|place| place * spacing));
+        let found = rest.places(&ctx, &now, spacing, &at).unwrap();
+        for (found, wanted) in found.iter().zip(&wanted) {
+            let off = (found.unwrap() / spacing - wanted).norm();
+            assert!(off < 5e-3, "{wanted}: {off} spacings off");
+        }
+        assert_eq!(found[wanted.len()..], [None, None]);
+        // One by one, and on one thread, they are the same bit for bit.
+        let alone = Context::new(Pool::new(0).unwrap());
+        for (place, found) in at.iter().zip(&found) {
+            assert_eq!(rest.places(&alone, &now, spacing, &[*place]).unwrap(), [*found]);
+        }
+        let nameless = Particles { ids: Vec::new(), ..now.clone() };
+        assert!(Rest::of(&nameless).is_none());
+        assert_eq!(rest.places(&ctx, &nameless, spacing, &at[..2]).unwrap(), [None, None]);
+        let error = rest.places(&ctx, &now, 0.0, &at).unwrap_err();
+        assert_eq!(error.to_string(), "spacing = 0 is not over 0 m");
+        ctx.cancel();
+        assert!(matches!(rest.places(&ctx, &now, spacing, &at), Err(Error::Cancelled)));
+    }
+
+    #[test]
+    fn a_place_between_liquids_that_came_together_was_in_one_of_the_two() {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        // Two blocks with a gap of 5 between them, which closes to one spacing, and to a half.
+        for deep in [0.0, 0.5] {
+            let ways = [DVec3::new(2.0 + 0.5 * deep, 0.0, 0.0), DVec3::new(-2.0 - 0.5 * deep, 0.0, 0.0)];
+            let corners = [DVec3::zeros(), DVec3::new(10.0, 0.3, 0.4)];
+            let all = |share: f64| {
+                let one = |n: usize| block(corners[n], 6).map(move |place| place + ways[n] * share);
+                numbered(one(0).chain(one(1)).collect())
+            };
+            let rest = Rest::of(&all(0.0)).unwrap();
+            let at: Vec<DVec3> = (0..400)
+                .map(|n| [n % 20, n / 20 % 5, n / 100].map(f64::from))
+                .map(|[x, y, z]| DVec3::new(5.5 + 0.2 * x, 1.2 * y - 0.3, 1.5 * z))
+                .collect();
+            let found = rest.places(&ctx, &all(1.0), 1.0, &at).unwrap();
+            let mut counts = [0; 2];
+            for (place, found) in at.iter().zip(&found) {
+                let off = ways.map(|way| (found.unwrap() + way - place).norm());
+                let nearer = usize::from(off[1] < off[0]);
+                assert!(off[nearer] < 1e-3, "{deep}, {place}: {off:?}");
+                counts[nearer] += 1;
+            }
+            assert!(counts.iter().all(|count| *count > 150), "{counts:?}");
+        }
+    }
+}

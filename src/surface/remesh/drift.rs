@@ -1,0 +1,109 @@
+//! Whether the mesh strains or rests: by how much the liquid has displaced each vertex over the last steps, of which edges know by how much
+//! their lengths have changed. Without that, lengths near a limit of improvement would be remade for ever by particles that only tremble.
+//! Projection does not count: where the surface depends on few particles, as on thin sheets, it moves ten times as far as they tremble.
+
+use crate::base::DVec3;
+
+/// Steps from one reference to the next.
+pub(in crate::surface) const WINDOW: u32 = 8;
+
+/// Displacements since a reference step; none where the mesh is not rebuilt.
+#[derive(Debug, Clone, Default)]
+pub(in crate::surface) struct Drift {
+    /// Steps since the reference, under [`WINDOW`].
+    pub steps: u32,
+    /// The displacement of each vertex (m). Vertices that were made since have it from when they were.
+    pub vertices: Vec<[f32; 3]>,
+}
+
+impl Drift {
+    /// That of a mesh of so many vertices at a reference step.
+    pub fn at_reference(vertices: usize) -> Self {
+        Self { steps: 0, vertices: vec![[0.0; 3]; vertices] }
+    }
+
+    /// That after a step in which the particles carried the vertices from some positions (m) to others; it is not yet a new reference.
+    pub fn after(&self, from: &[DVec3], to: &[DVec3]) -> Vec<[f32; 3]> {
+        let moved = |(drift, (from, to)): (&[f32; 3], (&DVec3, &DVec3))| {
+            let by = to - from;
+            [0, 1, 2].map(|axis| drift[axis] + by[axis] as f32)
+        };
+        self.vertices.iter().zip(from.iter().zip(to)).map(moved).collect()
+    }
+
+    /// Counts a step, after which vertices are displaced by so much (m): each [`WINDOW`] steps it is the new reference, and always where
+    /// there are no vertices.
+    pub fn next(&self, displacements: Vec<[f32; 3]>) -> Self {
+        let steps = self.steps + 1;
+        if steps < WINDOW && !displacements.is_empty() {
+            Self { steps, vertices: displacements }
+        } else {
+            Self::at_reference(displacements.len())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::{Context, Pool};
+    use crate::surface::balls::{numbered, own_surface, shell};
+    use crate::surface::{Params, Particles, Tracker};
+
+    /// Frames in which the liquid is drawn out, and those in which it rests.
+    const MOVING: i32 = 18;
+    const RESTING: i32 = 24;
+
+    #[test]
+    fn a_mesh_that_was_drawn_out_keeps_every_triangle_when_its_particles_only_tremble() {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        let places = shell(DVec3::zeros(), 0.0, 4.2);
+        let mut seed = 1u64;
+        let mut chance = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 33) as f64 / f64::from(1u32 << 30) - 1.0
+        };
+        let mut at = |frame: i32| -> Particles {
+            let long = libm::exp(0.05 * f64::from(frame.min(MOVING)));
+            let thin = 1.0 / long.sqrt();
+            let moved = |place: &DVec3| {
+                let by = DVec3::new(chance(), chance(), chance()) * 0.0115;
+                place.component_mul(&DVec3::new(long, thin, thin)) + by
+            };
+            numbered(places.iter().map(moved).collect())
+        };
+        let mut from = at(0);
+        let mesh = own_surface(&ctx, &from.places);
+        let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
+        let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
+        let mut made = Vec::new();
+        for frame in 1..=MOVING + RESTING {
+            let to = at(frame);
+            let report = tracker.step(&ctx, &from, &to, 0.04).unwrap();
+            from = to;
+            made.push(report.change.map_or(0, |change| change.made_triangles()));
+            if frame == MOVING + 3 {
+                // What it knows of its rest is in its state.
+                let state = tracker.save();
+                tracker = Tracker::resume(params, &mesh, &state).unwrap();
+                assert!(tracker.save() == state && tracker.drift.steps != 0);
+            }
+        }
+        let resting = made.split_off((MOVING as u32 + WINDOW) as usize);
+        assert!(made.iter().sum::<usize>() > 500, "{made:?}");
+        assert!(resting.iter().all(|made| *made == 0), "{resting:?}");
+    }
+
+    #[test]
+    fn a_reference_is_as_old_as_the_window_at_most() {
+        let mut drift = Drift::at_reference(1);
+        let by = DVec3::new(0.5, 0.0, -0.25);
+        for step in 1..=2 * WINDOW {
+            let after = drift.after(&[by * f64::from(step - 1)], &[by * f64::from(step)]);
+            assert_eq!(after[0][0], 0.5 * ((step - 1) % WINDOW + 1) as f32);
+            drift = drift.next(after);
+            assert_eq!(drift.steps, step % WINDOW);
+        }
+        assert_eq!(drift.vertices, [[0.0; 3]]);
+    }
+}

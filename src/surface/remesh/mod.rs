@@ -1,0 +1,343 @@
+//! Mesh improvement (thesis 2.6): where the tracked mesh was stretched its edges are split, where it was squeezed they collapse, and
+//! thin triangles that were made flip. What is measured against is the length that the edges around a vertex had at its birth: long and
+//! short edges stay as they were sculpted. Nearly all of a mesh needs nothing, and stays as it is, bit for bit; so does all of one at rest
+//! (`strain.rs`).
+//!
+//! After Wojtan et al. 2009, and Brochu and Bridson 2009 ("Robust topological operations for dynamic explicit surfaces") for what
+//! stays on ridges and in corners. `fans.rs` has the operations, `butterfly.rs`, `collapse.rs`, `flip.rs` and `relax.rs` say where and
+//! whether.
+//!
+//! | word | meaning |
+//! |---|---|
+//! | size | of a vertex: the lengths of the shortest and of the longest edge around it at its birth |
+//! | target | of an edge: what its ends allow; too long is measured by the lesser of their longest, too short by the greater of their shortest |
+//! | due | of a triangle: something about it may be out of range |
+
+mod butterfly;
+mod collapse;
+pub(in crate::surface) mod drift;
+mod fans;
+mod flip;
+mod relax;
+mod shape;
+mod strain;
+
+use rayon::prelude::*;
+
+use super::repair::Source;
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::Result;
+use fans::Fans;
+
+/// Longest edge that is left alone (targets). The halves of one that is split have 0.75: far from what collapses.
+const TOO_LONG: f64 = 1.5;
+/// Shortest edge that is left alone (targets).
+const TOO_SHORT: f64 = 0.5;
+/// How often an edge and its parts may be halved in a frame: it may be any length where a vertex went astray.
+const ROUNDS: usize = 5;
+/// Sweeps in a frame: what one changes is due in the next.
+const SWEEPS: usize = 3;
+/// How often vertices move in a sweep.
+const RELAXED: usize = 3;
+/// Triangles of a task.
+const GRAIN: usize = 4096;
+/// Operations between two looks whether the work was cancelled.
+const LOOK: usize = 256;
+
+/// A mesh that is improved, lengths in any unit: closed and 2-manifold by index. Arrays have one value for each vertex, or triangle.
+pub struct Improvable<'a> {
+    /// Places of vertices.
+    pub places: &'a mut Vec<DVec3>,
+    /// Triangles, counter-clockwise seen from outside.
+    pub triangles: &'a mut Vec<[u32; 3]>,
+    /// Of each vertex the lengths of the shortest and of the longest edge around it at its birth: as born no edge is out of range. Edges
+    /// between vertices of size 0 are as they should be.
+    pub sizes: &'a mut Vec<Size>,
+    /// Of each vertex the vertex that it was; none: it was made in this frame.
+    pub origins: &'a mut Vec<Option<u32>>,
+    /// Displacement of each vertex since a reference some frames ago; not finite: it is not known.
+    pub drifts: &'a mut Vec<[f32; 3]>,
+    /// Of each triangle where it comes from.
+    pub sources: &'a mut Vec<Source>,
+    /// Of each vertex whether its triangles are left alone: what is broken is rebuilt in the next frame.
+    pub flags: &'a mut Vec<bool>,
+    /// By how much lengths change where the liquid only trembles.
+    pub tremble: f64,
+}
+
+/// Lengths of the shortest and of the longest edge around a vertex.
+pub type Size = [f32; 2];
+
+/// How many operations improved a mesh.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Improvements {
+    /// Edges that were divided by a vertex.
+    pub splits: usize,
+    /// Vertices that went into a neighbour.
+    pub collapses: usize,
+    /// Edges that were turned within their two triangles.
+    pub flips: usize,
+}
+
+/// Improves a mesh; it stays a closed 2-manifold by index. Vertices that have an origin stay where they are or go; triangles that stay
+/// as they are stay in their order, with their vertices. Runs on the threads of the phase around it.
+///
+/// # Errors
+/// Cancel: the mesh is then improved in part, and still closed.
+pub fn improve(ctx: &Context, mesh: &mut Improvable<'_>) -> Result<Improvements> {
+    let due = due(ctx, mesh)?;
+    if due.is_empty() {
+        return Ok(Improvements::default());
+    }
+    let fans = Fans::of(mesh);
+    let mut work = Work { ctx, fans, rounds: ROUNDS, done: Improvements::default() };
+    let result = work.run(due);
+    let Work { fans, done, .. } = work;
+    fans.finish();
+    result.map(|()| done)
+}
+
+/// The size of each vertex as it is; 0 where it has no edges.
+pub fn sizes(places: &[DVec3], triangles: &[[u32; 3]]) -> Vec<Size> {
+    let mut sizes = vec![[f32::INFINITY, 0.0f32]; places.len()];
+    for &[a, b, c] in triangles {
+        for ends in [[a, b], [b, c], [c, a]] {
+            let [p, q] = ends.map(|end| places[end as usize]);
+            let length = (p - q).norm() as f32;
+            for end in ends {
+                let [shortest, longest] = &mut sizes[end as usize];
+                (*shortest, *longest) = (shortest.min(length), longest.max(length));
+            }
+        }
+    }
+    sizes.into_iter().map(|size| if size[0].is_finite() { size } else { [0.0; 2] }).collect()
+}
+
+impl Improvable<'_> {
+    /// The shortest and the longest that an edge should be.
+    fn target(&self, [a, b]: [u32; 2]) -> [f64; 2] {
+        between(self.sizes[a as usize], self.sizes[b as usize])
+    }
+
+    /// Square of an edge's length over its target; 1 where it is between the two, or has none.
+    fn stretch(&self, ends: [u32; 2]) -> f64 {
+        let [p, q] = ends.map(|end| self.places[end as usize]);
+        let [shortest, longest] = self.target(ends);
+        let square = (p - q).norm_squared();
+        let stretch = if square > longest * longest {
+            square / (longest * longest)
+        } else if square < shortest * shortest {
+            square / (shortest * shortest)
+        } else {
+            1.0
+        };
+        if stretch.is_finite() { stretch } else { 1.0 }
+    }
+
+    /// Whether an edge is out of range, and not at rest.
+    fn needs(&self, ends: [u32; 2], is_out: fn(f64) -> bool) -> bool {
+        is_out(self.stretch(ends)) && self.is_strained(ends)
+    }
+
+    /// Whether something about a triangle may be out of range: where none was made or changed in this frame, its edges alone.
+    fn is_due(&self, [a, b, c]: [u32; 3], source: Source) -> bool {
+        if [a, b, c].into_iter().any(|corner| self.flags[corner as usize]) {
+            return false;
+        }
+        let is_out = |ends: [u32; 2]| self.needs(ends, is_long) || self.needs(ends, is_short);
+        !matches!(source, Source::Whole(_)) || [[a, b], [b, c], [c, a]].into_iter().any(is_out)
+    }
+}
+
+/// The shortest and the longest that an edge between vertices of two sizes should be.
+fn between(one: Size, two: Size) -> [f64; 2] {
+    let [shortest, longest] = [f64::from(one[0].max(two[0])), f64::from(one[1].min(two[1]))];
+    // Vertices of different kinds, which were not born as neighbours, meet in the middle.
+    if shortest <= longest { [shortest, longest] } else { [0.5 * (shortest + longest); 2] }
+}
+
+/// The size of a vertex between two.
+fn mean(one: Size, two: Size) -> Size {
+    [0, 1].map(|end| 0.5 * (one[end] + two[end]))
+}
+
+fn is_long(stretch: f64) -> bool {
+    stretch > TOO_LONG * TOO_LONG
+}
+
+fn is_short(stretch: f64) -> bool {
+    stretch < TOO_SHORT * TOO_SHORT
+}
+
+/// The triangles that may need something, ascending.
+fn due(ctx: &Context, mesh: &Improvable<'_>) -> Result<Vec<u32>> {
+    let parts: Vec<Vec<u32>> = mesh
+        .triangles
+        .par_chunks(GRAIN)
+        .zip(mesh.sources.par_chunks(GRAIN))
+        .enumerate()
+        .map(|(chunk, (triangles, sources))| {
+            ctx.check()?;
+            let all = ((chunk * GRAIN) as u32..).zip(triangles.iter().zip(sources));
+            let due = all.filter(|(_, (corners, source))| mesh.is_due(**corners, **source));
+            Ok(due.map(|(triangle, _)| triangle).collect())
+        })
+        .collect::<Result<_>>()?;
+    Ok(parts.concat())
+}
+
+/// Adds some triangles to others; ascending, each once.
+fn join(near: &mut Vec<u32>, more: &[u32]) {
+    if !more.is_empty() {
+        near.extend_from_slice(more);
+        near.sort_unstable();
+        near.dedup();
+    }
+}
+
+/// What is done at some triangles.
+type Pass<T> = fn(&mut T, &[u32]) -> Result<()>;
+
+/// A mesh that is being improved.
+struct Work<'c, 'm, 'a> {
+    ctx: &'c Context,
+    fans: Fans<'m, 'a>,
+    /// How often edges may still be halved.
+    rounds: usize,
+    done: Improvements,
+}
+
+impl Work<'_, '_, '_> {
+    fn run(&mut self, mut due: Vec<u32>) -> Result<()> {
+        for _ in 0..SWEEPS {
+            due = self.sweep(due)?;
+            if due.is_empty() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Looks at some triangles, and at what changes on the way, in each pass; returns what has changed.
+    fn sweep(&mut self, mut near: Vec<u32>) -> Result<Vec<u32>> {
+        let mut changed = Vec::new();
+        let mut halved = self.split(&near)?;
+        while !halved.is_empty() {
+            join(&mut changed, &halved);
+            halved = self.split(&halved)?;
+        }
+        join(&mut near, &changed);
+        let passes: [Pass<Self>; 4] = [Self::collapse, Self::unfold, Self::flip, Self::relax];
+        for pass in passes {
+            pass(self, &near)?;
+            let touched = self.fans.take_touched();
+            join(&mut near, &touched);
+            join(&mut changed, &touched);
+        }
+        Ok(changed)
+    }
+
+    /// Halves each edge that is too long, the longest first; returns the triangles that changed.
+    fn split(&mut self, near: &[u32]) -> Result<Vec<u32>> {
+        if self.rounds == 0 {
+            return Ok(Vec::new());
+        }
+        let edges = self.edges(near, is_long, -1.0);
+        self.rounds -= usize::from(!edges.is_empty());
+        for (n, ends) in edges.into_iter().enumerate() {
+            self.look(n)?;
+            let edge = self.fans.edge(ends).filter(|_| self.fans.needs(ends, is_long));
+            if let Some(edge) = edge
+                && !edge.corners.iter().any(|&corner| self.fans.is_flagged(corner))
+            {
+                let place = self.fans.split_place(&edge);
+                self.fans.split(&edge, place);
+                self.done.splits += 1;
+            }
+        }
+        Ok(self.fans.take_touched())
+    }
+
+    /// Collapses edges that are too short, the shortest first.
+    fn collapse(&mut self, near: &[u32]) -> Result<()> {
+        let edges = self.edges(near, is_short, 1.0);
+        for (n, ends) in edges.into_iter().enumerate() {
+            self.look(n)?;
+            if self.fans.edge(ends).is_none() || !self.fans.needs(ends, is_short) {
+                continue;
+            }
+            let way = self.fans.collapses(ends).into_iter().find(|way| self.fans.may(way, &[]));
+            if let Some(way) = way {
+                self.fans.collapse(&way);
+                self.done.collapses += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes folds away.
+    fn unfold(&mut self, near: &[u32]) -> Result<()> {
+        for (n, &triangle) in near.iter().enumerate() {
+            self.look(n)?;
+            if let Some(way) = self.fans.unfolding(triangle) {
+                self.fans.collapse(&way);
+                self.done.collapses += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Flips edges of thin triangles.
+    fn flip(&mut self, near: &[u32]) -> Result<()> {
+        for (n, &triangle) in near.iter().enumerate() {
+            self.look(n)?;
+            if let Some(edge) = self.fans.better(triangle) {
+                self.fans.flip(&edge);
+                self.done.flips += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves vertices that were made in this frame.
+    fn relax(&mut self, near: &[u32]) -> Result<()> {
+        let there = near.iter().filter(|triangle| self.fans.is_there(**triangle));
+        let mut vertices: Vec<u32> = there.flat_map(|triangle| self.fans.corners(*triangle)).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        for _ in 0..RELAXED {
+            for (n, vertex) in vertices.iter().enumerate() {
+                self.look(n)?;
+                if let Some(place) = self.fans.relaxed(*vertex) {
+                    self.fans.put(*vertex, place);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Edges of triangles that are out of range and not at rest, each once, in the order of their lengths times a sign, then of their vertices.
+    fn edges(&self, near: &[u32], is_out: fn(f64) -> bool, sign: f64) -> Vec<[u32; 2]> {
+        let mut edges = Vec::new();
+        for &triangle in near.iter().filter(|triangle| self.fans.is_there(**triangle)) {
+            let [a, b, c] = self.fans.corners(triangle);
+            for [a, b] in [[a, b], [b, c], [c, a]] {
+                let ends = [a.min(b), a.max(b)];
+                if self.fans.needs(ends, is_out) {
+                    edges.push((sign * self.fans.length(ends), ends));
+                }
+            }
+        }
+        edges.sort_unstable_by(|one, two| one.0.total_cmp(&two.0).then(one.1.cmp(&two.1)));
+        edges.dedup_by_key(|edge| edge.1);
+        edges.into_iter().map(|(_, ends)| ends).collect()
+    }
+
+    fn look(&self, n: usize) -> Result<()> {
+        if n.is_multiple_of(LOOK) { self.ctx.check() } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests;

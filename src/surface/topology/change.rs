@@ -1,0 +1,312 @@
+//! The mesh where the liquid has merged or split: matched to the particles' surface (thesis 2.4) and rebuilt (2.5), in the cells
+//! in which it no longer fits; elsewhere it stays as it is.
+
+use super::hidden::Everywhere;
+use super::mesh_distance::Gamma;
+use super::particle_count::Crowd;
+use crate::base::DVec3;
+use crate::base::mesh::used;
+use crate::base::topology::around;
+use crate::context::Context;
+use crate::distance::lattice::Lattice;
+use crate::error::Result;
+use crate::surface::level_set::band::Distances;
+use crate::surface::level_set::implicit::Implicit;
+use crate::surface::level_set::sampler::Sampler;
+use crate::surface::particles::grid::{Coord, cell_of};
+use crate::surface::remesh::{Improvable, Improvements, Size, improve};
+use crate::surface::repair::{CellSet, Pierces, Rebuilt, Shape, Source, ladder, overlaps};
+use crate::surface::track::project::foot;
+
+/// A mesh, and where it no longer fits.
+pub struct Unfit<'a> {
+    /// Places of vertices (m).
+    pub vertices: &'a [DVec3],
+    pub triangles: &'a [[u32; 3]],
+    /// Vertices whose triangles are rebuilt.
+    pub flags: &'a [bool],
+    /// Places of the particles' surface that the mesh should have, and does not (cells).
+    pub bare: &'a [DVec3],
+    /// What it takes to find where it does not fit besides; none: that is not looked for.
+    pub everywhere: Option<Everywhere<'a>>,
+}
+
+/// What a mesh became.
+#[derive(Debug, Clone)]
+pub struct Change {
+    /// Places of vertices (m): those that stayed, in their order, then those that were made.
+    pub vertices: Vec<DVec3>,
+    /// Triangles, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// For each vertex the vertex that it was; none: it was made.
+    pub origins: Vec<Option<u32>>,
+    /// For each triangle where it comes from.
+    pub sources: Vec<Source>,
+    /// Places (m) to which the step took the vertices that there were; after several steps, the first that changed the mesh.
+    pub before: Vec<DVec3>,
+    /// For each vertex that was made its signed distance from the particles' surface (m); of several steps, in the last.
+    pub delta: Vec<f32>,
+    /// For each vertex the lengths (m) of the shortest and of the longest edge around it at its birth.
+    pub sizes: Vec<[f32; 2]>,
+    /// For each vertex its displacement (m) since the reference of [`crate::surface::Tracker`], from which edges at rest are known.
+    pub drifts: Vec<[f32; 3]>,
+    /// What improved the mesh; of several steps, in the last.
+    pub improvements: Improvements,
+    /// Parts without particles that were taken away.
+    pub dry: usize,
+    /// Parts with some particles, but fewer than [`crate::surface::Params::min_drop`], that were taken away.
+    pub specks: usize,
+    /// Cells in which the mesh did not fit.
+    pub flagged_cells: usize,
+    /// Cells that were rebuilt.
+    pub rebuilt_cells: usize,
+    /// How much more was rebuilt than those cells and what they need: 0 nothing, 1 a ring around them, 2 whole parts, 3 everything.
+    pub rung: usize,
+    /// Iterations of the matching.
+    pub iterations: usize,
+}
+
+/// By how much lengths change where particles only tremble (spacings), at most.
+const TREMBLE: f64 = 0.01;
+/// Where the mesh has passed through itself by less than this (cells) it is left alone: mending takes more of it than that is worth.
+const DEEP: f64 = 0.25;
+/// Lengths of the shortest and of the longest edge around a vertex that was made (cells).
+const BORN: [f64; 2] = [1.0, 1.0];
+
+impl Change {
+    /// Of a mesh that goes as a whole.
+    pub(in crate::surface) fn to_nothing(unfit: &Unfit<'_>) -> Self {
+        let (vertices, triangles, origins, sources) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { vertices, triangles, origins, sources, ..Self::nothing(unfit) }
+    }
+
+    /// Of a mesh that stays as it is.
+    fn nothing(unfit: &Unfit<'_>) -> Self {
+        Self {
+            vertices: unfit.vertices.to_vec(),
+            triangles: unfit.triangles.to_vec(),
+            origins: (0..unfit.vertices.len() as u32).map(Some).collect(),
+            sources: (0..unfit.triangles.len() as u32).map(Source::Whole).collect(),
+            before: unfit.vertices.to_vec(),
+            delta: Vec::new(),
+            sizes: Vec::new(),
+            drifts: Vec::new(),
+            improvements: Improvements::default(),
+            dry: 0,
+            specks: 0,
+            flagged_cells: 0,
+            rebuilt_cells: 0,
+            rung: 0,
+            iterations: 0,
+        }
+    }
+
+    /// Shares 0..=1 of the vertices that there were, for those that there are: a vertex that was made has the mean of the neighbours that
+    /// stayed, 0 without any.
+    pub(in crate::surface) fn carried_shares(&self, values: &[f32]) -> Vec<f32> {
+        let old = |vertex: u32| self.origins[vertex as usize].map(|at| values[at as usize]);
+        let sums: Vec<(f32, u32)> = around(self.origins.len(), &self.triangles, old);
+        let mean = |(vertex, (sum, count)): (u32, (f32, u32))| {
+            old(vertex).unwrap_or(if count > 0 { (sum / count as f32).clamp(0.0, 1.0) } else { 0.0 })
+        };
+        (0..).zip(sums).map(mean).collect()
+    }
+
+    /// Count of triangles that were made: parts of others among them.
+    pub fn made_triangles(&self) -> usize {
+        self.sources.iter().filter(|source| !matches!(source, Source::Whole(_))).count()
+    }
+
+    /// Count of triangles that are of no triangle there was.
+    pub(in crate::surface) fn rebuilt_triangles(&self) -> usize {
+        self.sources.iter().filter(|source| **source == Source::New).count()
+    }
+
+    /// What two changes did, one after the other.
+    pub fn after(mut self, first: &Self) -> Self {
+        self.origins.iter_mut().for_each(|at| *at = at.and_then(|at| first.origins[at as usize]));
+        self.sources.iter_mut().for_each(|source| *source = source.after(&first.sources));
+        self.flagged_cells += first.flagged_cells;
+        self.rebuilt_cells += first.rebuilt_cells;
+        self.rung = self.rung.max(first.rung);
+        self.before.clone_from(&first.before);
+        self.iterations += first.iterations;
+        self.dry += first.dry;
+        self.specks += first.specks;
+        self
+    }
+}
+
+/// Rebuilds a closed mesh where it no longer fits. None where it does everywhere.
+///
+/// # Errors
+/// Vertices too far apart for the grid; more memory than the context allows; cancel.
+pub fn change(
+    ctx: &Context,
+    unfit: &Unfit<'_>,
+    phi: &Implicit,
+    distances: &Distances,
+) -> Result<Option<Change>> {
+    let cell = distances.cell();
+    let Some(first) = unfit.vertices.first().copied().or_else(|| Some(unfit.bare.first()? * cell)) else {
+        return Ok(None);
+    };
+    let low = unfit.vertices.iter().fold(first, |low, place| low.inf(place));
+    let high = unfit.vertices.iter().fold(first, |high, place| high.sup(place));
+    let lattice = Lattice::near(cell, 0.5 * (low + high))?;
+    let in_cells: Vec<DVec3> = unfit.vertices.iter().map(|place| lattice.to_cells(*place)).collect();
+    let fixed = in_cells.iter().map(|place| lattice.fix(*place)).collect::<Result<Vec<_>>>()?;
+    let (shape, flagged) = ctx.phase("flag", || {
+        // Some 100 bytes for each edge of the grid, of which there are up to 1.7 for a cell's face.
+        let edges = |[a, b, c]: [DVec3; 3]| (b - a).cross(&(c - a)).norm() / 2.0;
+        let faces: f64 =
+            unfit.triangles.iter().map(|names| edges(names.map(|name| in_cells[name as usize]))).sum();
+        ctx.allow("the mesh's cells (larger ones need less)", (170.0 * faces).min(1e18) as u64)?;
+        let pierces = Pierces::of(&fixed, unfit.triangles);
+        let shape = Shape { fixed, triangles: unfit.triangles.to_vec(), pierces };
+        ctx.check()?;
+        let mut flagged = flagged(unfit, &shape, &lattice);
+        if let Some(everywhere) = &unfit.everywhere {
+            everywhere.flag(ctx, &shape, (&in_cells, &lattice), (phi, distances), &mut flagged)?;
+        }
+        Ok((shape, flagged))
+    })?;
+    if flagged.count() == 0 {
+        return Ok(None);
+    }
+    let gamma =
+        ctx.phase("match", || Gamma::matched(ctx, &shape, &in_cells, &lattice, &flagged, (phi, distances)))?;
+    let mut set = flagged.clone();
+    for node in gamma.turned() {
+        for n in 0..8 {
+            set.add([node[0] - (n >> 2), node[1] - (n >> 1 & 1), node[2] - (n & 1)]);
+        }
+    }
+    let rebuilt = ctx.phase("rebuild", || ladder(ctx, &shape, (&in_cells, &lattice), &set, &gamma))?;
+    let Rebuilt { draft, cells, rung, .. } = rebuilt;
+    let own = unfit.vertices.len();
+    let names = used(draft.places.len(), &draft.triangles)
+        .unwrap_or_else(|| (0..draft.places.len() as u32).collect());
+    let origin = DVec3::from(lattice.origin.map(f64::from));
+    let place = |name: &u32| match unfit.vertices.get(*name as usize) {
+        Some(place) => *place,
+        None => (draft.places[*name as usize] + origin) * cell,
+    };
+    let vertices = names.iter().map(place).collect();
+    Ok(Some(Change {
+        vertices,
+        triangles: crate::base::mesh::renumbered(&draft.triangles, &names),
+        origins: names.iter().map(|name| ((*name as usize) < own).then_some(*name)).collect(),
+        sources: draft.sources,
+        before: unfit.vertices.to_vec(),
+        delta: Vec::new(),
+        sizes: Vec::new(),
+        drifts: Vec::new(),
+        improvements: Improvements::default(),
+        dry: 0,
+        specks: 0,
+        flagged_cells: flagged.count(),
+        rebuilt_cells: cells,
+        rung,
+        iterations: gamma.iterations,
+    }))
+}
+
+/// Takes parts with too few particles away, improves a mesh (thesis 2.6), also where it was changed, and measures the vertices
+/// that were made. Sizes, and drifts up to now, are those of the mesh before the change; vertices that were made keep a distance of at most `most` (m): what lies
+/// farther from the particles' surface is no detail, and moves there, or is rebuilt again, in the next frame. None where nothing has
+/// changed.
+///
+/// # Errors
+/// Cancel.
+pub fn improved(
+    ctx: &Context,
+    unfit: &Unfit<'_>,
+    (sizes, drifts): (&[Size], &[[f32; 3]]),
+    change: Option<Change>,
+    distances: &Distances,
+    crowd: &Crowd<'_>,
+    most: f64,
+) -> Result<Option<Change>> {
+    let mut is_changed = change.is_some();
+    let cell = distances.cell();
+    let mut change = change.unwrap_or_else(|| Change::nothing(unfit));
+    [change.dry, change.specks] = ctx.phase("dry", || Ok(change.drop_dry(crowd)))?;
+    is_changed |= change.dry + change.specks > 0;
+    let born = BORN.map(|share| (share * cell) as f32);
+    change.sizes = change.origins.iter().map(|at| at.map_or(born, |at| sizes[at as usize])).collect();
+    change.drifts = change.origins.iter().map(|at| at.map_or([0.0; 3], |at| drifts[at as usize])).collect();
+    let mut flags: Vec<bool> =
+        change.origins.iter().map(|at| at.is_some_and(|at| unfit.flags[at as usize])).collect();
+    let mut mesh = Improvable {
+        places: &mut change.vertices,
+        triangles: &mut change.triangles,
+        sizes: &mut change.sizes,
+        drifts: &mut change.drifts,
+        origins: &mut change.origins,
+        sources: &mut change.sources,
+        flags: &mut flags,
+        tremble: TREMBLE * crowd.spacing,
+    };
+    change.improvements = ctx.phase("improve", || improve(ctx, &mut mesh))?;
+    if !is_changed && change.improvements == Improvements::default() {
+        return Ok(None);
+    }
+    let mut sampler = Sampler::new(distances);
+    let made = change.vertices.iter().zip(&change.origins).filter(|(_, origin)| origin.is_none());
+    let mut distance = |place: DVec3| match foot(&mut sampler, place) {
+        Some(foot) => foot.distance,
+        None => sampler.at(place).map_or(0.0, |(distance, _)| f64::from(distance)),
+    };
+    change.delta =
+        made.map(|(place, _)| (distance(*place / cell) * cell).clamp(-most, most) as f32).collect();
+    Ok(Some(change))
+}
+
+/// The cells in which the mesh does not fit: those of triangles around flagged vertices, those of the places that it should have, and
+/// those in which it has passed through itself.
+fn flagged(unfit: &Unfit<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
+    let mut set = CellSet::default();
+    for (triangle, names) in (0..).zip(unfit.triangles) {
+        if names.iter().any(|name| unfit.flags[*name as usize]) {
+            shape.cells_of(triangle).into_iter().for_each(|cell| _ = set.add(cell));
+        }
+    }
+    for place in unfit.bare {
+        let cell: Coord = cell_of(place);
+        set.add([0, 1, 2].map(|axis| cell[axis] - lattice.origin[axis]));
+    }
+    overlaps(shape, DEEP, &mut set);
+    set
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::faults::Faults;
+    use crate::context::Pool;
+    use crate::surface::balls::{own_surface, two_balls};
+    use crate::surface::{Params, Tracker};
+
+    #[test]
+    fn two_balls_become_one_and_part_again() {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        // Together and apart, with a hollow in time to merge.
+        let away = |frame: i32| 9.0 - 0.25 * f64::from(if frame < 24 { frame } else { 48 - frame });
+        let at = |frame: i32| two_balls(5.5, DVec3::new(away(frame), 0.1, 0.2));
+        let mut from = at(0);
+        let mesh = own_surface(&ctx, &from.places);
+        let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
+        let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
+        let mut parts = Vec::new();
+        for frame in 1..=48 {
+            let to = at(frame);
+            tracker.step(&ctx, &from, &to, 1.0 / 24.0).unwrap();
+            from = to;
+            let faults = Faults::of(&tracker.mesh());
+            assert!(faults.by_index.is_watertight(), "{frame}: {faults:?}");
+            parts.push(faults.parts);
+        }
+        assert!(parts.contains(&1) && parts[0] == 2 && parts[47] == 2, "{parts:?}");
+    }
+}

@@ -1,0 +1,257 @@
+//! Places of the particles' surface that the mesh does not cover, though it covers others of the same part: a bridge that has just
+//! grown between two bodies, the rim of a hole. They tell of a change before a vertex jumps there (the early test that thesis 2.3.3
+//! has not: a thread between vertices moves none of them).
+//!
+//! What covers the surface is the mesh of the feet: each vertex without its detail. Where nothing changes it lies on the surface.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::uncovered_parts::Parts;
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::distance::triangle::Triangle;
+use crate::error::Result;
+use crate::surface::level_set::implicit::{Implicit, SIDE};
+use crate::surface::level_set::isosurface::Isosurface;
+use crate::surface::particles::grid::{Coord, cell_of};
+
+/// A place of the surface is covered if a triangle of feet is so near (spacings; a cell at least).
+const SLACK: f64 = 0.5;
+/// Vertices whose feet are so near to an uncovered place are beside it (spacings; two cells at least).
+const BESIDE: f64 = 1.0;
+/// How many times as far this is at the first frame, whose gaps are no change: as the surface moves through the grid they look a
+/// little larger or smaller.
+const FIRST: f64 = 2.0;
+/// A triangle of feet over more bins than this on an axis does not lie on the surface.
+const LONG: f64 = 1024.0;
+/// Vertices, places or triangles between looks for a cancel.
+const GRAIN: usize = 2048;
+
+/// The mesh without its detail, on the particles' surface.
+pub struct Cover<'a> {
+    /// The foot of each vertex (cells), if it has one.
+    pub feet: &'a [Option<DVec3>],
+    pub triangles: &'a [[u32; 3]],
+    /// Initial distance between particles (cells).
+    pub spacing: f64,
+    /// Whether it is as it was given.
+    pub is_first: bool,
+}
+
+impl Cover<'_> {
+    /// Whether each vertex is beside a place of the surface that is not covered, and these places (cells).
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn beside_bare(
+        &self,
+        ctx: &Context,
+        phi: &Implicit,
+        surface: &Isosurface,
+        parts: &Parts,
+    ) -> Result<(Vec<bool>, Vec<DVec3>)> {
+        let mut trodden = Marks::default();
+        self.feet.iter().flatten().for_each(|foot| trodden.set(cell_of(foot)));
+        ctx.check()?;
+        let bare = self.bare(ctx, &doubtful(phi, surface, parts, &trodden))?;
+        let reach = self.reach();
+        let items = bare.iter().zip(0..).map(|(place, index)| (bin_of(place, reach), index)).collect();
+        let bins = Bins::new(reach, items);
+        let is_beside = |foot: &Option<DVec3>| {
+            let foot = foot.as_ref()?;
+            let mut near = bins.near(foot).map(|place| (bare[place as usize] - foot).norm());
+            near.any(|distance| distance <= reach).then_some(())
+        };
+        let flags: Vec<Vec<bool>> = self
+            .feet
+            .par_chunks(GRAIN)
+            .map(|feet| {
+                ctx.check()?;
+                Ok(feet.iter().map(|foot| is_beside(foot).is_some()).collect())
+            })
+            .collect::<Result<_>>()?;
+        Ok((flags.concat(), bare))
+    }
+
+    /// How near to an uncovered place a vertex' foot is beside it (cells).
+    pub fn reach(&self) -> f64 {
+        (BESIDE * self.spacing).max(2.0) * if self.is_first { FIRST } else { 1.0 }
+    }
+
+    /// Those of some places (cells) that no triangle of feet is near.
+    fn bare(&self, ctx: &Context, places: &[DVec3]) -> Result<Vec<DVec3>> {
+        if places.is_empty() {
+            return Ok(Vec::new());
+        }
+        let slack = (SLACK * self.spacing).max(1.0);
+        let mut wanted = Marks::default();
+        places.iter().for_each(|place| around(bin_of(place, slack)).for_each(|bin| wanted.set(bin)));
+        let in_bins = |(chunk, triangles): (usize, &[[u32; 3]])| {
+            ctx.check()?;
+            let (mut out, mut bins) = (Vec::new(), Vec::new());
+            for (triangle, index) in triangles.iter().zip((chunk * GRAIN) as u32..) {
+                let Some(corners) = self.corners(triangle) else { continue };
+                each_bin(corners, slack, |bin| bins.push(bin));
+                // Parts of a long triangle share most of theirs.
+                bins.sort_unstable();
+                bins.dedup();
+                out.extend(bins.drain(..).filter(|bin| wanted.has(*bin)).map(|bin| (bin, index)));
+            }
+            Ok(out)
+        };
+        let lists: Vec<Vec<(Coord, u32)>> = self
+            .triangles
+            .par_chunks(GRAIN)
+            .enumerate()
+            .map(|(n, part)| in_bins((n, part)))
+            .collect::<Result<_>>()?;
+        let bins = Bins::new(slack, lists.concat());
+        let is_bare =
+            |place: &DVec3| !bins.near(place).any(|triangle| self.distance(triangle, place) <= slack);
+        let parts: Vec<Vec<DVec3>> = places
+            .par_chunks(GRAIN)
+            .map(|places| {
+                ctx.check()?;
+                Ok(places.iter().filter(|place| is_bare(place)).copied().collect())
+            })
+            .collect::<Result<_>>()?;
+        Ok(parts.concat())
+    }
+
+    fn corners(&self, triangle: &[u32; 3]) -> Option<[DVec3; 3]> {
+        let [a, b, c] = triangle.map(|vertex| self.feet[vertex as usize]);
+        Some([a?, b?, c?])
+    }
+
+    /// Distance (cells) of a place from a triangle of feet.
+    fn distance(&self, triangle: u32, place: &DVec3) -> f64 {
+        let corners = self.corners(&self.triangles[triangle as usize]).expect("it was listed with its feet");
+        let seen = corners.map(|corner| (corner - place).cast::<f32>().into());
+        DVec3::from(Triangle::of_cells(seen).closest([0.0; 3]).map(f64::from)).norm()
+    }
+}
+
+/// Corners of the surface's triangles (cells), on parts that have feet, in cells without any.
+fn doubtful(phi: &Implicit, surface: &Isosurface, parts: &Parts, trodden: &Marks) -> Vec<DVec3> {
+    let place = |vertex: u32| {
+        let place = surface.in_cells(phi, vertex);
+        (parts.is_covered(vertex) && !trodden.has(cell_of(&place))).then_some(place)
+    };
+    (0..surface.vertices() as u32).into_par_iter().with_min_len(4096).filter_map(place).collect()
+}
+
+/// What lies in cubes of an edge (cells).
+struct Bins {
+    edge: f64,
+    /// Ascending, each once.
+    items: Vec<(Coord, u32)>,
+}
+
+impl Bins {
+    fn new(edge: f64, mut items: Vec<(Coord, u32)>) -> Self {
+        items.par_sort_unstable();
+        items.dedup();
+        Self { edge, items }
+    }
+
+    /// What lies in the bin of a place (cells) and in those around it.
+    fn near(&self, place: &DVec3) -> impl Iterator<Item = u32> {
+        let [x, y, z] = bin_of(place, self.edge);
+        // The three along z are neighbours in the order.
+        (x - 1..=x + 1).flat_map(move |x| (y - 1..=y + 1).map(move |y| (x, y))).flat_map(move |(x, y)| {
+            let from = self.items.partition_point(|(bin, _)| *bin < [x, y, z - 1]);
+            self.items[from..].iter().take_while(move |(bin, _)| *bin <= [x, y, z + 1]).map(|(_, item)| *item)
+        })
+    }
+}
+
+/// Calls `see` with bins of an edge (cells) that together hold a triangle; it is divided until its box is that of a few.
+fn each_bin(triangle: [DVec3; 3], edge: f64, mut see: impl FnMut(Coord)) {
+    let [a, b, c] = &triangle;
+    if (a.sup(b).sup(c) - a.inf(b).inf(c)).max() > LONG * edge {
+        return;
+    }
+    // Most triangles are no larger than a few bins: the list is not allocated for these.
+    let (mut due, mut next) = (Vec::new(), Some(triangle));
+    while let Some([a, b, c]) = next {
+        let [low, high] = [bin_of(&a.inf(&b).inf(&c), edge), bin_of(&a.sup(&b).sup(&c), edge)];
+        if (0..3).all(|axis| high[axis] - low[axis] <= 1) {
+            each_between(low, high).for_each(&mut see);
+            next = due.pop();
+            continue;
+        }
+        // The longest edge, ab, is halved.
+        let lengths = [(a - b).norm_squared(), (b - c).norm_squared(), (c - a).norm_squared()];
+        let [a, b, c] = match lengths {
+            [ab, bc, ca] if ab >= bc && ab >= ca => [a, b, c],
+            [_, bc, ca] if bc >= ca => [b, c, a],
+            _ => [c, a, b],
+        };
+        let middle = 0.5 * (a + b);
+        due.push([a, middle, c]);
+        next = Some([middle, b, c]);
+    }
+}
+
+/// Marked bins or cells: a bit for each of those in a patch.
+#[derive(Default)]
+struct Marks {
+    patches: HashMap<Coord, u64>,
+}
+
+impl Marks {
+    fn set(&mut self, cell: Coord) {
+        *self.patches.entry(cell.map(|x| x.div_euclid(SIDE))).or_default() |= bit(cell);
+    }
+
+    fn has(&self, cell: Coord) -> bool {
+        self.patches.get(&cell.map(|x| x.div_euclid(SIDE))).is_some_and(|bits| bits & bit(cell) != 0)
+    }
+}
+
+fn bit(cell: Coord) -> u64 {
+    let [x, y, z] = cell.map(|x| x.rem_euclid(SIDE));
+    1 << (x << 4 | y << 2 | z)
+}
+
+fn bin_of(place: &DVec3, edge: f64) -> Coord {
+    cell_of(&(place / edge))
+}
+
+/// Bins from one to another, ascending.
+fn each_between(low: Coord, high: Coord) -> impl Iterator<Item = Coord> {
+    let on = move |axis: usize| low[axis]..=high[axis];
+    on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])))
+}
+
+/// A bin and those around it.
+fn around(bin: Coord) -> impl Iterator<Item = Coord> {
+    each_between(bin.map(|x| x - 1), bin.map(|x| x + 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bins_of_a_triangle_hold_all_of_it_and_a_sliver_has_few() {
+        let corners = [DVec3::new(0.3, 0.2, 0.1), DVec3::new(40.2, 38.9, 41.7), DVec3::new(40.3, 39.0, 41.5)];
+        let mut bins = Vec::new();
+        each_bin(corners, 1.0, |bin| bins.push(bin));
+        bins.sort_unstable();
+        bins.dedup();
+        assert!(bins.len() < 500, "{}", bins.len());
+        for n in 0..=1000 {
+            let share = f64::from(n) / 1000.0;
+            for end in [corners[1], corners[2]] {
+                let place = corners[0] + (end - corners[0]) * share;
+                assert!(bins.binary_search(&cell_of(&place)).is_ok(), "{place}");
+            }
+        }
+        each_bin([DVec3::zeros(), DVec3::new(3e3, 0.0, 0.0), DVec3::new(0.0, 1.0, 0.0)], 1.0, |_| {
+            panic!("it is too long")
+        });
+    }
+}

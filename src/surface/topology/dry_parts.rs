@@ -1,0 +1,164 @@
+//! Parts of the mesh without liquid, crumbs that were left where it went, and those with too little of it. They are taken away.
+
+use super::change::Change;
+use super::particle_count::{Bounds, Crowd, are_inside, seen_from};
+use crate::base::DVec3;
+use crate::base::mesh::{renumbered, used};
+use crate::base::topology::{self, bodies};
+use crate::surface::repair::Source;
+
+impl Change {
+    /// Takes away the parts of the mesh with a volume over 0 that hold too few particles, and what hollows are in them. Returns how many
+    /// held none, and how many some; hollows are not counted. A mesh of one part stays.
+    pub(in crate::surface) fn drop_dry(&mut self, crowd: &Crowd<'_>) -> [usize; 2] {
+        // Mostly there is one.
+        if topology::parts(self.vertices.len(), &self.triangles) < 2 {
+            return [0; 2];
+        }
+        let (mut parts, mut bounds): (Vec<Vec<u32>>, Vec<Bounds>) = Default::default();
+        let mut hollows: Vec<Vec<u32>> = Vec::new();
+        for part in bodies(&self.triangles) {
+            match self.bounds(&part) {
+                Some(own) => {
+                    parts.push(part);
+                    bounds.push(own);
+                }
+                None => hollows.push(part),
+            }
+        }
+        let mesh = |at: usize| {
+            let corners: Vec<[DVec3; 3]> = self.corners(&parts[at]).collect();
+            seen_from(bounds[at][0], &corners)
+        };
+        let counts = crowd.held(&bounds, mesh);
+        let out: Vec<usize> = (0..parts.len()).filter(|part| counts[*part] < crowd.least).collect();
+        let mut gone = [0; 2];
+        out.iter().for_each(|part| gone[usize::from(counts[*part] > 0)] += 1);
+        if gone == [0; 2] {
+            return gone;
+        }
+        // Parts do not pass through each other, so one corner tells. A part within one of too few particles has too few, too.
+        let corners = hollows.iter().filter_map(|hollow| self.corners(hollow).next());
+        let firsts: Vec<DVec3> = corners.map(|[first, ..]| first).collect();
+        let out_bounds: Vec<Bounds> = out.iter().map(|part| bounds[*part]).collect();
+        let are_out = are_inside(&firsts, &out_bounds, |at| mesh(out[at]));
+        let hollows = hollows.iter().zip(are_out).filter(|(_, is_out)| *is_out).map(|(hollow, _)| hollow);
+        let mut is_out = vec![false; self.triangles.len()];
+        for triangle in out.iter().map(|part| &parts[*part]).chain(hollows).flatten() {
+            is_out[*triangle as usize] = true;
+        }
+        let mut marks = is_out.iter();
+        self.triangles.retain(|_| !marks.next().copied().unwrap_or_default());
+        let mut marks = is_out.iter();
+        self.sources.retain(|_: &Source| !marks.next().copied().unwrap_or_default());
+        let names = used(self.vertices.len(), &self.triangles)
+            .unwrap_or_else(|| (0..self.vertices.len() as u32).collect());
+        self.triangles = renumbered(&self.triangles, &names);
+        self.vertices = names.iter().map(|name| self.vertices[*name as usize]).collect();
+        self.origins = names.iter().map(|name| self.origins[*name as usize]).collect();
+        gone
+    }
+
+    /// The bounds of a part (m), if it has a volume over 0.
+    fn bounds(&self, part: &[u32]) -> Option<Bounds> {
+        let [first, ..] = self.corners(part).next()?;
+        let (mut low, mut high, mut six) = (first, first, 0.0);
+        for [a, b, c] in self.corners(part) {
+            (low, high) = (low.inf(&a).inf(&b).inf(&c), high.sup(&a).sup(&b).sup(&c));
+            six += (a - first).dot(&(b - first).cross(&(c - first)));
+        }
+        (six > 0.0).then_some([low, high])
+    }
+
+    /// Places (m) of the corners of some triangles.
+    fn corners<'a>(&'a self, part: &'a [u32]) -> impl Iterator<Item = [DVec3; 3]> + 'a {
+        part.iter()
+            .map(move |triangle| self.triangles[*triangle as usize].map(|at| self.vertices[at as usize]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::{Context, Pool};
+    use crate::surface::balls::{numbered, own_surface, shell};
+    use crate::surface::{Params, Particles, Tracker};
+
+    const FRAMES: i32 = 28;
+    /// From this frame on both drops are far from the ball.
+    const AWAY: i32 = 23;
+
+    /// A box of places 1 m apart.
+    fn lattice(low: DVec3, counts: [u32; 3]) -> impl Iterator<Item = DVec3> {
+        let on = move |axis: usize| (0..counts[axis]).map(f64::from);
+        on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| low + DVec3::new(x, y, z))))
+    }
+
+    /// A ball, from which a drop of 4 particles flies one way and one of 20 the other, and where the middles of these are.
+    fn splash(frame: i32) -> (Particles, [DVec3; 2]) {
+        let way = 3.6 + 0.25 * f64::from(frame);
+        let [small, large] = [DVec3::new(way, 0.4, 0.4), DVec3::new(-way - 4.0, 0.4, 0.4)];
+        let ball = shell(DVec3::zeros(), 0.0, 4.5);
+        let four = lattice(small, [2, 2, 1]);
+        let twenty = lattice(large, [5, 2, 2]);
+        let places = ball.into_iter().chain(four).chain(twenty).collect();
+        let middles = [small + DVec3::new(0.5, 0.5, 0.0), large + DVec3::new(2.0, 0.5, 0.5)];
+        (numbered(places), middles)
+    }
+
+    /// Follows it to the end: how many specks were taken away, and in each of the last frames the counts of vertices at both drops.
+    fn followed(min_drop: usize) -> (usize, Vec<[usize; 2]>) {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        let mut from = splash(0).0;
+        let mesh = own_surface(&ctx, &from.places);
+        let params = Params { rebuild: true, min_drop, ..Params::for_spacing(1.0) };
+        let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
+        let (mut specks, mut counts) = (0, Vec::new());
+        for frame in 1..=FRAMES {
+            let (to, middles) = splash(frame);
+            let report = tracker.step(&ctx, &from, &to, 1.0 / 24.0).unwrap();
+            from = to;
+            specks += report.change.map_or(0, |change| change.specks);
+            if frame >= AWAY {
+                let near = |middle: DVec3| {
+                    tracker.vertices().iter().filter(|place| (**place - middle).norm() < 2.2).count()
+                };
+                counts.push(middles.map(near));
+            }
+        }
+        (specks, counts)
+    }
+
+    #[test]
+    fn drops_of_too_few_particles_go_and_stay_away() {
+        let (specks, counts) = followed(1);
+        assert!(specks == 0 && counts.iter().flatten().all(|count| *count > 8), "{specks}: {counts:?}");
+        let (specks, counts) = followed(8);
+        assert!(specks > 0, "{counts:?}");
+        assert!(counts.iter().all(|[small, large]| *small == 0 && *large > 8), "{counts:?}");
+    }
+
+    #[test]
+    fn a_hollow_goes_with_the_drop_around_it() {
+        const LEAST: usize = 1200;
+        let ctx = Context::new(Pool::new(2).unwrap());
+        let ball = shell(DVec3::zeros(), 0.0, 7.0);
+        let hollow = shell(DVec3::new(-20.0, 0.3, 0.2), 4.0, 6.5);
+        assert!(hollow.len() < LEAST && ball.len() >= LEAST, "{} and {}", hollow.len(), ball.len());
+        let particles = numbered([ball, hollow].concat());
+        let mesh = own_surface(&ctx, &particles.places);
+        assert_eq!(bodies(&mesh.triangles).len(), 3);
+        for every in [false, true] {
+            let params = Params { rebuild: true, every, min_drop: LEAST, ..Params::for_spacing(1.0) };
+            let mut tracker = Tracker::new(&ctx, params, &mesh, &particles).unwrap();
+            let mut specks = 0;
+            for step in 0..3 {
+                let report = tracker.step(&ctx, &particles, &particles, 1.0 / 24.0).unwrap();
+                specks += report.change.map_or(0, |change| change.specks);
+                let left = tracker.vertices().iter().filter(|place| place.x < -10.0).count();
+                assert!(left == 0, "{left} vertices after step {step}, every = {every}");
+            }
+            assert!(specks == 1 && bodies(tracker.triangles()).len() == 1, "{specks}, every = {every}");
+        }
+    }
+}

@@ -1,0 +1,469 @@
+//! Changes that no vertex tells of (thesis 2.8, "at every frame"): where the mesh is not where the particles' surface is, by more than its
+//! detail, though each of its vertices was projected.
+//!
+//! A vertex that was projected lies as far from phi = 0 as it keeps. So what is hidden lies between vertices, or has none, or never
+//! had a distance to keep:
+//!
+//! | what | found by |
+//! |---|---|
+//! | liquid without a mesh, a mesh without liquid | nodes inside of the one and outside of the other, farther from phi = 0 than vertices around keep |
+//! | needles, and films across a gap | places on triangles, farther from phi = 0 than the corners keep |
+//! | hollows of the mesh in which there is liquid | closed parts with a volume below 0 that lie inside of phi |
+//!
+//! Bubbles and drops that the mesh does not cover are known anyway (`topology/uncovered_parts.rs`).
+
+use std::collections::{BTreeMap, HashSet};
+
+use rayon::prelude::*;
+
+use super::mesh_distance::{between, far, node};
+use super::particle_count::{Bounds, is_within};
+use crate::base::DVec3;
+use crate::base::blocks::{VOXELS, offset};
+use crate::base::topology::{bodies, parts};
+use crate::context::Context;
+use crate::distance::lattice::Lattice;
+use crate::error::Result;
+use crate::surface::level_set::band::Distances;
+use crate::surface::level_set::implicit::Implicit;
+use crate::surface::level_set::sampler::Sampler;
+use crate::surface::particles::grid::{Coord, cell_of};
+use crate::surface::repair::{CellSet, Shape};
+
+/// How much farther from phi = 0 than detail reaches the mesh must be (spacings; a cell at least).
+const SLACK: f64 = 0.5;
+/// Triangles between looks for a cancel.
+const GRAIN: usize = 2048;
+/// A triangle in more blocks than this is looked for from each block.
+const LARGE: i64 = 512;
+/// Vertices are rounded by less than this (cells).
+const ROUNDED: f64 = 0.01;
+/// Most places on a triangle along an axis.
+const PLACES: f64 = 4096.0;
+
+/// What it takes to find where a mesh does not fit, all over it.
+pub struct Everywhere<'a> {
+    /// The distance that each vertex keeps (m); NaN: it has none.
+    pub kept: &'a [f32],
+    /// Initial distance between particles (cells).
+    pub spacing: f64,
+    /// Bounds (cells) of drops that the mesh should not have.
+    pub specks: &'a [Bounds],
+}
+
+impl Everywhere<'_> {
+    /// Adds the cells in which a mesh does not fit and no vertex says so. Vertices have these places (cells from the lattice's origin);
+    /// `phi` and its distances are on the same grid.
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn flag(
+        &self,
+        ctx: &Context,
+        shape: &Shape,
+        (in_cells, lattice): (&[DVec3], &Lattice),
+        (phi, distances): (&Implicit, &Distances),
+        set: &mut CellSet,
+    ) -> Result<()> {
+        let cell = distances.cell() as f32;
+        // No number is less than 0.
+        let keeps = self.kept.iter().map(|delta| (delta.abs() / cell).max(0.0)).collect();
+        let slack = (SLACK * self.spacing).max(1.0) as f32;
+        let origin = lattice.origin;
+        let mesh = Compared { shape, in_cells, kept: self.kept, keeps, slack, origin, phi, distances };
+        for node in mesh.differing(ctx)? {
+            let place = DVec3::from(plus(node, origin).map(f64::from));
+            if !self.specks.iter().any(|speck| is_within(speck, &place)) {
+                cells_at(node).for_each(|cell| _ = set.add(cell));
+            }
+        }
+        mesh.stray(ctx)?.into_iter().for_each(|cell| _ = set.add(cell));
+        mesh.hollows(ctx, set)
+    }
+}
+
+/// A mesh and the particles' surface.
+struct Compared<'a> {
+    shape: &'a Shape,
+    /// Places of vertices (cells from the lattice's origin).
+    in_cells: &'a [DVec3],
+    /// See [`Everywhere::kept`].
+    kept: &'a [f32],
+    /// The size of that (cells); 0 where there is none.
+    keeps: Vec<f32>,
+    /// Cells.
+    slack: f32,
+    /// The lattice's origin.
+    origin: Coord,
+    phi: &'a Implicit,
+    distances: &'a Distances,
+}
+
+/// A triangle in many blocks: the least and the greatest of them, and the most that its corners keep (cells).
+struct Large {
+    low: Coord,
+    high: Coord,
+    keeps: f32,
+}
+
+impl Large {
+    /// Whether a block is so many blocks from it at most.
+    fn is_near(&self, block: Coord, by: i32) -> bool {
+        (0..3).all(|axis| (self.low[axis] - by..=self.high[axis] + by).contains(&block[axis]))
+    }
+}
+
+/// What triangles are in blocks.
+#[derive(Default)]
+struct Passed {
+    /// The most that corners of triangles in a block keep (cells).
+    keeps: BTreeMap<Coord, f32>,
+    large: Vec<Large>,
+}
+
+impl Compared<'_> {
+    /// Nodes inside of the mesh and outside of phi, or the other way round, farther from phi = 0 than detail there.
+    fn differing(&self, ctx: &Context) -> Result<Vec<Coord>> {
+        let passed = self.passed(ctx)?;
+        let origin = self.origin.map(|at| at >> 3);
+        let known = self.distances.coords().iter().map(|block| [0, 1, 2].map(|at| block[at] - origin[at]));
+        let mut blocks: Vec<Coord> = known.chain(passed.keeps.keys().copied()).collect();
+        blocks.sort_unstable();
+        blocks.dedup();
+        let lists: Vec<Vec<Coord>> = blocks
+            .par_iter()
+            .map(|block| {
+                ctx.check()?;
+                Ok(self.differing_in(*block, &passed))
+            })
+            .collect::<Result<_>>()?;
+        Ok(lists.concat())
+    }
+
+    fn differing_in(&self, block: Coord, passed: &Passed) -> Vec<Coord> {
+        let around = between(block.map(|at| at - 1), block.map(|at| at + 1));
+        let near = around.filter_map(|block| passed.keeps.get(&block).copied());
+        let large = passed.large.iter().filter(|large| large.is_near(block, 1)).map(|large| large.keeps);
+        let allowed = self.slack + near.chain(large).fold(0.0, f32::max);
+        let there = plus(block, self.origin.map(|at| at >> 3));
+        let reach = self.distances.reach_in(there);
+        if allowed >= reach {
+            return Vec::new();
+        }
+        let known = self.distances.find(there).map(|slot| self.distances.values(slot));
+        let is_passed =
+            passed.keeps.contains_key(&block) || passed.large.iter().any(|large| large.is_near(block, 0));
+        // Where the mesh does not pass, all nodes are on one side of it.
+        let first = self.is_inside(node(block, 0));
+        let differs = |at: usize| {
+            let node = node(block, at);
+            let phi = known.map_or_else(|| far(self.phi, reach, there, at), |values| values[at]);
+            let is_inside = || if is_passed { self.is_inside(node) } else { first };
+            (phi.abs() > allowed && is_inside() != (phi < 0.0)).then_some(node)
+        };
+        (0..VOXELS).filter_map(differs).collect()
+    }
+
+    /// The blocks in which triangles are.
+    fn passed(&self, ctx: &Context) -> Result<Passed> {
+        let in_blocks = |triangles: &[[u32; 3]]| {
+            ctx.check()?;
+            let mut out = Passed::default();
+            for names in triangles {
+                let [a, b, c] = self.corners(names);
+                let side =
+                    |place: DVec3, by: f64| [0, 1, 2].map(|axis| ((place[axis] + by).floor() as i32) >> 3);
+                let low = side(a.inf(&b).inf(&c), -ROUNDED);
+                let high = side(a.sup(&b).sup(&c), ROUNDED);
+                let keeps = self.most_kept(names);
+                let size = (0..3).map(|axis| i64::from(high[axis] - low[axis]) + 1).product::<i64>();
+                if size > LARGE {
+                    out.large.push(Large { low, high, keeps });
+                } else {
+                    between(low, high).for_each(|block| raise(&mut out.keeps, block, keeps));
+                }
+            }
+            Ok(out)
+        };
+        let parts: Vec<Passed> =
+            self.shape.triangles.par_chunks(GRAIN).map(in_blocks).collect::<Result<_>>()?;
+        let mut all = Passed::default();
+        for part in parts {
+            part.keeps.into_iter().for_each(|(block, keeps)| raise(&mut all.keeps, block, keeps));
+            all.large.extend(part.large);
+        }
+        Ok(all)
+    }
+
+    /// Cells with places of triangles that are farther from phi = 0 than their corners keep.
+    fn stray(&self, ctx: &Context) -> Result<Vec<Coord>> {
+        let in_cells = |sampler: &mut Sampler<'_>, triangles: &[[u32; 3]]| {
+            ctx.check()?;
+            let mut out = Vec::new();
+            for names in triangles {
+                let [a, b, c] = longest_first(self.corners(names));
+                // Short ones cannot be farther than corners that are where they should be.
+                let is_known = names.iter().all(|name| !self.kept[*name as usize].is_nan());
+                if is_known && (b - a).norm() <= 2.0 * f64::from(self.slack) {
+                    continue;
+                }
+                let allowed = self.slack + self.most_kept(names);
+                each_place([a, b, c], |place| {
+                    if self.phi_at(sampler, place).abs() > allowed {
+                        out.push(cell_of(&place));
+                    }
+                });
+            }
+            Ok(out)
+        };
+        let lists: Vec<Vec<Coord>> = self
+            .shape
+            .triangles
+            .par_chunks(GRAIN)
+            .map_init(|| Sampler::new(self.distances), in_cells)
+            .collect::<Result<_>>()?;
+        Ok(lists.concat())
+    }
+
+    /// Adds the cells of hollows of the mesh that lie inside of phi, with all that is in them.
+    fn hollows(&self, ctx: &Context, set: &mut CellSet) -> Result<()> {
+        let triangles = &self.shape.triangles;
+        if parts(self.in_cells.len(), triangles) < 2 {
+            return Ok(());
+        }
+        let mut sampler = Sampler::new(self.distances);
+        for part in bodies(triangles) {
+            ctx.check()?;
+            let corners = || part.iter().map(move |triangle| self.corners(&triangles[*triangle as usize]));
+            let Some([first, ..]) = corners().next() else { continue };
+            let six = corners().map(|[a, b, c]| (a - first).dot(&(b - first).cross(&(c - first))));
+            let is_hollow = six.sum::<f64>() < 0.0;
+            if is_hollow && corners().flatten().all(|place| self.phi_at(&mut sampler, place) < -self.slack) {
+                let cells = part.iter().flat_map(|triangle| self.shape.cells_of(*triangle)).collect();
+                self.fill(cells, set);
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the cells of a hollow's surface and those with nodes in it.
+    fn fill(&self, surface: Vec<Coord>, set: &mut CellSet) {
+        let of = |pick: fn(i32, i32) -> i32| {
+            surface.iter().copied().reduce(|a, b| [0, 1, 2].map(|axis| pick(a[axis], b[axis])))
+        };
+        let (Some(low), Some(high)) = (of(i32::min), of(i32::max)) else { return };
+        let mut due: Vec<Coord> = Vec::new();
+        for cell in surface {
+            set.add(cell);
+            due.extend((0..8).map(|n| plus(cell, corner(n))));
+        }
+        let mut seen: HashSet<Coord> = HashSet::new();
+        while let Some(node) = due.pop() {
+            let is_there = (0..3).all(|axis| (low[axis]..=high[axis] + 1).contains(&node[axis]));
+            if !is_there || !seen.insert(node) || self.is_inside(node) || self.phi_of(node) >= -self.slack {
+                continue;
+            }
+            cells_at(node).for_each(|cell| _ = set.add(cell));
+            for axis in 0..3 {
+                for by in [-1, 1] {
+                    let mut beside = node;
+                    beside[axis] += by;
+                    due.push(beside);
+                }
+            }
+        }
+    }
+
+    /// Whether a node is inside of the mesh.
+    fn is_inside(&self, node: Coord) -> bool {
+        self.shape.pierces.winding(node) > 0
+    }
+
+    /// phi at a node (cells).
+    fn phi_of(&self, node: Coord) -> f32 {
+        let node = plus(node, self.origin);
+        let block = node.map(|at| at >> 3);
+        let [x, y, z] = node.map(|at| (at & 7) as usize);
+        match self.distances.find(block) {
+            Some(slot) => self.distances.values(slot)[offset(x, y, z)],
+            None => far(self.phi, self.distances.reach(), block, offset(x, y, z)),
+        }
+    }
+
+    /// phi at a place (cells).
+    fn phi_at(&self, sampler: &mut Sampler<'_>, place: DVec3) -> f32 {
+        match sampler.at(place + DVec3::from(self.origin.map(f64::from))) {
+            Some((phi, _)) => phi,
+            None => self.phi_of(cell_of(&place)),
+        }
+    }
+
+    fn corners(&self, names: &[u32; 3]) -> [DVec3; 3] {
+        names.map(|name| self.in_cells[name as usize])
+    }
+
+    /// The most that corners keep (cells).
+    fn most_kept(&self, names: &[u32; 3]) -> f32 {
+        names.iter().map(|name| self.keeps[*name as usize]).fold(0.0, f32::max)
+    }
+}
+
+/// Raises what is kept in a block.
+fn raise(all: &mut BTreeMap<Coord, f32>, block: Coord, keeps: f32) {
+    let most = all.entry(block).or_default();
+    *most = most.max(keeps);
+}
+
+fn plus(a: Coord, b: Coord) -> Coord {
+    [0, 1, 2].map(|axis| a[axis] + b[axis])
+}
+
+/// A corner of a cell, seen from its first node.
+fn corner(n: i32) -> Coord {
+    [n >> 2, n >> 1 & 1, n & 1]
+}
+
+/// The eight cells around a node.
+fn cells_at(node: Coord) -> impl Iterator<Item = Coord> {
+    (0..8).map(move |n| plus(node, corner(n).map(|at| -at)))
+}
+
+/// The corners of a triangle so that its longest edge is that from the first to the second.
+fn longest_first([a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
+    match [(a - b).norm_squared(), (b - c).norm_squared(), (c - a).norm_squared()] {
+        [ab, bc, ca] if ab >= bc && ab >= ca => [a, b, c],
+        [_, bc, ca] if bc >= ca => [b, c, a],
+        _ => [c, a, b],
+    }
+}
+
+/// Calls `see` with places on a triangle whose first edge is its longest, a cell apart or less.
+fn each_place([a, b, c]: [DVec3; 3], mut see: impl FnMut(DVec3)) {
+    let length = (b - a).norm();
+    let height = if length > 0.0 { (b - a).cross(&(c - a)).norm() / length } else { 0.0 };
+    let parts = |length: f64| length.ceil().clamp(1.0, PLACES);
+    let rows = parts(height);
+    for row in 0..=rows as u32 {
+        let share = f64::from(row) / rows;
+        let (from, to) = (a + (c - a) * share, b + (c - b) * share);
+        let steps = parts((to - from).norm());
+        for step in 0..=steps as u32 {
+            see(from + (to - from) * (f64::from(step) / steps));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::faults::Faults;
+    use crate::base::{TriMesh, Vec3};
+    use crate::context::Pool;
+    use crate::surface::balls::{numbered, own_surface, shell, two_balls};
+    use crate::surface::{Params, Tracker};
+
+    fn context() -> Context {
+        Context::new(Pool::new(2).unwrap())
+    }
+
+    /// What becomes of a mesh on particles that stay where they are.
+    fn followed(ctx: &Context, mesh: &TriMesh, places: &[DVec3], every: bool) -> Tracker {
+        let particles = numbered(places.to_vec());
+        let params = Params { rebuild: true, every, ..Params::for_spacing(1.0) };
+        let mut tracker = Tracker::new(ctx, params, mesh, &particles).unwrap();
+        for step in 0..3 {
+            let report = tracker.step(ctx, &particles, &particles, 1.0 / 24.0).unwrap();
+            assert!(step > 0 || report.flagged() == 0, "a vertex tells of it");
+            assert!(every || report.change.is_none(), "step {step}");
+        }
+        tracker
+    }
+
+    fn parts(mesh: &TriMesh) -> usize {
+        let faults = Faults::of(mesh);
+        assert!(faults.by_index.is_watertight(), "{faults:?}");
+        faults.parts
+    }
+
+    #[test]
+    fn a_hollow_with_liquid_in_it_is_filled() {
+        let ctx = context();
+        let places = shell(DVec3::zeros(), 0.0, 6.5);
+        let mut mesh = own_surface(&ctx, &places);
+        let hollow = own_surface(&ctx, &shell(DVec3::new(2.5, 0.3, 0.2), 0.0, 2.0));
+        let whole = mesh.volume();
+        mesh.append(&hollow.clone().reversed());
+        assert!(followed(&ctx, &mesh, &places, false).triangles() == mesh.triangles);
+        let filled = followed(&ctx, &mesh, &places, true).mesh();
+        let off = (filled.volume() - whole).abs();
+        assert!(parts(&filled) == 1 && off < 0.1 * hollow.volume(), "{off} m3 of {}", hollow.volume());
+    }
+
+    #[test]
+    fn a_bubble_of_the_liquid_is_meshed() {
+        let ctx = context();
+        let places = shell(DVec3::zeros(), 5.0, 8.5);
+        let whole = own_surface(&ctx, &places);
+        let of_part = |part: Vec<u32>| {
+            let triangles = part.iter().map(|triangle| whole.triangles[*triangle as usize]).collect();
+            TriMesh { positions: whole.positions.clone(), triangles }.without_unused()
+        };
+        let all: Vec<TriMesh> = bodies(&whole.triangles).into_iter().map(of_part).collect();
+        let outer = all.iter().max_by(|a, b| a.volume().total_cmp(&b.volume())).unwrap();
+        let bubble = outer.volume() - whole.volume();
+        assert!(all.len() == 2 && bubble > 100.0, "{} parts, {bubble} m3", all.len());
+        assert!(followed(&ctx, outer, &places, false).triangles() == outer.triangles);
+        let meshed = followed(&ctx, outer, &places, true).mesh();
+        let off = (meshed.volume() - whole.volume()).abs();
+        assert!(parts(&meshed) == 2 && off < 0.1 * bubble, "{off} m3 of {bubble}");
+    }
+
+    #[test]
+    fn a_needle_across_a_gap_is_cut() {
+        let ctx = context();
+        let places = two_balls(3.5, DVec3::new(-7.0, 0.0, 0.0)).places;
+        let mut mesh = own_surface(&ctx, &places);
+        // The tip of a triangle that looks at the other ball is pulled up to it.
+        let x = |name: u32| mesh.positions[name as usize].x;
+        let middle = |triangle: &usize| mesh.triangles[*triangle].map(x).iter().sum::<f32>();
+        let left = (0..mesh.triangles.len()).filter(|triangle| middle(triangle) < 0.0);
+        let nearest = left.max_by(|a, b| middle(a).total_cmp(&middle(b))).unwrap();
+        let right = mesh.positions.iter().filter(|place| place.x > 0.0);
+        let tip = right.min_by(|a, b| a.x.total_cmp(&b.x)).unwrap() - Vec3::new(0.4, 0.0, 0.0);
+        let [a, b, c] = mesh.triangles.swap_remove(nearest);
+        let at = mesh.positions.len() as u32;
+        mesh.positions.push(tip);
+        mesh.triangles.extend([[a, b, at], [b, c, at], [c, a, at]]);
+        let longest = |tracker: &Tracker| {
+            let places = tracker.vertices();
+            let corners = tracker.triangles().iter().map(|names| names.map(|name| places[name as usize]));
+            corners
+                .map(|[a, b, c]| (a - b).norm().max((b - c).norm()).max((c - a).norm()))
+                .fold(0.0, f64::max)
+        };
+        let without = longest(&followed(&ctx, &mesh, &places, false));
+        let tracker = followed(&ctx, &mesh, &places, true);
+        assert_eq!(parts(&tracker.mesh()), 2);
+        let with = longest(&tracker);
+        assert!(without > 4.0 && with < 2.5, "{without} m, {with} m");
+    }
+
+    #[test]
+    fn detail_stays_as_it_is() {
+        let ctx = context();
+        let places = shell(DVec3::zeros(), 0.0, 6.5);
+        let mut mesh = own_surface(&ctx, &places);
+        // A bump of 2 m on one side, a dent of 1.5 m on the other.
+        for place in &mut mesh.positions {
+            let off = (place.x * place.x + place.z * place.z) / 9.0;
+            let share = (1.0 - off).max(0.0) * (1.0 - off).max(0.0);
+            let up = place.normalize() * (share * if place.y > 0.0 { 2.0 } else { -1.5 });
+            *place += up;
+        }
+        let tracker = followed(&ctx, &mesh, &places, true);
+        assert!(tracker.triangles() == mesh.triangles);
+        let now = tracker.mesh().positions;
+        let far = now.iter().zip(&mesh.positions).map(|(a, b)| (a - b).norm());
+        assert!(far.fold(0.0, f32::max) < 1e-3);
+    }
+}

@@ -1,0 +1,122 @@
+//! Where the mesh of a tracker no longer fits its liquid after a step, and what it becomes.
+
+use rayon::prelude::*;
+
+use super::change::{Change, Unfit, change, improved};
+use super::hidden::Everywhere;
+use super::uncovered_parts::is_near;
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::Result;
+use crate::surface::level_set::band::Distances;
+use crate::surface::level_set::implicit::Implicit;
+use crate::surface::params::Params;
+use crate::surface::particles::grid::{Coord, cell_of};
+use crate::surface::tracker::{Covered, Next, Tracker};
+
+impl Tracker {
+    /// What the mesh becomes where it no longer fits.
+    pub(in crate::surface) fn changed(
+        &self,
+        ctx: &Context,
+        next: &Next,
+        feet: &[Option<DVec3>],
+        covered: &Covered,
+        (phi, distances): (&Implicit, &Distances),
+        particles: &[DVec3],
+    ) -> Result<Option<Change>> {
+        // What never had a distance does not fit from the start: that is no change.
+        let mut flags: Vec<bool> =
+            next.flags.iter().zip(&next.delta).map(|(flag, delta)| *flag && !delta.is_nan()).collect();
+        self.wait_alone(&mut flags, &covered.bare);
+        let bin = |place: &DVec3| cell_of(&(place / covered.reach));
+        let beside =
+            feet.iter().zip(&covered.bare).filter(|(_, is)| **is).filter_map(|(foot, _)| foot.as_ref());
+        let mut beside: Vec<Coord> = beside.map(bin).collect();
+        beside.par_sort_unstable();
+        beside.dedup();
+        let mut bare: Vec<DVec3> =
+            covered.places.iter().filter(|place| is_near(&beside, bin(place))).copied().collect();
+        bare.extend_from_slice(&covered.lacking.places);
+        let Params { spacing, cell, change: farthest, every, .. } = self.params;
+        let specks = &covered.lacking.specks;
+        let everywhere = every.then(|| Everywhere { kept: &next.delta, spacing: 1.0 / cell, specks });
+        let (vertices, triangles) = (&next.vertices, &self.triangles);
+        let unfit = Unfit { vertices, triangles, flags: &flags, bare: &bare, everywhere };
+        let changed = change(ctx, &unfit, phi, distances)?;
+        let crowd = self.crowd(particles);
+        let own = (&*self.sizes, &*next.drifts);
+        improved(ctx, &unfit, own, changed, distances, &crowd, farthest * spacing)
+    }
+
+    /// Takes the flags off vertices that jump alone, were placed in the last step, and have only covered surface beside them: mostly the
+    /// foot slips over a crease and comes back, and to cut a crease for it takes much of the mesh. What has come to stay is flagged
+    /// again in the next step.
+    fn wait_alone(&self, flags: &mut [bool], bare: &[bool]) {
+        if !flags.contains(&true) {
+            return;
+        }
+        let mut is_alone = vec![true; flags.len()];
+        for corners in &self.triangles {
+            for (at, next) in [(0, 1), (1, 2), (2, 0)] {
+                let ends = [corners[at] as usize, corners[next] as usize];
+                if ends.iter().all(|end| flags[*end]) {
+                    ends.iter().for_each(|end| is_alone[*end] = false);
+                }
+            }
+        }
+        for (at, flag) in flags.iter_mut().enumerate() {
+            *flag &= !is_alone[at] || bare[at] || self.flags[at];
+        }
+    }
+
+    /// Becomes what the mesh became.
+    pub(in crate::surface) fn take(&mut self, change: &Change) {
+        let mut made = change.delta.iter();
+        let delta =
+            |at: &Option<u32>| at.map_or_else(|| *made.next().unwrap_or(&0.0), |at| self.delta[at as usize]);
+        self.delta = change.origins.iter().map(delta).collect();
+        let flag = |flags: &[bool], at: &Option<u32>| at.is_some_and(|at| flags[at as usize]);
+        self.flags = change.origins.iter().map(|at| flag(&self.flags, at)).collect();
+        self.bare = change.origins.iter().map(|at| flag(&self.bare, at)).collect();
+        if !self.lasting.is_empty() {
+            self.lasting = change.carried_shares(&self.lasting);
+        }
+        self.sizes.clone_from(&change.sizes);
+        self.drift.vertices.clone_from(&change.drifts);
+        self.vertices.clone_from(&change.vertices);
+        self.triangles.clone_from(&change.triangles);
+        self.is_rebuilt = true;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::Pool;
+    use crate::surface::balls::{numbered, own_surface, shell};
+
+    #[test]
+    fn a_vertex_that_jumps_alone_has_a_step_to_come_back() {
+        let particles = numbered(shell(DVec3::zeros(), 0.0, 3.2));
+        let ctx = Context::new(Pool::new(1).unwrap());
+        let mesh = own_surface(&ctx, &particles.places);
+        let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
+        let mut tracker = Tracker::new(&ctx, params, &mesh, &particles).unwrap();
+        let none = vec![false; mesh.positions.len()];
+        let waited = |tracker: &Tracker, flagged: &[u32], bare: &[bool]| {
+            let mut flags = none.clone();
+            flagged.iter().for_each(|at| flags[*at as usize] = true);
+            tracker.wait_alone(&mut flags, bare);
+            (0..).zip(flags).filter(|(_, flag)| *flag).map(|(at, _)| at).collect::<Vec<u32>>()
+        };
+        let [a, b, _] = mesh.triangles[0];
+        assert!(waited(&tracker, &[a], &none).is_empty());
+        assert_eq!(waited(&tracker, &[a, b], &none), [a.min(b), a.max(b)]);
+        let mut bare = none.clone();
+        bare[a as usize] = true;
+        assert_eq!(waited(&tracker, &[a], &bare), [a]);
+        tracker.flags[a as usize] = true;
+        assert_eq!(waited(&tracker, &[a], &none), [a]);
+    }
+}

@@ -1,0 +1,299 @@
+//! The mesh is carried along by the particles around it (thesis 2.2).
+//!
+//! The thesis moves a vertex by the weighted mean of the particles' ways. That is right to zeroth order only: a vertex outside the
+//! particles moves as those inside do, and lags where the liquid turns. By default the ways are fitted by affine maps (weighted
+//! least squares) at the nodes of a grid, one spacing apart, and a vertex follows the eight maps around it: affine motion is
+//! exact, and there are far fewer nodes than vertices of a detailed mesh.
+//!
+//! Where particles move farther than their spacing, a frame is divided, and the parts of their ways are taken one after the other.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::Result;
+use crate::surface::Particles;
+use crate::surface::params::Params;
+use crate::surface::particles::affine_fit::{Map, Near, Sums, sums};
+use crate::surface::particles::grid::{Cells, Coord};
+use crate::surface::particles::paths::Paths;
+use crate::surface::tracker::validate_step;
+
+/// How the ways of particles are combined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Weighting {
+    /// By affine maps.
+    #[default]
+    Affine,
+    /// By their mean (thesis 2.2).
+    Mean,
+}
+
+/// Radius within which particles count for a mean (spacings; thesis 2.2).
+const MEAN_RADIUS: f32 = 2.0;
+/// Radius within which they count for a map (spacings): trembling particles make vertices tremble less the more there are.
+const MAP_RADIUS: f32 = 3.0;
+/// Greatest part of a way in one go (spacings).
+const STEP: f64 = 1.0;
+/// Most parts of a frame.
+const MOST: usize = 64;
+/// How often the radius is doubled where no particle is near.
+const DOUBLINGS: u32 = 8;
+/// Farthest cell.
+const LIMIT: f64 = (i32::MAX / 4) as f64;
+
+/// Where particles carry places (m) from one frame to the next, `dt` (s, over 0) later: what
+/// [`Tracker::step`](crate::surface::Tracker::step) does to its vertices before it projects them, for any places, with the parameters' spacing
+/// and weighting.
+///
+/// # Errors
+/// Parameters out of range, a time that is not positive; particles that are not valid or too far apart, or have neither ids nor
+/// velocities; cancel.
+pub fn carried(
+    ctx: &Context,
+    places: &[DVec3],
+    from: &Particles,
+    to: &Particles,
+    dt: f64,
+    params: &Params,
+) -> Result<Vec<DVec3>> {
+    params.validate()?;
+    validate_step(from, to, dt)?;
+    ctx.phase("advect", || {
+        let paths = Paths::between(from, to, dt)?;
+        let mut out = places.to_vec();
+        advect(ctx, &mut out, &paths, params.spacing, params.weighting)?;
+        Ok(out)
+    })
+}
+
+/// Working memory of one thread.
+#[derive(Default)]
+struct Scratch {
+    of_cell: Near,
+    of_place: Near,
+}
+
+/// Carries places (m) along the ways of particles whose spacing is `spacing` (m). Returns the count of parts.
+///
+/// # Errors
+/// Particles too far apart; cancel.
+pub fn advect(
+    ctx: &Context,
+    vertices: &mut [DVec3],
+    paths: &Paths,
+    spacing: f64,
+    weighting: Weighting,
+) -> Result<usize> {
+    let parts = (paths.farthest() / (STEP * spacing)).ceil().clamp(1.0, MOST as f64) as usize;
+    if paths.count() == 0 {
+        return Ok(parts);
+    }
+    let (mut from, mut to) = (Vec::new(), Vec::new());
+    paths.at(0.0, &mut from);
+    let mut order: Vec<(Coord, u32)> = (0..vertices.len() as u32).map(|vertex| ([0; 3], vertex)).collect();
+    for part in 1..=parts {
+        paths.at(part as f64 / parts as f64, &mut to);
+        let cells = Cells::new(&from, 2.0 * spacing, |path| paths.rank(path))?;
+        let ways = cells.order.par_iter().with_min_len(4096).map(|path| {
+            let way = (to[*path as usize] - from[*path as usize]) / spacing;
+            [way.x as f32, way.y as f32, way.z as f32]
+        });
+        let field = Field { cells: &cells, ways: ways.collect(), spacing };
+        match weighting {
+            Weighting::Affine => field.carry_by_maps(ctx, vertices, &mut order)?,
+            Weighting::Mean => field.carry_by_means(ctx, vertices, &mut order)?,
+        }
+        std::mem::swap(&mut from, &mut to);
+    }
+    Ok(parts)
+}
+
+/// Particles and their ways in a part of a frame.
+struct Field<'a> {
+    cells: &'a Cells,
+    /// In the order of cells (spacings).
+    ways: Vec<[f32; 3]>,
+    /// m.
+    spacing: f64,
+}
+
+/// Sorts vertices (m) by cells of an edge (m). `order` are their cells and numbers, as they were sorted before.
+fn sort(vertices: &[DVec3], edge: f64, order: &mut [(Coord, u32)]) {
+    order.par_iter_mut().with_min_len(4096).for_each(|(cell, vertex)| {
+        let place = vertices[*vertex as usize];
+        *cell = [0, 1, 2].map(|axis| (place[axis] / edge).floor().clamp(-LIMIT, LIMIT) as i32);
+    });
+    order.par_sort_unstable();
+}
+
+impl Field<'_> {
+    /// Carries vertices (m) by the affine maps at the nodes around them.
+    fn carry_by_maps(&self, ctx: &Context, vertices: &mut [DVec3], order: &mut [(Coord, u32)]) -> Result<()> {
+        sort(vertices, self.spacing, order);
+        let groups: Vec<&[(Coord, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
+        let mut nodes: Vec<Coord> = groups.iter().flat_map(|group| corners(group[0].0)).collect();
+        nodes.par_sort_unstable_by_key(|node| (node.map(|x| x >> 1), *node));
+        nodes.dedup();
+        // Nodes of a particles' cell share what is near.
+        let shared: Vec<&[Coord]> = nodes.chunk_by(|a, b| a.map(|x| x >> 1) == b.map(|x| x >> 1)).collect();
+        let maps: Vec<Vec<Option<Map>>> = shared
+            .par_iter()
+            .with_min_len(4)
+            .map_init(Scratch::default, |scratch, nodes| {
+                ctx.check()?;
+                Ok(self.maps_at(nodes, scratch))
+            })
+            .collect::<Result<_>>()?;
+        let maps: Vec<Option<Map>> = maps.into_iter().flatten().collect();
+        let find = |node: &Coord| {
+            let key = (node.map(|x| x >> 1), *node);
+            let at = nodes.binary_search_by_key(&key, |node| (node.map(|x| x >> 1), *node));
+            at.ok().and_then(|at| maps[at])
+        };
+        let follow = |group: &[(Coord, u32)]| {
+            let cell = group[0].0;
+            let around = corners(cell).each_ref().map(find);
+            let way = |(_, vertex): &(Coord, u32)| {
+                let at = vertices[*vertex as usize] / self.spacing - DVec3::from(cell.map(f64::from));
+                blended(&around, at).unwrap_or_else(|| self.mean_far(vertices[*vertex as usize]))
+                    * self.spacing
+            };
+            group.iter().map(way).collect()
+        };
+        let ways = each(ctx, &groups, follow)?;
+        add(&groups, &ways, vertices);
+        Ok(())
+    }
+
+    /// The maps at nodes in a particles' cell; none where no particle is near.
+    fn maps_at(&self, nodes: &[Coord], scratch: &mut Scratch) -> Vec<Option<Map>> {
+        let Scratch { of_cell, of_place } = scratch;
+        let cell = nodes[0].map(|x| x >> 1);
+        self.gather(cell, 2, of_cell);
+        let map = |node: &Coord| {
+            let at = [0, 1, 2].map(|axis| (node[axis] - 2 * cell[axis]) as f32);
+            sums(of_cell, of_place, at, MAP_RADIUS).map(|sums| sums.map())
+        };
+        nodes.iter().map(map).collect()
+    }
+
+    /// Carries vertices (m) by the mean way of the particles around them.
+    fn carry_by_means(
+        &self,
+        ctx: &Context,
+        vertices: &mut [DVec3],
+        order: &mut [(Coord, u32)],
+    ) -> Result<()> {
+        sort(vertices, self.cells.edge(), order);
+        let groups: Vec<&[(Coord, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
+        let follow = |group: &[(Coord, u32)]| {
+            let cell = group[0].0;
+            let (mut of_cell, mut of_place) = (Near::default(), Near::default());
+            self.gather(cell, 1, &mut of_cell);
+            let way = |(_, vertex): &(Coord, u32)| {
+                let place = vertices[*vertex as usize];
+                let sums = sums(&of_cell, &mut of_place, self.seen_from(cell, place), MEAN_RADIUS);
+                sums.map_or_else(|| self.mean_far(place), |sums| sums.mean()) * self.spacing
+            };
+            group.iter().map(way).collect()
+        };
+        let ways = each(ctx, &groups, follow)?;
+        add(&groups, &ways, vertices);
+        Ok(())
+    }
+
+    /// A place (m) from the corner of a particles' cell (spacings).
+    fn seen_from(&self, cell: Coord, place: DVec3) -> [f32; 3] {
+        let at = (place - DVec3::from(cell.map(f64::from)) * self.cells.edge()) / self.spacing;
+        [at.x as f32, at.y as f32, at.z as f32]
+    }
+
+    /// The particles in the cells around one, in spacings from its corner.
+    fn gather(&self, cell: Coord, rings: i32, out: &mut Near) {
+        out.clear();
+        let [low, high] = [-rings, rings].map(|by| cell.map(|at| at.saturating_add(by)));
+        self.cells.near(low, high, cell, |particle, offset| {
+            out.push(offset.map(|x| 2.0 * x), self.ways[particle]);
+        });
+    }
+
+    /// The mean way (spacings) of the particles around a place (m) that has none near: the thesis' radius is doubled until there are
+    /// some.
+    fn mean_far(&self, place: DVec3) -> DVec3 {
+        let cell =
+            [0, 1, 2].map(|axis| (place[axis] / self.cells.edge()).floor().clamp(-LIMIT, LIMIT) as i32);
+        let (mut near, mut room) = (Near::default(), Near::default());
+        let found: Option<Sums> = (1..=DOUBLINGS).find_map(|doubling| {
+            self.gather(cell, 1 << doubling, &mut near);
+            sums(&near, &mut room, self.seen_from(cell, place), MEAN_RADIUS * (1 << doubling) as f32)
+        });
+        found.map_or_else(DVec3::zeros, |sums| sums.mean())
+    }
+}
+
+/// The ways (m) of the vertices of each group.
+fn each(
+    ctx: &Context,
+    groups: &[&[(Coord, u32)]],
+    follow: impl Fn(&[(Coord, u32)]) -> Vec<DVec3> + Sync,
+) -> Result<Vec<Vec<DVec3>>> {
+    let one = |group: &&[(Coord, u32)]| {
+        ctx.check()?;
+        Ok(follow(group))
+    };
+    groups.par_iter().with_min_len(16).map(one).collect()
+}
+
+fn add(groups: &[&[(Coord, u32)]], ways: &[Vec<DVec3>], vertices: &mut [DVec3]) {
+    for ((_, vertex), way) in groups.iter().copied().flatten().zip(ways.iter().flatten()) {
+        vertices[*vertex as usize] += way;
+    }
+}
+
+/// The eight nodes of a cell: bits x, y and z of their number.
+fn corners(cell: Coord) -> [Coord; 8] {
+    std::array::from_fn(|n| [0, 1, 2].map(|axis| cell[axis] + (n >> (2 - axis) & 1) as i32))
+}
+
+/// What the maps at the corners of a cell say at a place in it (0..1 on each axis): the nearer, and the more particles they are
+/// made of, the more they count. None without maps.
+fn blended(maps: &[Option<Map>; 8], at: DVec3) -> Option<DVec3> {
+    let (mut sum, mut all) = (Vector3::zeros(), 0.0);
+    for (n, map) in maps.iter().enumerate() {
+        let Some(map) = map else { continue };
+        let corner = DVec3::new((n >> 2) as f64, (n >> 1 & 1) as f64, (n & 1) as f64);
+        let share = (0..3).map(|axis| 1.0 - (at[axis] - corner[axis]).abs()).product::<f64>() * map.weight;
+        sum += map.at(at - corner) * share;
+        all += share;
+    }
+    (all > 0.0).then(|| sum / all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::Pool;
+
+    #[test]
+    fn places_outside_of_the_particles_turn_with_them_and_lag_behind_by_the_mean() {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        let grid = (0..729).map(|n| [n / 81, n / 9 % 9, n % 9].map(|x| f64::from(x) - 4.0));
+        let places: Vec<DVec3> = grid.map(DVec3::from).collect();
+        let turn = |place: &DVec3| place + DVec3::new(-place.z, 0.0, place.x) * 0.05;
+        let at = |places: Vec<DVec3>| Particles { places, velocities: Vec::new(), ids: (0..729).collect() };
+        let (from, to) = (at(places.clone()), at(places.iter().map(turn).collect()));
+        let outside = [DVec3::new(4.5, 0.0, 0.0), DVec3::new(0.2, 4.7, 4.6)];
+        let off = |weighting| {
+            let params = Params { weighting, ..Params::for_spacing(1.0) };
+            let there = carried(&ctx, &outside, &from, &to, 0.1, &params).unwrap();
+            there.iter().zip(&outside).map(|(there, place)| (there - turn(place)).norm()).fold(0.0, f64::max)
+        };
+        assert!(off(Weighting::Affine) < 1e-3, "{}", off(Weighting::Affine));
+        assert!(off(Weighting::Mean) > 0.02, "{}", off(Weighting::Mean));
+        let params = Params::for_spacing(1.0);
+        let error = carried(&ctx, &outside, &from, &to, 0.0, &params).unwrap_err();
+        assert_eq!(error.to_string(), "a step of 0 s does not go on in time");
+    }
+}

@@ -1,0 +1,119 @@
+//! Where the band of distances must reach farther than elsewhere: around the few vertices whose detail is deeper than that of nearly all
+//! others. A band as wide as theirs all over the surface would take many times as long.
+
+use std::collections::BTreeMap;
+
+use crate::base::DVec3;
+use crate::base::blocks::DIM;
+use crate::surface::particles::grid::{Coord, cell_of};
+use crate::surface::tracker::{DRIFT, REACH, Tracker, WIDER};
+
+/// Blocks of the band, ascending, and how far it reaches in each (cells).
+pub type Deep = Vec<(Coord, f32)>;
+
+/// How far from a vertex splines read nodes (cells), and one for rounding.
+const READ: f64 = 3.0;
+/// Reaches are rounded up to so much (cells): that of the same vertex is then the same however it was measured.
+const STEP: f64 = 0.25;
+
+impl Tracker {
+    /// How far the band must reach (r) for a vertex that keeps a distance (r).
+    pub(in crate::surface) fn reach_for(&self, delta: f64) -> f64 {
+        // Splines read two nodes farther; a vertex drifts less than this before it is moved back.
+        (WIDER * delta + DRIFT + 2.0 * self.params.cell).clamp(REACH[0], REACH[1])
+    }
+
+    /// The blocks around vertices at these positions (m) in which the band must reach farther than it does everywhere. Around those that
+    /// have no distance it reaches as far as `unknown` (r).
+    pub(in crate::surface) fn deep(&self, vertices: &[DVec3], unknown: f64) -> Deep {
+        let (spacing, cell) = (self.params.spacing, self.params.cell * self.params.spacing);
+        let cells = |length: f64| (length / self.params.cell / STEP).ceil() * STEP;
+        // Neighbours share their blocks: these are listed once for all of them.
+        let mut boxes: BTreeMap<[Coord; 2], f64> = BTreeMap::new();
+        for (position, delta) in vertices.iter().zip(&self.delta) {
+            let far = f64::from(delta.abs()) / spacing;
+            // On the way to its foot a vertex comes no farther from where it is than that.
+            let [reach, way] =
+                if delta.is_nan() { [unknown; 2] } else { [self.reach_for(far), far + 2.0 * DRIFT] };
+            if reach > self.reach {
+                let side = DVec3::repeat(cells(way) + READ);
+                let corners = [position / cell - side, position / cell + side];
+                let most = boxes.entry(corners.map(|at| cell_of(&(at / DIM as f64)))).or_default();
+                *most = most.max(cells(reach));
+            }
+        }
+        let blocks = |([low, high], reach): ([Coord; 2], f64)| {
+            let on = move |axis: usize| low[axis]..=high[axis];
+            let all = on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])));
+            all.map(move |block| (block, reach as f32))
+        };
+        sorted(boxes.into_iter().flat_map(blocks).collect())
+    }
+}
+
+/// Ascending, each block once, with the farthest of its reaches.
+pub fn sorted(mut blocks: Deep) -> Deep {
+    blocks.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+    blocks.dedup_by_key(|(block, _)| *block);
+    blocks
+}
+
+/// How far the band reaches in a block; none where it does no farther than elsewhere.
+pub fn reach_in(deep: &[(Coord, f32)], block: Coord) -> Option<f32> {
+    deep.binary_search_by_key(&block, |(block, _)| *block).ok().map(|at| deep[at].1)
+}
+
+/// Whether the band reaches in all blocks of one list as far as in those of the other.
+pub fn covers(deep: &[(Coord, f32)], other: &[(Coord, f32)]) -> bool {
+    other.iter().all(|(block, reach)| reach_in(deep, *block).is_some_and(|own| own >= *reach))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::{Context, Pool};
+    use crate::surface::balls::{numbered, own_surface, shell};
+    use crate::surface::{Params, Particles};
+
+    #[test]
+    fn one_deep_detail_widens_the_band_around_it_alone_and_is_kept() {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        let positions = shell(DVec3::zeros(), 0.0, 6.2);
+        let mut mesh = own_surface(&ctx, &positions);
+        for vertex in [17, 18] {
+            let out = mesh.positions[vertex].normalize();
+            mesh.positions[vertex] += out * 2.7;
+        }
+        let at = |frame: i32| -> Particles {
+            let by = DVec3::new(0.11, 0.07, -0.05) * f64::from(frame);
+            numbered(positions.iter().map(|position| position + by).collect())
+        };
+        let params = Params::for_spacing(1.0);
+        let mut tracker = Tracker::new(&ctx, params, &mesh, &at(0)).unwrap();
+        assert!(tracker.delta().iter().all(|delta| !delta.is_nan()));
+        assert!((tracker.delta()[17] - 2.7).abs() < 0.2, "{}", tracker.delta()[17]);
+        assert!(tracker.reach < 2.6, "{} r everywhere", tracker.reach);
+        let deep = tracker.deep(tracker.vertices(), 0.0);
+        assert!(!deep.is_empty() && deep.len() <= 128, "{} blocks", deep.len());
+        for frame in 0..4 {
+            let report = tracker.step(&ctx, &at(frame), &at(frame + 1), 0.04).unwrap();
+            assert_eq!(report.flagged(), 0, "frame {frame}");
+        }
+        let by = at(4).places[0] - positions[0];
+        let off = tracker
+            .vertices()
+            .iter()
+            .zip(&mesh.positions)
+            .map(|(now, first)| now - (first.cast::<f64>() + by));
+        let most = off.map(|off| off.norm()).fold(0.0, f64::max);
+        assert!(most < 0.05, "a vertex is off by {most} r");
+    }
+
+    #[test]
+    fn lists_of_blocks_keep_the_farthest_reach() {
+        let list = sorted(vec![([1, 0, 0], 3.0), ([0, 0, 0], 2.0), ([1, 0, 0], 5.0)]);
+        assert_eq!(list, [([0, 0, 0], 2.0), ([1, 0, 0], 5.0)]);
+        assert!(covers(&list, &[([1, 0, 0], 4.0)]) && covers(&list, &[]));
+        assert!(!covers(&list, &[([1, 0, 0], 6.0)]) && !covers(&list, &[([2, 0, 0], 1.0)]));
+    }
+}

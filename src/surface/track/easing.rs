@@ -1,0 +1,315 @@
+//! Changes that are seen before they happen (thesis 2.8 wishes for it): vertices that a change will take away lead to what will take
+//! their place, and go a part of that way in each of the frames before it, so that a bridge does not pop up. Only what is shown is
+//! moved so; the mesh that goes on is not.
+
+use rayon::prelude::*;
+
+use crate::base::deviation::NearestTree;
+use crate::base::mesh::{renumbered, used};
+use crate::base::topology::{around, bodies};
+use crate::base::{DVec3, TriMesh, Vec3};
+use crate::context::Context;
+use crate::error::Result;
+use crate::surface::repair::{Source, weights};
+use crate::surface::topology::change::Change;
+
+/// Places of a task.
+const GRAIN: usize = 256;
+/// How often the places that are made pull the old surface towards them.
+const PULLS: usize = 16;
+/// Longest way to what takes a vertex' place (spacings): what is farther away is another surface that appears.
+const LONGEST: f64 = 4.0;
+/// A part of the old surface from which nothing that is made is farther away than this (spacings) stays: that is no jump.
+const NEAR: f64 = 0.25;
+/// How often the ways of vertices that nothing pulls at become the mean of those around them.
+const SPREAD: usize = 8;
+/// A pull that counts for less than this of a vertex is left out.
+const LEAST: f64 = 1e-3;
+
+/// What a step does to the vertices before it.
+#[derive(Debug, Clone, Default)]
+pub struct Leads {
+    /// Vertices that go, ascending, with their ways (m) to what takes their place.
+    ways: Vec<(u32, DVec3)>,
+    /// The vertex before the step that each vertex was, where any was made or went.
+    origins: Origins,
+}
+
+impl Leads {
+    /// Those of a change of a mesh that had these triangles; particles are a spacing (m) apart.
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn of(ctx: &Context, change: &Change, triangles: &[[u32; 3]], spacing: f64) -> Result<Self> {
+        let ways = ctx.phase("ease", || ways(ctx, change, triangles, spacing))?;
+        Ok(Self { ways, origins: Some(change.origins.clone()) })
+    }
+
+    /// Of a mesh that is exchanged for another, which has nothing of it.
+    pub fn cut(vertices: usize) -> Self {
+        Self { ways: Vec::new(), origins: Some(vec![None; vertices]) }
+    }
+
+    /// The vertex before the step that a vertex after it was; none: it was made.
+    pub fn before(&self, vertex: u32) -> Option<u32> {
+        origin(&self.origins, vertex)
+    }
+
+    /// Whether a vertex before the step goes, and has something that takes its place.
+    pub fn takes(&self, vertex: u32) -> bool {
+        self.ways.binary_search_by_key(&vertex, |(vertex, _)| *vertex).is_ok()
+    }
+
+    /// Of two steps, one after the other.
+    pub fn then(mut self, next: &Self) -> Self {
+        let ways = next.ways.iter().filter_map(|(vertex, way)| Some((origin(&self.origins, *vertex)?, *way)));
+        self.ways.extend(ways);
+        self.ways.sort_unstable_by_key(|(vertex, _)| *vertex);
+        self.origins = through(self.origins, &next.origins);
+        self
+    }
+}
+
+/// The vertex that each vertex was; none: each is as it was.
+type Origins = Option<Vec<Option<u32>>>;
+
+fn origin(origins: &Origins, vertex: u32) -> Option<u32> {
+    origins.as_ref().map_or(Some(vertex), |origins| origins[vertex as usize])
+}
+
+/// Through two steps.
+fn through(first: Origins, second: &Origins) -> Origins {
+    let Some(second) = second else { return first };
+    Some(second.iter().map(|at| at.and_then(|at| origin(&first, at))).collect())
+}
+
+/// A vertex that is moved for what is to come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Eased {
+    /// Which one.
+    pub vertex: u32,
+    /// By how much now (m).
+    pub now: DVec3,
+    /// And when the first of the coming steps is done.
+    pub next: DVec3,
+}
+
+/// Which vertices are moved, and by how much, for the steps to come, the first one first, in ascending order. They are moved for
+/// `ahead` steps, ever nearer to what the last one of these makes of them, and are there when it is done.
+pub fn eased<'a>(coming: impl IntoIterator<Item = &'a Leads>, ahead: usize) -> Vec<Eased> {
+    let (mut origins, mut moved) = (None, Vec::new());
+    for (step, leads) in (1..=ahead + 1).zip(coming) {
+        let [now, next] = [step, step - 1].map(|steps| weight(steps, ahead));
+        for (vertex, way) in &leads.ways {
+            if let Some(vertex) = origin(&origins, *vertex) {
+                moved.push(Eased { vertex, now: way * now, next: way * next });
+            }
+        }
+        origins = through(origins, &leads.origins);
+    }
+    moved.sort_by_key(|eased| eased.vertex);
+    moved
+}
+
+/// Share of its way that a vertex has gone so many steps before it is done; it sets out and arrives gently.
+fn weight(steps: usize, ahead: usize) -> f64 {
+    let gone = 1.0 - (steps as f64 / (ahead + 1) as f64).min(1.0);
+    gone * gone * (3.0 - 2.0 * gone)
+}
+
+/// The ways (m) of the vertices that a change takes away, by the vertices before it; lengths count in spacings (m).
+fn ways(ctx: &Context, change: &Change, triangles: &[[u32; 3]], spacing: f64) -> Result<Vec<(u32, DVec3)>> {
+    let Some(old) = Patch::old(change, triangles) else { return Ok(Vec::new()) };
+    let new = Patch::new(change);
+    if new.triangles.is_empty() {
+        return Ok(Vec::new());
+    }
+    // Places count from one of them: far from the origin 32 bits are too few.
+    let origin = change.before[old.names[0] as usize];
+    let begin: Vec<DVec3> = old.names.iter().map(|name| change.before[*name as usize] - origin).collect();
+    let ends: Vec<DVec3> = new.names.iter().map(|name| change.vertices[*name as usize] - origin).collect();
+    let made = ends.iter().zip(&new.is_loose).filter(|(_, made)| **made).map(|(place, _)| *place);
+    let made = old.jumps(&begin, made.collect(), [NEAR, LONGEST].map(|length| length * spacing));
+    if made.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut places = begin.clone();
+    let mut is_pulled = vec![false; places.len()];
+    for _ in 0..PULLS {
+        ctx.check()?;
+        let tree = old.tree(&places);
+        let near: Vec<_> = made.par_iter().with_min_len(GRAIN).map(|place| tree.nearest(*place)).collect();
+        let mut pulls = vec![(DVec3::zeros(), 0.0); places.len()];
+        for (place, near) in made.iter().zip(near) {
+            let Some(near) = near else { continue };
+            let corners = old.triangles[near.triangle];
+            let shares = weights(&corners.map(|at| places[at as usize]), near.place);
+            for (corner, share) in corners.into_iter().zip(shares) {
+                let pull = &mut pulls[corner as usize];
+                *pull = (pull.0 + (place - near.place) * share, pull.1 + share);
+            }
+        }
+        for (at, (pull, share)) in pulls.into_iter().enumerate() {
+            if old.is_loose[at] && share > LEAST {
+                places[at] += pull / share;
+                is_pulled[at] = true;
+            }
+        }
+    }
+    let mut ways: Vec<DVec3> = places.iter().zip(&begin).map(|(to, from)| to - from).collect();
+    old.spread(&mut ways, &is_pulled);
+    let limit = LONGEST * spacing;
+    let moved = (0..ways.len()).filter(|at| ways[*at] != DVec3::zeros() && ways[*at].norm() <= limit);
+    Ok(moved.map(|at| (old.names[at], ways[at])).collect())
+}
+
+/// Triangles that a change takes away, or that it makes.
+struct Patch {
+    /// Of the mesh, ascending.
+    names: Vec<u32>,
+    /// Whether each goes, or was made; the others stay.
+    is_loose: Vec<bool>,
+    /// Of these vertices.
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Patch {
+    /// Those that are no longer there as they were; none where no vertex goes.
+    fn old(change: &Change, triangles: &[[u32; 3]]) -> Option<Self> {
+        let mut goes = vec![true; change.before.len()];
+        change.origins.iter().flatten().for_each(|at| goes[*at as usize] = false);
+        if !goes.contains(&true) {
+            return None;
+        }
+        let mut is_old = vec![true; triangles.len()];
+        for source in &change.sources {
+            if let Source::Whole(at) = source {
+                is_old[*at as usize] = false;
+            }
+        }
+        let old = triangles.iter().zip(&is_old).filter(|(_, is_old)| **is_old).map(|(names, _)| *names);
+        let patch = Self::of(goes.len(), old.collect(), |name| goes[name as usize]);
+        (!patch.triangles.is_empty()).then_some(patch)
+    }
+
+    /// Those that are new, or parts of others.
+    fn new(change: &Change) -> Self {
+        let made = change.sources.iter().zip(&change.triangles);
+        let made = made.filter(|(source, _)| !matches!(source, Source::Whole(_))).map(|(_, names)| *names);
+        Self::of(change.vertices.len(), made.collect(), |name| change.origins[name as usize].is_none())
+    }
+
+    fn of(vertices: usize, triangles: Vec<[u32; 3]>, is_loose: impl Fn(u32) -> bool) -> Self {
+        let names = used(vertices, &triangles).unwrap_or_else(|| (0..vertices as u32).collect());
+        let triangles = renumbered(&triangles, &names);
+        Self { is_loose: names.iter().map(|name| is_loose(*name)).collect(), names, triangles }
+    }
+
+    /// Of places that are made those at parts of the patch, whose vertices lie at `begin`, where any is farther away than the first of two
+    /// lengths; those beyond the second belong to another surface.
+    fn jumps(&self, begin: &[DVec3], made: Vec<DVec3>, [near, longest]: [f64; 2]) -> Vec<DVec3> {
+        let mut part_of = vec![0; self.triangles.len()];
+        let parts = bodies(&self.triangles);
+        for (part, triangles) in parts.iter().enumerate() {
+            triangles.iter().for_each(|triangle| part_of[*triangle as usize] = part);
+        }
+        let tree = self.tree(begin);
+        let mut is_jump = vec![false; parts.len()];
+        let mut found = Vec::with_capacity(made.len());
+        let feet: Vec<_> = made.par_iter().with_min_len(GRAIN).map(|place| tree.nearest(*place)).collect();
+        for (place, at) in made.into_iter().zip(feet) {
+            let Some(at) = at.filter(|at| at.distance <= longest) else { continue };
+            let part = part_of[at.triangle];
+            is_jump[part] |= at.distance > near;
+            found.push((place, part));
+        }
+        found.into_iter().filter(|(_, part)| is_jump[*part]).map(|(place, _)| place).collect()
+    }
+
+    /// Gives each loose vertex without a way the mean of those around it, a few times; those that stay have none.
+    fn spread(&self, ways: &mut [DVec3], has_way: &[bool]) {
+        for _ in 0..SPREAD {
+            let sums = around(ways.len(), &self.triangles, |vertex| Some(ways[vertex as usize]));
+            for (at, (sum, count)) in sums.into_iter().enumerate() {
+                if self.is_loose[at] && !has_way[at] && count > 0 {
+                    ways[at] = sum / f64::from(count);
+                }
+            }
+        }
+    }
+
+    fn tree(&self, places: &[DVec3]) -> NearestTree {
+        let positions: Vec<Vec3> = places.iter().map(|place| place.cast()).collect();
+        NearestTree::new(&TriMesh { positions, triangles: self.triangles.clone() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::Pool;
+    use crate::surface::balls::{own_surface, two_balls};
+    use crate::surface::{Params, Tracker};
+
+    #[test]
+    fn the_old_surface_leads_to_the_bridge_that_comes() {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        let balls = |away: f64| two_balls(4.2, DVec3::new(away, 0.1, 0.0));
+        let mut from = balls(6.5);
+        let mesh = own_surface(&ctx, &from.places);
+        let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
+        let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
+        let farthest = |places: &[DVec3], triangles: &[[u32; 3]], change: &Change| {
+            let positions = places.iter().map(|place| place.cast()).collect();
+            let tree = NearestTree::new(&TriMesh { positions, triangles: triangles.to_vec() });
+            let made = change.vertices.iter().zip(&change.origins).filter(|(_, origin)| origin.is_none());
+            made.map(|(place, _)| tree.nearest(*place).unwrap().distance).fold(0.0, f64::max)
+        };
+        let mut seen = 0;
+        for step in 1..=16 {
+            let to = balls(6.5 - 0.2 * f64::from(step));
+            let triangles = tracker.triangles().to_vec();
+            let report = tracker.step(&ctx, &from, &to, 0.04).unwrap();
+            from = to;
+            let Some(change) = report.change else { continue };
+            let far = farthest(&change.before, &triangles, &change);
+            if far < 0.5 {
+                continue;
+            }
+            let mut places = change.before.clone();
+            let leads = Leads::of(&ctx, &change, &triangles, 1.0).unwrap();
+            eased([&leads], 0).iter().for_each(|eased| places[eased.vertex as usize] += eased.next);
+            assert!(farthest(&places, &triangles, &change) < 0.35 * far, "{step}");
+            // What stays is not moved.
+            let stay: Vec<u32> = change.origins.iter().copied().flatten().collect();
+            assert!(stay.len() > 100, "{step}: {} stay", stay.len());
+            for at in stay {
+                assert_eq!(places[at as usize], change.before[at as usize]);
+            }
+            seen += 1;
+        }
+        assert!(seen > 0);
+    }
+
+    #[test]
+    fn a_vertex_is_moved_more_the_nearer_its_change_is_by_the_name_that_it_has() {
+        // The second step takes vertex 1 away, which was vertex 2 before the first.
+        let way = DVec3::new(1.0, 2.0, 3.0);
+        let first = Leads { ways: Vec::new(), origins: Some(vec![Some(0), Some(2), None]) };
+        let second = Leads { ways: vec![(1, way), (2, way)], origins: Some(vec![Some(0)]) };
+        let still = Leads::default();
+        let moved = |coming: &[&Leads]| eased(coming.iter().copied(), 3);
+        assert!(moved(&[&still, &still]).is_empty());
+        let [one] = moved(&[&first, &second])[..] else { panic!("one vertex is moved") };
+        assert!(one.vertex == 2 && one.now == way * 0.5 && one.next == way * 0.84375, "{one:?}");
+        let both = first.clone().then(&second);
+        assert_eq!((both.ways.clone(), both.origins.clone()), (vec![(2, way)], Some(vec![Some(0)])));
+        let [one] = moved(&[&still, &still, &still, &both])[..] else { panic!("one vertex is moved") };
+        assert!(one.now == DVec3::zeros() && one.next == way * 0.15625, "{one:?}");
+        assert!(moved(&[&still, &still, &still, &still, &both]).is_empty());
+        assert!(moved(&[&Leads::cut(3), &second]).is_empty());
+        let [one, two] = eased([&second], 0)[..] else { panic!("two vertices are moved") };
+        assert_eq!((one.vertex, two.vertex), (1, 2));
+        assert!([one, two].iter().all(|eased| eased.now == DVec3::zeros() && eased.next == way));
+    }
+}

@@ -1,0 +1,147 @@
+//! Steps of a tracker that are made before they are wanted: what they change is seen before it happens (`track/easing.rs`), and when their
+//! turn comes they are there.
+
+use std::collections::VecDeque;
+
+use super::easing::{Eased, Leads, eased};
+use super::easing_limit::{Displaced, uncrossed};
+use crate::base::DVec3;
+use crate::context::Context;
+use crate::error::Result;
+use crate::surface::Particles;
+use crate::surface::report::StepReport;
+use crate::surface::tracker::Tracker;
+
+/// The steps to come of a tracker.
+#[derive(Debug, Default)]
+pub struct Outlook {
+    /// The particles at which the first one begins.
+    from: Particles,
+    /// In their order.
+    steps: VecDeque<Coming>,
+}
+
+/// A step to come.
+#[derive(Debug)]
+struct Coming {
+    to: Particles,
+    dt: f64,
+    after: Tracker,
+    report: StepReport,
+    leads: Leads,
+}
+
+impl Outlook {
+    /// Makes the steps from the particles `from`, at which the tracker is, through those to come, each `dt` (s) after the one before.
+    /// Steps that were made for the same particles are kept. A tracker that went another way needs another outlook.
+    ///
+    /// # Errors
+    /// As [`Tracker::step`]; the steps before the one that failed stay.
+    pub fn look(
+        &mut self,
+        ctx: &Context,
+        tracker: &Tracker,
+        from: Particles,
+        coming: Vec<Particles>,
+        dt: f64,
+    ) -> Result<()> {
+        if self.from != from {
+            self.steps.clear();
+            self.from = from;
+        }
+        let is_same = |(step, to): &(&Coming, &Particles)| step.dt == dt && step.to == **to;
+        let same = self.steps.iter().zip(&coming).take_while(is_same).count();
+        self.steps.truncate(same);
+        for to in coming.into_iter().skip(same) {
+            let last = self.steps.back();
+            let (mut after, from) = match last {
+                Some(last) => (last.after.clone(), &last.to),
+                None => (tracker.clone(), &self.from),
+            };
+            let triangles = after.triangles().to_vec();
+            let report = after.step(ctx, from, &to, dt)?;
+            let spacing = tracker.params().spacing;
+            let leads = match &report.change {
+                Some(change) => Leads::of(ctx, change, &triangles, spacing)?,
+                None => Leads::default(),
+            };
+            self.steps.push_back(Coming { to, dt, after, report, leads });
+        }
+        Ok(())
+    }
+
+    /// What a step becomes that was made already.
+    pub fn take(&mut self, from: &Particles, to: &Particles, dt: f64) -> Option<(Tracker, StepReport)> {
+        let is_it = |step: &Coming| step.dt == dt && step.to == *to;
+        if self.from != *from || !self.steps.front().is_some_and(is_it) {
+            *self = Self::default();
+            return None;
+        }
+        let Coming { to, after, report, .. } = self.steps.pop_front()?;
+        self.from = to;
+        Some((after, report))
+    }
+
+    /// Places (m) of the tracker's vertices as they are shown: those that a step to come takes away go towards what it makes, for
+    /// `ahead` steps before it, as far as the mesh does not pass through itself.
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn eased(&self, ctx: &Context, tracker: &Tracker, ahead: usize) -> Result<Vec<DVec3>> {
+        let mut places = tracker.vertices().to_vec();
+        let moved = displaced(&eased(self.steps.iter().map(|step| &step.leads), ahead));
+        for (vertex, by) in uncrossed(ctx, tracker.vertices(), tracker.triangles(), moved)? {
+            places[vertex as usize] += by;
+        }
+        Ok(places)
+    }
+}
+
+/// The vertices that are displaced now.
+pub fn displaced(eased: &[Eased]) -> Vec<Displaced> {
+    let moved = eased.iter().filter(|eased| eased.now != DVec3::zeros());
+    moved.map(|eased| (eased.vertex, eased.now)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::Pool;
+    use crate::surface::Params;
+    use crate::surface::balls::{own_surface, two_balls};
+
+    const DT: f64 = 0.04;
+
+    /// Two balls of particles that meet.
+    fn balls(frame: i32) -> Particles {
+        two_balls(4.2, DVec3::new(6.5 - 0.2 * f64::from(frame), 0.1, 0.0))
+    }
+
+    #[test]
+    fn steps_that_were_made_ahead_are_those_that_come_and_only_what_goes_is_moved() {
+        let ctx = Context::new(Pool::new(2).unwrap());
+        let first = balls(0);
+        let mesh = own_surface(&ctx, &first.places);
+        let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
+        let mut tracker = Tracker::new(&ctx, params, &mesh, &first).unwrap();
+        let mut plain = tracker.clone();
+        let (mut outlook, mut moved) = (Outlook::default(), 0);
+        for frame in 0..16 {
+            let (from, to) = (balls(frame), balls(frame + 1));
+            let coming: Vec<Particles> = (1..=3).map(|ahead| balls(frame + ahead)).collect();
+            outlook.look(&ctx, &tracker, from.clone(), coming, DT).unwrap();
+            let places = outlook.eased(&ctx, &tracker, 3).unwrap();
+            moved += places.iter().zip(tracker.vertices()).filter(|(shown, own)| shown != own).count();
+            let (next, report) = outlook.take(&from, &to, DT).unwrap();
+            tracker = next;
+            let wanted = plain.step(&ctx, &from, &to, DT).unwrap();
+            assert!(tracker.save() == plain.save(), "{frame}");
+            assert_eq!(report.change.is_some(), wanted.change.is_some(), "{frame}");
+        }
+        assert!(moved > 20, "{moved}");
+        // Other particles are another way.
+        outlook.look(&ctx, &tracker, balls(16), vec![balls(17)], DT).unwrap();
+        assert!(outlook.take(&balls(16), &balls(18), DT).is_none());
+        assert!(outlook.take(&balls(16), &balls(17), DT).is_none());
+    }
+}

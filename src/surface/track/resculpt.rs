@@ -1,0 +1,163 @@
+//! A mesh that was edited by hand takes the place of the one that has followed the particles up to then.
+
+use crate::base::TriMesh;
+use crate::context::Context;
+use crate::error::Result;
+use crate::surface::Particles;
+use crate::surface::report::StepReport;
+use crate::surface::tracker::Tracker;
+
+impl Tracker {
+    /// Puts an edited mesh (m), of any vertices and triangles, in the place of its own, at the time of `particles`: those to which its last
+    /// step went, or with which it began. What each vertex keeps is measured anew and followed from there; the parameters stay, no detail
+    /// is said to last ([`Tracker::set_lasting`]), no vertex is flagged. The report is that of [`Tracker::begin`]. After an error the
+    /// tracker is as it was.
+    ///
+    /// States have the edited mesh's triangles from then on: [`Tracker::resume`] still takes the mesh with which all began.
+    ///
+    /// # Errors
+    /// As [`Tracker::begin`] and [`Tracker::set_lasting`].
+    pub fn resculpt(
+        &mut self,
+        ctx: &Context,
+        mesh: &TriMesh,
+        lasting: Vec<f32>,
+        particles: &Particles,
+    ) -> Result<StepReport> {
+        let ((mut next, report), phases) = ctx.step(4, || Self::begin(ctx, self.params, mesh, particles))?;
+        next.set_lasting(lasting)?;
+        // Also where the triangles are the first ones: sizes, and what lasts, are no longer those of the first mesh.
+        next.is_rebuilt = true;
+        // The surface of the particles to come is the same for every mesh.
+        next.ahead = std::mem::take(&mut self.ahead);
+        *self = next;
+        Ok(StepReport { phases, ..report })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::{DVec3, Vec3};
+    use crate::context::Pool;
+    use crate::surface::Params;
+    use crate::surface::balls::{numbered, own_surface, shell};
+
+    /// Height of the bump (m); particles lie 1 m apart.
+    const HEIGHT: f64 = 0.8;
+    const DT: f64 = 1.0 / 24.0;
+
+    fn context() -> Context {
+        Context::new(Pool::new(2).unwrap())
+    }
+
+    /// The middle of the ball at a frame (m).
+    fn middle(frame: i32) -> DVec3 {
+        DVec3::new(0.3, 0.1, -0.2) * f64::from(frame)
+    }
+
+    /// A ball of particles that travels.
+    fn ball(frame: i32) -> Particles {
+        numbered(shell(middle(frame), 0.0, 5.2))
+    }
+
+    /// A mesh of its surface that has followed it to a frame, and the mesh at the first one.
+    fn followed(ctx: &Context, rebuild: bool, frame: i32) -> (Tracker, TriMesh) {
+        let first = ball(0);
+        let mesh = own_surface(ctx, &first.places);
+        let params = Params { rebuild, ..Params::for_spacing(1.0) };
+        let mut tracker = Tracker::new(ctx, params, &mesh, &first).unwrap();
+        go_on(ctx, &mut tracker, [0, frame]);
+        (tracker, mesh)
+    }
+
+    fn go_on(ctx: &Context, tracker: &mut Tracker, [from, to]: [i32; 2]) {
+        for frame in from..to {
+            tracker.step(ctx, &ball(frame), &ball(frame + 1), DT).unwrap();
+        }
+    }
+
+    /// How far the mesh reaches over the middle of the ball (m).
+    fn top(tracker: &Tracker, frame: i32) -> f64 {
+        tracker.vertices().iter().map(|place| (place - middle(frame)).y).fold(0.0, f64::max)
+    }
+
+    /// The mesh of a frame with a bump on top.
+    fn with_bump(tracker: &Tracker, frame: i32) -> TriMesh {
+        let mut mesh = tracker.mesh();
+        for place in &mut mesh.positions {
+            let out = (place.cast::<f64>() - middle(frame)).normalize();
+            let share = ((out.y - 0.7) / 0.3).clamp(0.0, 1.0);
+            *place += (out * (HEIGHT * share)).cast::<f32>();
+        }
+        mesh
+    }
+
+    #[test]
+    fn a_bump_that_was_sculpted_into_a_later_frame_stays() {
+        let ctx = context();
+        for rebuild in [false, true] {
+            let (mut tracker, _) = followed(&ctx, rebuild, 5);
+            let plain = top(&tracker, 5);
+            let report = tracker.resculpt(&ctx, &with_bump(&tracker, 5), Vec::new(), &ball(5)).unwrap();
+            assert!(report.lost == 0 && report.change.is_none() && report.triangles > 100);
+            assert!(tracker.flags().iter().all(|flag| !flag));
+            let most = |tracker: &Tracker| tracker.delta().iter().copied().fold(0.0, f32::max);
+            let (height, delta) = (top(&tracker, 5), most(&tracker));
+            assert!(height - plain > 0.9 * HEIGHT, "{plain} to {height}");
+            assert!((f64::from(delta) - HEIGHT).abs() < 0.15, "{delta}");
+            go_on(&ctx, &mut tracker, [5, 10]);
+            assert!((top(&tracker, 10) - height).abs() < 0.2, "{height} to {}", top(&tracker, 10));
+            assert!((most(&tracker) - delta).abs() < 0.1, "{delta} to {}", most(&tracker));
+        }
+    }
+
+    #[test]
+    fn a_state_after_it_goes_on_with_the_same_bytes() {
+        let ctx = context();
+        for rebuild in [false, true] {
+            let (mut tracker, first) = followed(&ctx, rebuild, 2);
+            tracker.set_lasting(vec![0.5; tracker.vertices().len()]).unwrap();
+            let mut edited = with_bump(&tracker, 2);
+            if !rebuild {
+                // One that is not rebuilt may be open.
+                edited.triangles.truncate(edited.triangles.len() - 2);
+            }
+            tracker.resculpt(&ctx, &edited, Vec::new(), &ball(2)).unwrap();
+            assert!(tracker.is_rebuilt() && tracker.triangles() == edited.triangles);
+            assert!(tracker.lasting.is_empty());
+            tracker.set_lasting(vec![0.25; edited.positions.len()]).unwrap();
+            let state = tracker.save();
+            // It is the first mesh that a state belongs to.
+            let mut back = Tracker::resume(tracker.params, &first, &state).unwrap();
+            assert!(back.save() == state && back.lasting == tracker.lasting);
+            go_on(&ctx, &mut tracker, [2, 4]);
+            go_on(&ctx, &mut back, [2, 4]);
+            assert!(back.save() == tracker.save() && state != tracker.save());
+        }
+    }
+
+    #[test]
+    fn a_mesh_that_does_not_fit_leaves_the_tracker_as_it_was() {
+        let ctx = context();
+        let (mut tracker, _) = followed(&ctx, true, 1);
+        let before = tracker.save();
+        let refused = |tracker: &mut Tracker, mesh: &TriMesh, words: &str| {
+            let error = tracker.resculpt(&ctx, mesh, Vec::new(), &ball(1)).unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+            assert!(tracker.save() == before, "{words}");
+        };
+        let mut open = tracker.mesh();
+        open.triangles.pop();
+        refused(&mut tracker, &open, "not closed and 2-manifold by index");
+        let mut far = tracker.mesh();
+        far.positions.iter_mut().for_each(|place| *place += Vec3::new(100.0, 0.0, 0.0));
+        refused(&mut tracker, &far, "same space");
+        refused(&mut tracker, &TriMesh::default(), "");
+        ctx.cancel();
+        let mesh = tracker.mesh();
+        refused(&mut tracker, &mesh, "cancelled");
+        ctx.reset();
+        tracker.resculpt(&ctx, &mesh, Vec::new(), &ball(1)).unwrap();
+    }
+}
