@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::io::mesh;
 use frazil::render::{Camera, Light, Model, Models, Size};
 use frazil::shallow::flows::{FlowPoint, Kind};

@@ -17,8 +17,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use frazil::base::arrays::{Number, On};
-use frazil::base::{DVec3, MeshArray, Points, TriMesh};
+use frazil::geometry::mesh::attributes::{Number, On};
+use frazil::geometry::{DVec3, MeshArray, Points, TriMesh};
 use frazil::io::{mesh, particles};
 use frazil::surface::{Change, Params, Particles, Source, Tracker};
 use frazil::{Context, Error, Pool};

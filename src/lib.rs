@@ -27,7 +27,7 @@
 //! ```
 //! # #[cfg(feature = "vdb")]
 //! # fn main() -> frazil::Result<()> {
-//! use frazil::base::{DVec3, TriMesh};
+//! use frazil::geometry::{DVec3, TriMesh};
 //! use frazil::motion::{Key, Keys, Rigid};
 //! use frazil::snow::base_layer::{BaseLayer, Params, initial};
 //! use frazil::sweep::Body;
@@ -61,7 +61,7 @@
 //!
 //! # let folder = tempfile::tempdir()?;
 //! # let folder = folder.path();
-//! io::mesh::write(&folder.join("box.ply"), &frazil::base::TriMesh::cuboid([-0.1; 3], [0.1; 3]))?;
+//! io::mesh::write(&folder.join("box.ply"), &frazil::geometry::TriMesh::cuboid([-0.1; 3], [0.1; 3]))?;
 //! let text = r#"
 //! [shot]
 //! frames = "1-3"
@@ -92,14 +92,15 @@
 //! `vdb` (OpenVDB), `scene` (scene files and the frame loop) and `cli` (the command, pictures); without any of them the crate
 //! is pure Rust. Rooms are layered, a room uses only those below it: see `CONTRIBUTING.md`.
 
-pub mod base;
 pub mod capi;
 pub mod context;
 pub mod distance;
 pub mod error;
 pub mod flow;
+pub mod geometry;
 pub mod io;
 pub mod motion;
+pub mod numeric;
 #[cfg(feature = "cli")]
 pub mod render;
 #[cfg(feature = "scene")]

@@ -5,8 +5,8 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use frazil::base::mesh::coincident;
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::mesh::coincident;
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::motion::{Character, Key, Keys, Motion, Placed, Play, Rigid, Space};
 use frazil::sweep::{self, Body, Settings, Topology};
 use frazil::vdb::{FloatGrid, Leaf};

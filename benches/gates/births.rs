@@ -1,7 +1,7 @@
 //! Gates of births: removed snow pays for every grain, for any count of frames, and birth throws none.
 
 use frazil::Context;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};

@@ -17,8 +17,10 @@ pub fn run(h: &mut Harness) {
     }
     if h.wants("snow.base.same_bytes_cpu") {
         let hashes = ["baseline", "avx2", "avx512"].map(hash_at);
-        let note =
-            format!("FRAZIL_CPU baseline, avx2, avx512; this one has {:?}", frazil::base::cpu::cpu_level());
+        let note = format!(
+            "FRAZIL_CPU baseline, avx2, avx512; this one has {:?}",
+            frazil::numeric::cpu::cpu_level()
+        );
         h.holds("snow.base.same_bytes_cpu", hashes.iter().all(|hash| *hash == hashes[0]), &note);
     }
     if h.wants("snow.grains.same_bytes") {

@@ -3,7 +3,6 @@
 use std::ptr::{null, null_mut};
 use std::time::{Duration, Instant};
 
-use frazil::base::TriMesh;
 use frazil::capi::base::*;
 use frazil::capi::body::frz_body;
 use frazil::capi::context::*;
@@ -15,6 +14,7 @@ use frazil::capi::mesh::*;
 use frazil::capi::pool::*;
 use frazil::capi::snow::*;
 use frazil::capi::{frz_status, frz_view};
+use frazil::geometry::TriMesh;
 
 use crate::common::shapes;
 use crate::harness::Harness;
@@ -63,7 +63,7 @@ impl Host {
     fn new() -> Self {
         let mut ball = shapes::sphere(0.15, 8);
         ball.positions.iter_mut().for_each(|p| p.y += 0.3);
-        let moved = |p: &frazil::base::Vec3| [p.x + 0.1, p.y - 0.05, p.z + 0.05];
+        let moved = |p: &frazil::geometry::Vec3| [p.x + 0.1, p.y - 0.05, p.z + 0.05];
         let spread = |n: usize, step: usize| (n * step % 97) as f32 / 97.0;
         let mut host = Self {
             pool: null_mut(),

@@ -7,13 +7,13 @@ use std::ptr::null_mut;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use frazil::base::DVec3;
 use frazil::capi::base::*;
 use frazil::capi::body::frz_body;
 use frazil::capi::context::*;
 use frazil::capi::grid::*;
 use frazil::capi::grid_bytes::*;
 use frazil::capi::{frz_status, frz_view};
+use frazil::geometry::DVec3;
 use frazil::motion::Motion;
 use frazil::snow::base_layer::BaseLayer;
 use frazil::sweep::Body;

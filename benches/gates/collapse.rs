@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::io::points_ply;
 
 use crate::columns::{self, D};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Motion, Rigid};
 use frazil::snow::grains::heap::Shell;
 use frazil::snow::grains::{Base, Grains, Object, Params, Surroundings};
@@ -208,7 +208,7 @@ fn walker(h: &mut Harness) {
 
 /// Counts of grains of a frame: not trapped but in the character, or in the base; trapped; all.
 fn walker_frame(out: &Path, frame: i32) -> [usize; 4] {
-    use frazil::base::points::Values;
+    use frazil::geometry::points::Values;
     let points =
         frazil::vdb::points::read(&out.join(format!("grains/grains.{frame:04}.vdb")), None).expect("points");
     let places: Vec<DVec3> = (0..points.count()).map(|index| points.position(index)).collect();

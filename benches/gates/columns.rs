@@ -4,7 +4,7 @@
 //! Their final radius is the edge of the deposit, not the farthest stray. Here it is the mean over 36 sectors of the farthest
 //! grain that a chain of touching grains connects to the middle.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::snow::grain_friction::of_repose;
 
 use crate::grains::{Experiment, walls};

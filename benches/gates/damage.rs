@@ -125,7 +125,7 @@ fn intact(kind: &str, folder: &Path) -> Vec<Vec<u8>> {
     if let Some(ending) = kind.strip_prefix(surface_readers::KIND) {
         return surface_readers::intact(ending, folder);
     }
-    let written = |mesh: &frazil::base::TriMesh| {
+    let written = |mesh: &frazil::geometry::TriMesh| {
         let path = folder.join(format!("intact.{kind}"));
         mesh::write(&path, mesh).expect("a mesh");
         std::fs::read(path).expect("its bytes")

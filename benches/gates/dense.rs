@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use frazil::base::bvh::Bvh;
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::spatial::bvh::Bvh;
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::motion::Motion;
 use nalgebra::Rotation3;
 use rayon::prelude::*;

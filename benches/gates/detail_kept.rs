@@ -5,7 +5,7 @@
 use std::collections::HashMap;
 
 use frazil::Context;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Params, Particles, Tracker};
 
 use crate::common::liquids::{Ball, ball, context, numbered, once_around};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::vdb::{file, points};
 
 use crate::common::character::data;

@@ -2,7 +2,7 @@
 //! a part listed that the mesh does not cover (it has no vertices).
 
 use frazil::Context;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Implicit, Isosurface, Params, Tracker};
 
 use crate::common::liquids::{context, numbered};

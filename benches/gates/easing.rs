@@ -2,8 +2,8 @@
 //! whether what is shown crosses itself.
 
 use frazil::Context;
-use frazil::base::deviation::NearestTree;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::check::deviation::NearestTree;
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Change, Outlook, Particles, Tracker};
 
 use crate::common::liquids::context;

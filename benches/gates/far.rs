@@ -1,6 +1,6 @@
 //! Gates of scenes far from the origin: the demonstration's walk, moved by whole cells.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params};

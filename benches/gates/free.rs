@@ -1,6 +1,6 @@
 //! Gates of grains in free motion: one that nothing touches, and heaps that nothing holds.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::snow::grains::heap::{Colliders, Division, Heap};
 
 use crate::grains::{Experiment, FRAME};

@@ -1,6 +1,6 @@
 //! Gate of the memory of grains in a step, measured in a process of its own.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::snow::grains::{Base, Grains, Params, Surroundings, memory};
 
 use crate::grains::{FRAME, Random};

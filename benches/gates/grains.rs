@@ -1,7 +1,7 @@
 //! Grains and what moves them in the gates, by subject in the files beside this one.
 
-use frazil::base::DVec3;
 use frazil::context::Context;
+use frazil::geometry::DVec3;
 use frazil::snow::grains::Params;
 use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap, Pose, Shell};
 

@@ -2,7 +2,7 @@
 
 use std::process::{Command, Stdio};
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::surface::Implicit;
 
 use crate::common::liquids::{ball, context, plain_phi, two_clouds, write_cache};
@@ -68,7 +68,7 @@ fn million(h: &mut Harness) {
     let phases = frame["phases"].as_array().expect("phases");
     let seconds: f64 = phases.iter().map(|phase| phase["seconds"].as_f64().expect("seconds")).sum();
     let note = format!("{} particles, {} triangles; threads=1", ball.places.len(), ball.mesh.triangles.len());
-    let cpu = frazil::base::cpu::cpu_level();
+    let cpu = frazil::numeric::cpu::cpu_level();
     h.gate(time, seconds, &format!("{note} cpu={cpu:?}; all phases of a frame"));
     let peak = read("run.json")["peak_memory_bytes"].as_f64().expect("a peak") / 1e9;
     h.gate(memory, peak, &format!("{note}; the whole command"));

@@ -1,6 +1,6 @@
 //! Gates of topology matching: near the flags it finds what it finds on the whole grid.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::surface::{Matching, Node, Solver, match_topology};
 
 use crate::common::liquids::context;

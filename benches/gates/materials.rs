@@ -1,7 +1,7 @@
 //! Gates of materials: walls that stand or fall as requested, bounces, and grains that stick to an object.
 
 use frazil::Context;
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::motion::Motion;
 use frazil::snow::grain_cohesion::of_wall;
 use frazil::snow::grain_friction::of_repose;

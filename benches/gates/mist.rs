@@ -3,9 +3,9 @@
 use std::time::Instant;
 
 use frazil::Context;
-use frazil::base::DVec3;
 use frazil::flow::tiles::padded;
 use frazil::flow::{Coord, Faces, Flow, Scheme, Solids, Tile, Tiles};
+use frazil::geometry::DVec3;
 use frazil::snow::mist::{Around, Boundary, Mist, Params, Source, StepReport};
 
 use crate::grain_memory::{in_a_process_of_its_own, kilobytes};

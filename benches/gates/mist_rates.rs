@@ -1,8 +1,8 @@
 //! Gate of mist over time: the same from 24, 48 and 96 frames a second.
 
 use frazil::Context;
-use frazil::base::DVec3;
 use frazil::flow::Tiles;
+use frazil::geometry::DVec3;
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};
 use frazil::snow::mist::{Around, Mist, Params, Source, Start, Surroundings};

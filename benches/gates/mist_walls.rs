@@ -1,7 +1,7 @@
 //! Gates of mist beside solids that move: what flows through them, and pockets that they seal off.
 
-use frazil::base::{DVec3, TriMesh};
 use frazil::flow::{Coord, Faces, Flow, Solids, Tiles};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::mist::{Around, Mist, Params, Surroundings};
 use frazil::sweep::Body;

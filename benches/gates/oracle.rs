@@ -1,6 +1,6 @@
 //! Exact answers by other means than the library's.
 
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use nalgebra::Rotation3;
 
 /// A box that moves rigidly, as in the keys of a motion.

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Character, Key, Keys, Placed, Play, Space};
 use frazil::snow::grains::{Base, Grains, Object, Params, Surroundings};
 use frazil::sweep::Body;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use frazil::base::points::Points;
+use frazil::geometry::points::Points;
 use frazil::vdb::file::WriteOptions;
 use frazil::vdb::points;
 

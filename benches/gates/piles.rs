@@ -1,6 +1,6 @@
 //! Gates of poured piles: the requested slope, for any size and count of grains, on snow as in a scene.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::snow::grain_friction::of_repose;
 
 use crate::grains::Experiment;

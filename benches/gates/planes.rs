@@ -1,6 +1,6 @@
 //! Gates of a grain on a plane that leans: it rests below the angle of friction and slides above it.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 
 use crate::grains::{Experiment, FRAME, still};
 use crate::harness::Harness;

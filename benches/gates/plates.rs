@@ -1,6 +1,6 @@
 //! Gate of the volume that flat-sided bodies remove, against what they cut out of the snow.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::snow::base_layer::BaseLayer;
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 

@@ -1,6 +1,6 @@
 //! The union of many poses of a moving mesh, by counting crossings along lines: nothing of the sweep is used.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::motion::Motion;
 use frazil::sweep::Topology;
 use rayon::prelude::*;

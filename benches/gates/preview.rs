@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::snow::grain_friction::of_repose;
 
 use crate::grains::Experiment;

@@ -29,7 +29,7 @@ pub fn run(h: &mut Harness) {
     let rate = pile.heap.count() as f64 * f64::from(frames) / seconds / 1e3;
     let note = format!(
         "threads=1 cpu={:?} {} grains, {} sub-steps, {:.1} M grain-sub-steps/s; thesis=3-13 Newton=1.8 MPM=48-93 Taichi=2.4",
-        frazil::base::cpu::cpu_level(),
+        frazil::numeric::cpu::cpu_level(),
         pile.heap.count(),
         pile.division.sub_steps,
         rate * pile.division.sub_steps as f64 / 1e3

@@ -2,8 +2,8 @@
 //! liquid inside, and little of it is rebuilt.
 
 use frazil::Context;
-use frazil::base::topology::Topology;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::check::topology::Topology;
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Change, Distances, Implicit, Isosurface, Sampler, Source};
 
 use crate::common::liquids::{context, own_surface};

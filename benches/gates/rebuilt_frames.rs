@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use std::time::Instant;
 
 use frazil::Context;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Implicit, Isosurface, Params, Particles, StepReport, Tracker};
 
 use crate::common::liquids::{context, filled, numbered};
@@ -177,7 +177,7 @@ impl Scene {
             middle(&counted, |step| step.improve),
             (self.motion)(0).places.len(),
             self.mesh.triangles.len(),
-            frazil::base::cpu::cpu_level()
+            frazil::numeric::cpu::cpu_level()
         );
         (middle(&counted, |step| step.whole), note)
     }

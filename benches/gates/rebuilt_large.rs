@@ -3,7 +3,7 @@
 
 use std::process::{Command, Stdio};
 
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 
 use crate::common::liquids::{ball, context};
 use crate::common::shapes::welded;

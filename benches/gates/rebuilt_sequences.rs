@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use frazil::Context;
-use frazil::base::TriMesh;
-use frazil::base::points::Values;
+use frazil::geometry::TriMesh;
+use frazil::geometry::points::Values;
 use frazil::io::particles;
 use frazil::surface::{Params, Particles, StepReport, Tracker};
 

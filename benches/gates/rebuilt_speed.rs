@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use frazil::Context;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Params, Particles, Source, StepReport, Tracker};
 
 use crate::common::liquids::{Ball, ball, context, numbered};
@@ -57,7 +57,7 @@ fn rebuilding(h: &mut Harness) {
     let note = format!(
         "{} triangles, threads=1 cpu={:?} thesis=3.16 s",
         dragon.mesh.triangles.len(),
-        frazil::base::cpu::cpu_level()
+        frazil::numeric::cpu::cpu_level()
     );
     if h.wants(names[0]) {
         let reports: Vec<StepReport> = steps_with(&ctx, &dragon, params(dragon.spacing), STEPS)
@@ -187,7 +187,7 @@ fn merge(h: &mut Harness) {
         median(meshing),
         from.places.len(),
         mesh.triangles.len(),
-        frazil::base::cpu::cpu_level()
+        frazil::numeric::cpu::cpu_level()
     );
     h.gate(name, median(seconds), &note);
 }

@@ -1,9 +1,9 @@
 //! Gates of the made sets, whose mesh is rebuilt: whether it becomes what the liquid does, how soon, and whether what its changes say
 //! of themselves is so; and whether it is valid, and becomes that too, where its topology is matched all over it in every step.
 
-use frazil::base::arrays::{Number, On};
-use frazil::base::topology::bodies;
-use frazil::base::{DetailedMesh, MeshArray, TriMesh};
+use frazil::geometry::check::topology::bodies;
+use frazil::geometry::mesh::attributes::{Number, On};
+use frazil::geometry::{DetailedMesh, MeshArray, TriMesh};
 use frazil::surface::{Change, carry_attributes};
 
 use crate::common::liquids::{context, own_surface};

@@ -2,8 +2,8 @@
 //! triangles while the particles tremble, and whether easing makes one cross itself.
 
 use frazil::Context;
-use frazil::base::faults::meeting_pairs;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::check::faults::meeting_pairs;
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Outlook, Params, Particles, Tracker};
 
 use crate::common::liquids::{Random, ball, context, filled, numbered, own_surface};

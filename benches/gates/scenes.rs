@@ -1,6 +1,6 @@
 //! Layers and bodies of the gates.
 
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params};

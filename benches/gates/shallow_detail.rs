@@ -1,6 +1,6 @@
 //! Gates of shallow's level of detail: nothing is lost while the near cells move about, and what a domain costs of which a quarter is near.
 
-use frazil::base::cpu::cpu_level;
+use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::detail::Cells;
 use frazil::shallow::flows::{FlowPoint, Kind, Pulse};
 use frazil::shallow::pipes::Border;

@@ -1,7 +1,7 @@
 //! Gates of falls: liquid that leaves an edge flies as ballistics says, and is in the balance all the way.
 
 use frazil::Context;
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::shallow::falls::Falls;
 use frazil::shallow::liquid::Liquid;
 use frazil::shallow::params::Pace;

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use frazil::base::Vec3;
+use frazil::geometry::Vec3;
 use frazil::shallow::Shallow;
 use frazil::shallow::columns::{Columns, NONE};
 use frazil::shallow::liquid::Liquid;

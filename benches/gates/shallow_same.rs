@@ -2,7 +2,7 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-use frazil::base::cpu::cpu_level;
+use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::Shallow;
 use frazil::shallow::falls::mesh::{Balls, Target as DropTarget, bound as drops_bound};
 use frazil::shallow::falls::{Droplet, Falls};

@@ -1,7 +1,7 @@
 //! Gates of what a shallow liquid carries: each scalar adds up to the last amount, and what a frame with one takes.
 
-use frazil::base::cpu::cpu_level;
-use frazil::base::{DVec3, Vec3};
+use frazil::geometry::{DVec3, Vec3};
+use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::falls::Falls;
 use frazil::shallow::flows::Kind;
 use frazil::shallow::liquid::Liquid;

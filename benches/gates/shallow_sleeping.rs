@@ -1,7 +1,7 @@
 //! Gates of what a pool at rest costs: thread CPU time of a frame of it, as part of the same one's while it was stirred; and that nothing depends on
 //! whether it sleeps.
 
-use frazil::base::cpu::cpu_level;
+use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::{Params, Shallow};
 

@@ -1,6 +1,6 @@
 //! Gates of shallow's time and memory: thread CPU time on one core.
 
-use frazil::base::cpu::cpu_level;
+use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::liquid::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::terrain::Solids;

@@ -1,6 +1,6 @@
 //! Gates of shallow's states: how long one takes, in thread CPU time on one core, and that a liquid flows on from it to the same bytes.
 
-use frazil::base::cpu::cpu_level;
+use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::Shallow;
 use frazil::{Context, Pool};
 

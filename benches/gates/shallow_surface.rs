@@ -1,6 +1,6 @@
 //! Gates of shallow's surface: thread CPU time on one core, and edges between columns that are not linked.
 
-use frazil::base::cpu::cpu_level;
+use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::Shallow;
 use frazil::shallow::columns::{Columns, NONE};
 use frazil::shallow::surface::ledges::Ledges;

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use frazil::base::cpu::cpu_level;
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::{TriMesh, Vec3};
+use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::grid::{Grid, Heights};
 use frazil::shallow::terrain::triangles::{self, Caster};
 use frazil::shallow::{Params, Shallow};

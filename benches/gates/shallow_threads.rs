@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use frazil::base::cpu::cpu_level;
+use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::Shallow;
 use frazil::{Context, Pool};
 

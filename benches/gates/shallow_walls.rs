@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use frazil::Context;
-use frazil::base::cpu::cpu_level;
+use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::grid::{BOTTOMLESS, Grid};
 use frazil::shallow::params::{Friction, Pace};
 use frazil::shallow::terrain::Solids;

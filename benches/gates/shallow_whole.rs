@@ -1,6 +1,6 @@
 //! Gates of a whole frame of shallow: what flows, what falls, and the surface and the drops in the caller's buffers; thread CPU time on one core.
 
-use frazil::base::cpu::cpu_level;
+use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::columns::Columns;
 use frazil::shallow::falls::mesh::{self as drops, Balls};
 use frazil::shallow::falls::{Droplet, Falls};

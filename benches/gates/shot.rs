@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::motion::{Character, Key, Keys, Motion, Placed, Play, Space};
 use frazil::scene::{Inputs, Scene};
 use frazil::snow::base_layer::{BaseLayer, Params};

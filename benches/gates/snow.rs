@@ -1,6 +1,6 @@
 //! Gates of the snow: what is left, what is removed, and that nothing grows.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::snow::base_layer::Params;
 use frazil::vdb::{FloatGrid, level_set};
 

@@ -1,7 +1,7 @@
 //! Gates of time and memory.
 
 use fastnoise_lite::{FastNoiseLite, FractalType, NoiseType};
-use frazil::base::blocks::{Block, BlockEdit};
+use frazil::numeric::blocks::{Block, BlockEdit};
 use frazil::snow::base_layer::BaseLayer;
 use frazil::sweep::{self, Body, SamplesSettings};
 use frazil::vdb::{FloatGrid, level_set};
@@ -23,7 +23,7 @@ pub fn frame_times(ctx: &frazil::Context, base: &mut BaseLayer, body: &Body) -> 
 /// Times of a frame, against the bounds and against stock OpenVDB; memory.
 pub fn run(h: &mut Harness) {
     let ctx = context(2);
-    let cpu = format!("threads=2 cpu={:?}", frazil::base::cpu::cpu_level());
+    let cpu = format!("threads=2 cpu={:?}", frazil::numeric::cpu::cpu_level());
     if h.wants("snow.base.small") || h.wants("snow.base.stock_small") {
         let (mut base, body) = scenes::small(&ctx, 2.0);
         let seconds = median(frame_times(&ctx, &mut base, &body));

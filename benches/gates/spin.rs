@@ -2,8 +2,9 @@
 
 use std::time::Instant;
 
-use frazil::base::{DVec3, cpu};
+use frazil::geometry::DVec3;
 use frazil::motion::Motion;
+use frazil::numeric::cpu;
 use frazil::sweep::{self, Body, Settings};
 use frazil::vdb::{FloatGrid, level_set};
 use rayon::prelude::*;

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use frazil::base::DVec3;
-use frazil::base::points::Points;
+use frazil::geometry::DVec3;
+use frazil::geometry::points::Points;
 use frazil::io::particles;
 
 use crate::common::liquids::Random;

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use frazil::Context;
-use frazil::base::arrays::{MeshArray, Number, On};
-use frazil::base::{DVec3, DetailedMesh, TriMesh, Uvs};
+use frazil::geometry::mesh::attributes::{MeshArray, Number, On};
+use frazil::geometry::{DVec3, DetailedMesh, TriMesh, Uvs};
 use frazil::io::mesh;
 use frazil::surface::{Implicit, Isosurface, Params, Particles, Tracker};
 

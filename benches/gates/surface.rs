@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use frazil::Context;
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::surface::{Implicit, Isosurface, Params, Particles, StepReport, Tracker};
 
 use crate::common::liquids::{
@@ -186,7 +186,7 @@ fn half_space(h: &mut Harness) {
 fn speed(h: &mut Harness) {
     let phases = ["advect", "phi", "distance", "project"];
     let names = phases.map(|phase| format!("surface.time_{phase}"));
-    let cpu = frazil::base::cpu::cpu_level();
+    let cpu = frazil::numeric::cpu::cpu_level();
     if names.iter().any(|name| h.wants(name)) {
         let reports = steps(&context(1), &ball(17.0, 146, 0.25));
         for ((name, phase), thesis) in names.iter().zip(phases).zip([1.17, 3.01, 1.39, 1.24]) {

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use frazil::base::DVec3;
-use frazil::base::points::{Column, Points, Values};
+use frazil::geometry::DVec3;
+use frazil::geometry::points::{Column, Points, Values};
 use frazil::io::mesh::extension;
 use frazil::io::particles::{self, Cloud};
 use frazil::vdb::file::{Compression, WriteOptions};

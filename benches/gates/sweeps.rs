@@ -1,7 +1,7 @@
 //! Gates of the swept volume: walls, and distances against exact ones.
 
-use frazil::base::DVec3;
-use frazil::base::blocks::offset;
+use frazil::geometry::DVec3;
+use frazil::numeric::blocks::offset;
 use frazil::sweep::{self, Body, Settings};
 use frazil::vdb::{FloatGrid, level_set};
 
@@ -157,7 +157,7 @@ fn boots(h: &mut Harness) {
         for frame in 2..=48 {
             let [(r0, at0), (r1, at1)] = [keys.at(f64::from(frame - 1)), keys.at(f64::from(frame))];
             let moved =
-                |p: &frazil::base::Vec3| (r1 * p.cast::<f64>() + at1 - r0 * p.cast::<f64>() - at0).norm();
+                |p: &frazil::geometry::Vec3| (r1 * p.cast::<f64>() + at1 - r0 * p.cast::<f64>() - at0).norm();
             speeds.push((mesh.positions.iter().map(moved).fold(0.0, f64::max), boot, frame));
         }
     }

@@ -146,7 +146,7 @@ impl Scene {
                 .map(|(stage, pass)| format!("{stage} {:.2}", pass.mean()))
                 .collect();
             let sum = passes.iter().map(Pass::mean).sum();
-            let cpu = frazil::base::cpu::cpu_level();
+            let cpu = frazil::numeric::cpu::cpu_level();
             h.gate(
                 shot,
                 sum,
@@ -229,7 +229,7 @@ impl Pass {
         format!(
             "threads=2 cpu={:?} thesis={thesis} s on 6 cores; {} grains in the end, {} of them rest; {:.1} thousand grains that are \
              awake in a core-second; all frames {:.2} s, the longest {:.2}",
-            frazil::base::cpu::cpu_level(),
+            frazil::numeric::cpu::cpu_level(),
             number(last, "grains"),
             number(last, "resting"),
             awake / sum / 2e3,

@@ -4,8 +4,8 @@
 //! exact way back of a particle near a face leads to where its corners were at the first frame; there they have the texture of the
 //! nearest place of the mesh then.
 
-use frazil::base::deviation::NearestTree;
-use frazil::base::{DVec3, DetailedMesh, TriMesh, Uvs, Vec3};
+use frazil::geometry::check::deviation::NearestTree;
+use frazil::geometry::{DVec3, DetailedMesh, TriMesh, Uvs, Vec3};
 use frazil::surface::{Change, Rest, Source, Traced, carry_attributes};
 
 use crate::common::liquids::context;
@@ -224,7 +224,7 @@ impl Sheet {
 
     /// Compares it with the particles' own texture, these being at `now` (m).
     fn see(&mut self, truth: &Truth, now: &[DVec3], sources: &[Source]) {
-        let is_mask = |array: &&frazil::base::MeshArray| array.name == Traced::MASK;
+        let is_mask = |array: &&frazil::geometry::MeshArray| array.name == Traced::MASK;
         let mask = self.traced.arrays.iter().find(is_mask).expect("the mask").values.clone();
         self.frames += 1;
         self.last = Sums::default();

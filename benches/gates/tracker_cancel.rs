@@ -5,11 +5,11 @@ use std::cell::Cell;
 use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
-use frazil::base::{DVec3, TriMesh, Vec3};
 use frazil::capi::mesh::*;
 use frazil::capi::tracker::*;
 use frazil::capi::tracker_eased::frz_tracker_read_eased;
 use frazil::capi::{frz_span, frz_status, frz_view};
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 
 use crate::cancel_latency::{Steps, measure};
 use crate::common::liquids::{ball, context, filled, own_surface, turned};

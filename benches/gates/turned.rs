@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::snow::grain_friction::of_repose;
 use frazil::snow::grains::heap::{Pose, Shell};
 

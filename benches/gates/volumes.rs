@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use frazil::Context;
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::snow::base_layer::BaseLayer;
 use frazil::snow::grains::Grains;
 use frazil::snow::volumes::{fog, united};

@@ -3,9 +3,9 @@
 
 use std::time::Instant;
 
-use frazil::base::deviation::{NearestTree, from_surface};
-use frazil::base::topology::bodies;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::check::deviation::{NearestTree, from_surface};
+use frazil::geometry::check::topology::bodies;
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Params, Particles, Tracker};
 
 use crate::common::liquids::{context, numbered};

@@ -1,8 +1,8 @@
 //! How often a closed mesh surrounds places: on a lattice by the crossings of its lines, and of particles by rays.
 
-use frazil::base::bvh::Bvh;
-use frazil::base::topology::bodies;
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::check::topology::bodies;
+use frazil::geometry::spatial::bvh::Bvh;
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use rayon::prelude::*;
 
 use crate::common::liquids::Random;

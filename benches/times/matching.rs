@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::time::Instant;
 
 use frazil::Context;
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::surface::{Matched, Matching, Node, Solver, match_topology};
 
 use crate::common::liquids::context;

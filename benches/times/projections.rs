@@ -3,7 +3,7 @@
 //! where advection put them.
 
 use frazil::Context;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Distances, Params, Particles, Sampler, carried, foot};
 use rayon::prelude::*;
 

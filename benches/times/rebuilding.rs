@@ -4,10 +4,10 @@
 use std::time::Instant;
 
 use frazil::Context;
-use frazil::base::TriMesh;
-use frazil::base::faults::Faults;
-use frazil::base::topology::bodies;
 use frazil::error::Result;
+use frazil::geometry::TriMesh;
+use frazil::geometry::check::faults::Faults;
+use frazil::geometry::check::topology::bodies;
 use frazil::surface::{Params, Particles, Tracker};
 
 use crate::common::liquids::{context, own_surface};

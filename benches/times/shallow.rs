@@ -1,7 +1,7 @@
 //! Shallow: the simulation columns of the thesis' Table 4.1, its time-step study and its scaling, beside ours.
 
 use frazil::Context;
-use frazil::base::cpu::cpu_level;
+use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::liquid::Liquid;
 use frazil::shallow::params::{Pace, Section};
 use frazil::shallow::pipes::Border;

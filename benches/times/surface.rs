@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use std::path::PathBuf;
 
 use frazil::Context;
-use frazil::base::mesh::coincident;
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::mesh::coincident;
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::surface::{Distances, Implicit, Isosurface, Params, Particles, Tracker, Weighting, carried};
 
 use crate::common::liquids::{Ball, ball, context, follow, numbered, once_around};

@@ -11,7 +11,7 @@ use super::handle::{Noun, change, clear, destroy_whole, free, give, read, requir
 use super::level_set::frz_noise;
 use super::mesh::no_flags;
 use super::views::{Sized32, fill, finite, frz_view, sized, write_bytes};
-use crate::base::blocks::Origin;
+use crate::numeric::blocks::Origin;
 use crate::snow::base_layer::{BaseLayer, Params};
 use crate::sweep::{Body, TOLERANCE};
 use crate::vdb::FloatGrid;

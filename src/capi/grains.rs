@@ -11,8 +11,8 @@ use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{Noun, change, destroy, read};
 use super::saved::{Saved, resumed};
 use super::views::{Sized32, fill, frz_view, sized, within};
-use crate::base::digits;
 use crate::context::Context;
+use crate::numeric::digits;
 use crate::snow::grains::{Base, Grains, Surroundings, memory};
 use crate::vdb::{FloatGrid, GridClass};
 

@@ -4,7 +4,7 @@ use super::guard::{Outcome, frz_status, guard};
 use super::handle::required;
 use super::mesh::no_flags;
 use super::views::{Sized32, fill, finite, sized, within};
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 use crate::snow::grains::Params;
 use crate::snow::{grain_cohesion, grain_friction};
 

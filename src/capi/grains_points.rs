@@ -7,7 +7,7 @@ use super::grains::frz_grains;
 use super::guard::{frz_status, guard};
 use super::handle::{change, clear, read, required};
 use super::views::{frz_span, frz_view, meaning};
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 use crate::snow::grains::memory;
 
 /// What frz_grains_read reads of each grain; in brackets its usual name as an attribute.

@@ -9,8 +9,8 @@ use super::grid_leaves::{check_origin, frz_leaf, frz_vector_leaf};
 use super::guard::{Failure, Outcome, frz_status};
 use super::mesh::no_flags;
 use super::views::{Sized32, finite, frz_view, meaning, sized, text};
-use crate::base::blocks::{Block, BlockEdit, DIM, Mask, Origin, VOXELS, Values};
 use crate::context::Context;
+use crate::numeric::blocks::{Block, BlockEdit, DIM, Mask, Origin, VOXELS, Values};
 use crate::vdb::{AnyGrid, FloatGrid, GridClass, VectorEdit, VectorGrid, Vectors};
 
 /// Description of a new grid.

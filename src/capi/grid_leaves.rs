@@ -4,7 +4,7 @@ use super::grid::frz_grid;
 use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{read, required};
 use super::views::{Plain, frz_span, frz_view};
-use crate::base::blocks::Origin;
+use crate::numeric::blocks::Origin;
 use crate::vdb::{Leaf, Probe, VectorLeaf, VectorProbe};
 
 /// A block of 8 x 8 x 8 voxels. Voxel (x, y, z) of the block has its value at x * 64 + y * 8 + z, and its bit in

@@ -9,9 +9,9 @@ use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{Changing, change, read, required};
 use super::mesh::{Mesh, frz_mesh};
 use super::views::{frz_span, frz_view, meaning, text, within};
-use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::{DVec3, TriMesh};
 use crate::vdb::{FloatGrid, GridRef, VectorGrid, level_set};
 
 /// How values between voxels are found.

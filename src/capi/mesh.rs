@@ -6,8 +6,8 @@ use super::context::{creates, frz_context};
 use super::guard::{Failure, Outcome, frz_status, guard};
 use super::handle::{Noun, destroy, read};
 use super::views::{Plain, Sized32, fill, frz_span, frz_view, meaning, sized, text};
-use crate::base::{PolygonMesh, TriMesh, Vec3};
 use crate::context::Context;
+use crate::geometry::{PolygonMesh, TriMesh, Vec3};
 
 /// A mesh of polygons with attributes of its vertices.
 pub struct frz_mesh {

@@ -5,9 +5,9 @@ use super::guard::{Outcome, frz_status, guard};
 use super::handle::{clear, give, read, required};
 use super::mesh::{Mesh, frz_mesh};
 use super::views::{Sized32, fill, within};
-use crate::base::arrays::{Number, On};
-use crate::base::{DetailedMesh, MeshArray};
 use crate::context::Context;
+use crate::geometry::mesh::attributes::{Number, On};
+use crate::geometry::{DetailedMesh, MeshArray};
 use crate::surface::{RepairReport, Repaired, carry_attributes, repair};
 
 /// What frz_mesh_repair did.

@@ -9,7 +9,7 @@ use super::mesh::no_flags;
 use super::shallow::frz_shallow;
 use super::shallow_params::FRZ_SHALLOW_NO_SCALAR;
 use super::views::{Sized32, fill, frz_span, frz_view, sized, write_bytes};
-use crate::base::Vec3;
+use crate::geometry::Vec3;
 use crate::shallow::stains::Absorbing;
 use crate::shallow::{Staining, Stains};
 

@@ -6,7 +6,7 @@ use super::guard::{Outcome, frz_status, guard};
 use super::handle::{Reading, read};
 use super::mesh::{Mesh, frz_mesh, no_flags};
 use super::views::{Plain, Sized32, fill, finite, frz_view, sized, within};
-use crate::base::TriMesh;
+use crate::geometry::TriMesh;
 use crate::snow::base_layer::initial::{Cover, Ground, layer};
 use crate::sweep::surface_bytes;
 

@@ -10,8 +10,8 @@ use super::saved::{Saved, resumed};
 use super::tracker_edits::Edits;
 pub use super::tracker_params::{frz_tracker_params, frz_tracker_params_init};
 use super::views::{Sized32, fill, finite, frz_view, sized};
-use crate::base::orientation::{Closing, Orientation};
-use crate::base::topology::Topology;
+use crate::geometry::check::orientation::{Closing, Orientation};
+use crate::geometry::check::topology::Topology;
 use crate::surface::{Change, Outlook, Particles, Tracker, estimate_spacing};
 
 /// A detailed mesh that follows the particles of a liquid.

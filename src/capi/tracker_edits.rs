@@ -4,7 +4,7 @@ use super::guard::{frz_status, guard};
 use super::handle::{clear, read, required};
 use super::tracker::{Follower, frz_tracker};
 use super::views::{frz_span, meaning};
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 use crate::surface::{Change, Source};
 
 /// What a step made of the mesh.

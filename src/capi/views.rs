@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use super::guard::frz_status::FRZ_ERROR_CAPACITY;
 use super::guard::frz_status::FRZ_ERROR_VERSION;
 use super::guard::{Failure, Outcome};
-use crate::base::digits;
+use crate::numeric::digits;
 
 /// An array that the caller lends for the time of the call.
 #[repr(C)]

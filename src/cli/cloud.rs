@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::base::points::Values;
-use frazil::base::{DVec3, Points};
+use frazil::geometry::points::Values;
+use frazil::geometry::{DVec3, Points};
 use frazil::io::mesh::extension;
 use frazil::io::particles::{self, Cloud};
 use frazil::io::sequence::Pattern;

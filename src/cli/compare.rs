@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::base::TriMesh;
-use frazil::base::deviation::{Deviation, NearestTree, from_surface, from_vertices, second_differences};
+use frazil::geometry::TriMesh;
+use frazil::geometry::check::deviation::{
+    Deviation, NearestTree, from_surface, from_vertices, second_differences,
+};
 use frazil::io::sequence::Pattern;
 use frazil::scene::FrameChoice;
 use frazil::{Context, Error, io};

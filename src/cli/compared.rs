@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use frazil::base::{PolygonMesh, TriMesh};
+use frazil::geometry::{PolygonMesh, TriMesh};
 use frazil::motion::{Character, is_gltf};
 
 use super::options::{Origin, warn_if_far};

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use frazil::base::arrays::On;
-use frazil::base::{MeshArray, TriMesh, Uvs, Vec3};
+use frazil::geometry::mesh::attributes::On;
+use frazil::geometry::{MeshArray, TriMesh, Uvs, Vec3};
 use frazil::io::mesh::extension;
 use frazil::io::sequence::Pattern;
 use frazil::io::usd_points::VELOCITIES;
@@ -395,11 +395,11 @@ impl Args {
         let time = f64::from(frame) / self.fps;
         let (mut pose, mut velocities) = (Vec::new(), Vec::new());
         motion.drawn_pose(time, &mut pose)?;
-        let out = |places: &mut Vec<frazil::base::DVec3>| {
+        let out = |places: &mut Vec<frazil::geometry::DVec3>| {
             places.iter_mut().for_each(|p| {
                 *p *= self.to_scale;
                 if self.to_up == Axis::Z {
-                    *p = frazil::base::DVec3::new(p.x, -p.z, p.y);
+                    *p = frazil::geometry::DVec3::new(p.x, -p.z, p.y);
                 }
             });
         };

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
-use frazil::base::faults::Faults;
-use frazil::base::orient::is_flat;
-use frazil::base::topology::Topology;
-use frazil::base::weld::Weld;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::check::faults::Faults;
+use frazil::geometry::check::predicates::is_flat;
+use frazil::geometry::check::topology::Topology;
+use frazil::geometry::mesh::weld::Weld;
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Character, is_gltf};
 use serde_json::{Value, json};
 

@@ -1,9 +1,9 @@
 //! Options that several commands share, and how their values are written.
 
 use frazil::Result;
-use frazil::base::mesh::{BY_OPTION, is_coarse};
-use frazil::base::weld::Weld;
-use frazil::base::{DVec3, PolygonMesh, TriMesh};
+use frazil::geometry::mesh::weld::Weld;
+use frazil::geometry::mesh::{BY_OPTION, is_coarse};
+use frazil::geometry::{DVec3, PolygonMesh, TriMesh};
 use frazil::motion::{Space, Up};
 use frazil::render::Size;
 use std::path::Path;

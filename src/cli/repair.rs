@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::base::arrays::On;
-use frazil::base::{DVec3, DetailedMesh, MeshArray, TriMesh};
+use frazil::geometry::mesh::attributes::On;
+use frazil::geometry::{DVec3, DetailedMesh, MeshArray, TriMesh};
 use frazil::io::mesh::extension;
 use frazil::io::sequence::Pattern;
 use frazil::io::{self, atomic, usd};

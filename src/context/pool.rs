@@ -4,8 +4,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use crate::base::cpu::FlushDenormals;
 use crate::error::{Error, Result};
+use crate::numeric::cpu::FlushDenormals;
 
 /// Most threads of a pool.
 pub const MOST_THREADS: usize = 1024;

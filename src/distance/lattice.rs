@@ -1,8 +1,8 @@
 //! Fixed-point coordinates: exact predicates on the voxel lattice need integers.
 
-use crate::base::DVec3;
-use crate::base::blocks::Origin;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::numeric::blocks::Origin;
 
 /// Fixed-point units in a cell; rounding to them moves a vertex by at most 1/8192 cell an axis.
 pub const UNITS: i32 = 4096;

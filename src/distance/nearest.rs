@@ -2,8 +2,8 @@
 //! sub-blocks leave few triangles for the exact distances.
 
 use super::triangle::{Offsets, Points, Triangle, near_lanes, nearest, prune, to_each};
-use crate::base::blocks::{Mask, offset};
-use crate::base::lanes::LANES;
+use crate::numeric::blocks::{Mask, offset};
+use crate::numeric::lanes::LANES;
 
 /// Working memory of [`search`].
 #[derive(Default)]

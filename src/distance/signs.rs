@@ -1,7 +1,7 @@
 //! Which voxels of a block lie inside the volume, and where the sign changes between neighbours.
 
 use super::winding::Lines;
-use crate::base::blocks::{Mask, offset};
+use crate::numeric::blocks::{Mask, offset};
 
 /// The bits of a line's ten voxels.
 const LINE: u16 = (1 << 10) - 1;

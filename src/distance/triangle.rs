@@ -2,8 +2,8 @@
 //!
 //! Compiled once for each instruction set, with the same bits in all of them (no fused multiply-add).
 
-use crate::base::cpu::dispatch;
-use crate::base::lanes::{LANES, Lanes};
+use crate::numeric::cpu::dispatch;
+use crate::numeric::lanes::{LANES, Lanes};
 
 use super::lattice::{Fixed, UNITS};
 use super::vectors::{cross, difference, dot, sub};

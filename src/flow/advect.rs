@@ -17,10 +17,10 @@ use super::room::Room;
 use super::stencil::row_of;
 use super::tiles::{Field, Tile, Tiles};
 use super::window::Window;
-use crate::base::cpu::dispatch;
-use crate::base::lanes::Lanes;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::numeric::cpu::dispatch;
+use crate::numeric::lanes::Lanes;
 
 /// How values are carried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

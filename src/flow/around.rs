@@ -10,7 +10,7 @@ use super::Flow;
 use super::operator::Operator;
 use super::tiles::{Coord, FACES, Field, Tile, Tiles, padded};
 use super::window::{Span, Window};
-use crate::base::cpu::dispatch;
+use crate::numeric::cpu::dispatch;
 
 /// How many times wider the cells around are.
 pub const WIDER: i32 = 2;

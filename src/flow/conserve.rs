@@ -12,10 +12,10 @@ use super::paths::{Extent, Paths};
 use super::stencil::row_of;
 use super::tiles::{Field, Tile, Tiles, neighbour_at};
 use super::window::{max, min};
-use crate::base::cpu::dispatch;
-use crate::base::lanes::Lanes;
 use crate::context::Context;
 use crate::error::Result;
+use crate::numeric::cpu::dispatch;
+use crate::numeric::lanes::Lanes;
 
 /// What becomes of a density besides being carried along.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::solids::Solids;
 use super::stencil::{Near, Stencil, Task, compute};
 use super::tiles::{Coord, FACES, NONE, Tile, Tiles, neighbour_at};
-use crate::base::blocks::Mask;
+use crate::numeric::blocks::Mask;
 
 /// The operator on a level.
 #[derive(Debug, Default)]

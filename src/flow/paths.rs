@@ -5,10 +5,10 @@ use rayon::prelude::*;
 use super::advect::Way;
 use super::tiles::{FACES, Field, Tile, Tiles};
 use super::window::{Span, Window, max, min};
-use crate::base::cpu::dispatch;
-use crate::base::lanes::Lanes;
 use crate::context::Context;
 use crate::error::Result;
+use crate::numeric::cpu::dispatch;
+use crate::numeric::lanes::Lanes;
 
 /// Largest displacement (cells) of a step; longer ones are cut off.
 pub const FARTHEST: f32 = 5.0;

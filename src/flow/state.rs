@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use super::Flow;
 use super::room::first;
 use super::tiles::{Coord, Field, Tile, Tiles};
-use crate::base::bytes::{Reader, Writer};
 use crate::error::{Error, Result};
+use crate::numeric::bytes::{Reader, Writer};
 
 /// What a flow carries from step to step.
 #[derive(Debug, Default)]

@@ -1,9 +1,9 @@
 //! The discrete Laplace operator of a tile: L x = sum over the six faces of open (x - neighbour), 0 outside all tiles.
 
 use super::tiles::Tile;
-use crate::base::blocks::Mask;
-use crate::base::cpu::dispatch;
-use crate::base::lanes::Lanes;
+use crate::numeric::blocks::Mask;
+use crate::numeric::cpu::dispatch;
+use crate::numeric::lanes::Lanes;
 
 /// Coefficients of a tile with faces that are not fully open, or with cells that do not take part.
 #[derive(Debug, Clone)]

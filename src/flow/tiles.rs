@@ -1,10 +1,10 @@
 //! Which tiles there are, and who is whose neighbour.
 
-use crate::base::blocks::VOXELS;
+use crate::numeric::blocks::VOXELS;
 
 /// Coordinate of a tile: that of its least cell, divided by 8.
 pub type Coord = [i32; 3];
-/// 512 values of a tile, in the order of [`crate::base::blocks`].
+/// 512 values of a tile, in the order of [`crate::numeric::blocks`].
 pub type Tile = [f32; VOXELS];
 /// A field: a tile of values for each slot.
 pub type Field = Vec<Tile>;

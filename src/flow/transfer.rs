@@ -6,7 +6,7 @@ use super::operator::Operator;
 use super::stencil::{Stencil, mean_residuals};
 use super::tiles::{NONE, Tile};
 use super::window::{Span, Window};
-use crate::base::cpu::dispatch;
+use crate::numeric::cpu::dispatch;
 
 /// Square of the ratio of the cells' widths, which the stencils leave out.
 const WIDER: f32 = 4.0;

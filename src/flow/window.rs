@@ -1,7 +1,7 @@
 //! Values of a tile and of cells around it, copied together so that kernels read them without asking for neighbours.
 
 use super::tiles::Tile;
-use crate::base::lanes::Lanes;
+use crate::numeric::lanes::Lanes;
 
 /// Most cells around a tile: a displacement of five cells, and two for cubic interpolation.
 pub const MOST: i32 = 7;

@@ -13,7 +13,7 @@ use flate2::write::GzEncoder;
 use super::numbers::{Kind, Numbers, Order, most_inflated};
 use super::particles::Found;
 use super::source;
-use crate::base::points::{Points, Values};
+use crate::geometry::points::{Points, Values};
 
 /// What Houdini's own files are, and the way out.
 pub(super) const HOUDINIS: &str = "is Houdini's own format since version 12 (JSON), not classic .bgeo: save it from Houdini as \

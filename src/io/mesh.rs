@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::caught::caught;
 use super::{atomic, obj, ply, ply_write, source, stl};
-use crate::base::{DVec3, DetailedMesh, PolygonMesh, TriMesh};
 use crate::error::{Error, Result};
+use crate::geometry::{DVec3, DetailedMesh, PolygonMesh, TriMesh};
 
 pub use ply_write::Carried;
 

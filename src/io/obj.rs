@@ -5,8 +5,9 @@ use std::io::Write;
 
 use super::ply_write::Carried;
 use super::{source, text};
-use crate::base::arrays::{MeshArray, Number, On};
-use crate::base::{PolygonMesh, TriMesh, Uvs, Vec3, uvs};
+use crate::geometry::mesh::attributes::{MeshArray, Number, On};
+use crate::geometry::mesh::uvs;
+use crate::geometry::{PolygonMesh, TriMesh, Uvs, Vec3};
 
 /// What is written of a mesh without vertices.
 const EMPTY: &[u8] = b"# an empty mesh\n";

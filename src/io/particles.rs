@@ -19,10 +19,10 @@ use std::path::Path;
 use super::caught::caught;
 use super::numbers::{Kind, Numbers};
 use super::{atomic, bgeo, points_ply, source, vtk, vtu, xyz};
-use crate::base::DVec3;
-use crate::base::mesh::spacing;
-use crate::base::points::{Attribute, Column, Points, Values};
 use crate::error::{Error, Result, one_line};
+use crate::geometry::DVec3;
+use crate::geometry::mesh::spacing;
+use crate::geometry::points::{Attribute, Column, Points, Values};
 
 /// Extensions of the files that are read.
 pub const READ: [&str; 7] = ["bgeo", "bgeo.gz", "bhclassic", "ply", "vtk", "vtu", "xyz"];

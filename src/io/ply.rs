@@ -6,8 +6,9 @@ use std::collections::HashMap;
 
 use super::ply_header::{self, Format, Header};
 use super::{source, text};
-use crate::base::arrays::{MeshArray, Number, On};
-use crate::base::{PolygonMesh, Uvs, Vec3, uvs};
+use crate::geometry::mesh::attributes::{MeshArray, Number, On};
+use crate::geometry::mesh::uvs;
+use crate::geometry::{PolygonMesh, Uvs, Vec3};
 
 pub(super) use super::ply_header::{Element, NAMES};
 
@@ -335,7 +336,7 @@ fn add_strips(values: &[f64], parsed: &mut Parsed) {
 mod tests {
     use super::super::ply_write::{Carried, write};
     use super::*;
-    use crate::base::TriMesh;
+    use crate::geometry::TriMesh;
 
     #[test]
     fn what_is_written_is_read_and_a_cut_file_is_refused() {

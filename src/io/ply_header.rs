@@ -1,7 +1,7 @@
 //! Headers of PLY files.
 
 use super::text;
-use crate::base::arrays::Number;
+use crate::geometry::mesh::attributes::Number;
 
 /// How the numbers behind a header are written.
 #[derive(Clone, Copy, PartialEq)]

@@ -3,8 +3,8 @@
 use std::io::{Result, Write};
 
 use super::ply::{NAMES, PLACES};
-use crate::base::arrays::{MeshArray, Number, On};
-use crate::base::{TriMesh, Uvs, Vec3};
+use crate::geometry::mesh::attributes::{MeshArray, Number, On};
+use crate::geometry::{TriMesh, Uvs, Vec3};
 
 /// What a mesh carries into a file besides its places.
 #[derive(Debug, Clone, Copy, Default)]

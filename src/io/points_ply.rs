@@ -10,10 +10,10 @@ use std::path::Path;
 use super::particles::{Cloud, shared, whole};
 use super::ply::{self, Element};
 use super::{atomic, source};
-use crate::base::DVec3;
-use crate::base::mesh::spacing;
-use crate::base::points::{Attribute, Points, Values};
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::geometry::mesh::spacing;
+use crate::geometry::points::{Attribute, Points, Values};
 
 /// The comment before the voxel size (m).
 const VOXEL: &str = "frazil voxel_size";
@@ -237,7 +237,7 @@ fn write_to(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::points::Column;
+    use crate::geometry::points::Column;
 
     #[test]
     fn what_is_written_is_read_and_a_cut_file_is_refused() {

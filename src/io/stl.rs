@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::io::Write;
 
 use super::{source, stl_text, text};
-use crate::base::{PolygonMesh, TriMesh, Vec3};
+use crate::geometry::{PolygonMesh, TriMesh, Vec3};
 
 /// Triangles between two looks at whether to stop.
 const PIECE: usize = 1 << 14;

@@ -7,7 +7,7 @@
 use super::source;
 use super::stl::Joined;
 use super::text::{self, Words};
-use crate::base::PolygonMesh;
+use crate::geometry::PolygonMesh;
 
 /// Facets between two looks at whether to stop.
 const PIECE: usize = 1 << 14;

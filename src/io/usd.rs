@@ -5,8 +5,8 @@ use std::fmt::Write;
 use super::usd_looks::{self, Look};
 use super::usd_points;
 use super::usd_primvars::{self, Primvar};
-use crate::base::arrays::Number;
-use crate::base::{DVec3, MeshArray, Points, Uvs, Vec3};
+use crate::geometry::mesh::attributes::Number;
+use crate::geometry::{DVec3, MeshArray, Points, Uvs, Vec3};
 
 /// A moving mesh at one frame.
 pub struct MeshFrame<'a> {

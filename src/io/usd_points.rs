@@ -4,9 +4,9 @@ use std::fmt::Write;
 
 use super::usd::{Units, list, prim_name, quoted, vector};
 use super::usd_primvars::{self, unique};
-use crate::base::arrays::Number;
-use crate::base::points::{Attribute, Column, Points, Values};
-use crate::base::{DVec3, Vec3};
+use crate::geometry::mesh::attributes::Number;
+use crate::geometry::points::{Attribute, Column, Points, Values};
+use crate::geometry::{DVec3, Vec3};
 
 /// The points of one frame. `v`, or `velocity`, `velocities` or `vel`, becomes `velocities` (m/s), `id` the prim's `ids`, `pscale` `widths` (twice as much: USD has
 /// diameters, m); every other attribute is a primvar of its name, with the interpolation `constant` where all points share

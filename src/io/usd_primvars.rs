@@ -7,7 +7,7 @@
 use std::fmt::Write;
 
 use super::usd::{list, prim_name};
-use crate::base::arrays::{MeshArray, Number, On};
+use crate::geometry::mesh::attributes::{MeshArray, Number, On};
 
 /// A primvar without its values: what it is called, and what has a value each.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -11,7 +11,7 @@ use std::io::Write;
 use super::numbers::{Kind, Numbers, Order};
 use super::particles::Found;
 use super::{source, text};
-use crate::base::points::Points;
+use crate::geometry::points::Points;
 
 /// Bytes of a particle in binary.
 const ROW: usize = 12;

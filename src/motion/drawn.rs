@@ -1,7 +1,7 @@
 //! Moving meshes as their files have them: every vertex in the file's order, and texture coordinates.
 
-use crate::base::mesh::{renumbered, used};
-use crate::base::{PolygonMesh, Uvs, Vec3};
+use crate::geometry::mesh::{renumbered, used};
+use crate::geometry::{PolygonMesh, Uvs, Vec3};
 
 /// A moving mesh as it is written.
 #[derive(Debug, Clone, Copy)]

@@ -4,8 +4,8 @@
 //! foot stays where it stands.
 
 use super::{Motion, Poses, span};
-use crate::base::DVec3;
 use crate::error::Result;
+use crate::geometry::DVec3;
 
 /// Sampled poses per second of the motion, and their least and greatest number.
 const RATE: f64 = 60.0;
@@ -112,7 +112,7 @@ fn part_of(mut values: Vec<f64>, part: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::{TriMesh, Vec3};
+    use crate::geometry::{TriMesh, Vec3};
     use crate::motion::{Key, Keys, Morph, Rigid};
 
     /// A foot that stands for half a second while it goes back 0.6 m, then swings to where it was.

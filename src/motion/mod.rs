@@ -20,8 +20,8 @@ pub use space::{Space, Up};
 
 use std::path::Path;
 
-use crate::base::DVec3;
 use crate::error::Result;
+use crate::geometry::DVec3;
 use crate::io::mesh::extension;
 
 /// Whether a file is a glTF character, by its name.
@@ -44,7 +44,7 @@ pub trait Motion: Send + Sync {
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()>;
 
     /// As [`Motion::pose`], but in the unit and around the origin in which the vertices were read, before anything turned or moved them:
-    /// the rounding of these coordinates is known ([`crate::base::weld`]).
+    /// the rounding of these coordinates is known ([`crate::geometry::mesh::weld`]).
     ///
     /// # Errors
     /// As [`Motion::pose`].

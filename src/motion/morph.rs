@@ -1,9 +1,9 @@
 //! One mesh that becomes another.
 
 use super::{Motion, between};
-use crate::base::mesh::used;
-use crate::base::{DVec3, TriMesh, Vec3};
 use crate::error::{Error, Result};
+use crate::geometry::mesh::used;
+use crate::geometry::{DVec3, TriMesh, Vec3};
 
 /// Vertices that move straight from one mesh's positions to another's.
 pub struct Morph {

@@ -1,8 +1,8 @@
 //! Poses of a motion one after another, and between two given ones.
 
 use super::Motion;
-use crate::base::{DVec3, Vec3};
 use crate::error::Result;
+use crate::geometry::{DVec3, Vec3};
 
 /// A motion's pose, and the one that was queried before it.
 pub struct Poses<'a> {

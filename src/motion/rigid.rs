@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Rotation3};
 
 use super::drawn::Faces;
 use super::{Drawn, Motion, Space};
-use crate::base::{DVec3, PolygonMesh, TriMesh};
 use crate::error::{Error, Result};
+use crate::geometry::{DVec3, PolygonMesh, TriMesh};
 
 /// A pose at a time: turned about x, then y, then z through the object's origin, then moved.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -272,7 +272,7 @@ impl Motion for Placed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::Vec3;
+    use crate::geometry::Vec3;
 
     #[test]
     fn turns_are_about_x_then_y_then_z() {

@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use super::drawn::Faces;
 use super::{Drawn, Motion, between};
-use crate::base::{DVec3, PolygonMesh, Vec3};
 use crate::error::{Error, Result};
+use crate::geometry::{DVec3, PolygonMesh, Vec3};
 use crate::io::mesh;
 use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;

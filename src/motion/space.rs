@@ -1,7 +1,7 @@
 //! The unit and upward axis of a file.
 
-use crate::base::DVec3;
-use crate::base::points::Values;
+use crate::geometry::DVec3;
+use crate::geometry::points::Values;
 use crate::io::particles::Cloud;
 
 /// The upward axis of a file.

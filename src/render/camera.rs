@@ -1,8 +1,8 @@
 //! The camera: given, or placed so that everything is in the picture.
 
 use super::cut::Plane;
-use crate::base::DVec3;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 
 /// Longest edge of a picture (pixels).
 const LONGEST: u32 = 16_384;

@@ -7,10 +7,10 @@ use super::camera::{Camera, Size};
 use super::model::Hit;
 use super::ramp::ramp;
 use super::shade::{Colour, SNOW};
-use crate::base::DVec3;
-use crate::base::points::{Column, Points, Values};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::geometry::points::{Column, Points, Values};
 
 /// Samples along an edge of a tile, which a task draws.
 const TILE: usize = 32;

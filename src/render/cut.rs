@@ -9,9 +9,9 @@ use super::camera::{Camera, Lens, Size};
 use super::picture::Picture;
 use super::ramp::ramp;
 use super::shade::{Colour, to_bytes};
-use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::{DVec3, TriMesh};
 
 /// Rows of the picture that are sampled at once.
 const ROWS: usize = 64;

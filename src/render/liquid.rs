@@ -2,7 +2,7 @@
 
 use super::model::{Hit, Model, smooth_normals};
 use super::shade::{Colour, Light, gloss};
-use crate::base::{DVec3, TriMesh};
+use crate::geometry::{DVec3, TriMesh};
 
 /// Surfaces of liquid behind each other that a ray passes at most.
 pub(super) const MOST_FILMS: usize = 8;

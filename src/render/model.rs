@@ -2,8 +2,8 @@
 
 use super::ramp::ramp;
 use super::shade::Colour;
-use crate::base::bvh::Bvh;
-use crate::base::{DVec3, TriMesh, Vec3};
+use crate::geometry::spatial::bvh::Bvh;
+use crate::geometry::{DVec3, TriMesh, Vec3};
 
 /// A mesh or a level set, ready to be drawn.
 pub struct Model {

@@ -8,9 +8,9 @@ use super::model::{Hit, Model};
 use super::picture::Picture;
 use super::shade::{Colour, Light, shade, to_bytes};
 use super::shadows::Shadows;
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::DVec3;
 use rayon::prelude::*;
 
 /// Samples along each edge of a pixel.

@@ -5,7 +5,7 @@
 use std::sync::LazyLock;
 
 use super::camera::{Camera, direction};
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// Linear red, green, blue.
 pub(super) type Colour = nalgebra::Vector3<f64>;

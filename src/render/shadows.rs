@@ -1,7 +1,7 @@
 //! Shadows of points: their spheres in the cells of a box, through which rays towards the light go.
 
 use super::cloud::Cloud;
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// Edge of a cell, in mean diameters: some dozen spheres of a heap lie in one.
 const CELL: f64 = 2.5;
@@ -124,7 +124,7 @@ impl Shadows {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::points::{Column, Points, Values};
+    use crate::geometry::points::{Column, Points, Values};
 
     #[test]
     fn rays_meet_the_spheres_that_are_in_their_way() {

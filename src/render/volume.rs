@@ -4,10 +4,10 @@ use super::cut::Field;
 use super::fog::{Fog, Part, Placement};
 use super::model::{Model, smooth_normals};
 use super::shade::SNOW;
-use crate::base::DVec3;
-use crate::base::blocks::{DIM, Origin};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::numeric::blocks::{DIM, Origin};
 use crate::vdb::{DENSITY_SCALE_KEY, FloatGrid, GridClass, MetaValue, Tile, level_set};
 
 impl Model {

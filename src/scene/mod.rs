@@ -22,8 +22,8 @@ pub use snow::{
 pub use surface::Surface;
 pub use text::{FrameChoice, Frames, Override, Value, Values, reference, template};
 
-use crate::base::DVec3;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 use crate::io::sequence::Pattern;
 use crate::motion::Space;
 use crate::snow::NoiseParams;

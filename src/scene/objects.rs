@@ -7,9 +7,9 @@ use super::shot::{
 };
 use super::text::keys::settings_of;
 use super::{Role, Scene, moving};
-use crate::base::{DVec3, TriMesh, Uvs, Vec3};
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::{DVec3, TriMesh, Uvs, Vec3};
 use crate::io::manifest::Keeps;
 use crate::io::seen::Seen;
 use crate::io::usd_looks::Look;

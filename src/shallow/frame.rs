@@ -11,10 +11,10 @@ use super::flow::stop::Stop;
 use super::pace::{self, LENGTHS, MOST_STEPS, Measures, Next};
 use super::params::Pace;
 use super::system::{Report, Shallow};
-use crate::base::cpu::FlushDenormals;
-use crate::base::digits;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::numeric::cpu::FlushDenormals;
+use crate::numeric::digits;
 
 /// The state at the beginning of a frame, and the steps of the frame before.
 #[derive(Debug, Default)]

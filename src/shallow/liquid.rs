@@ -1,7 +1,7 @@
 //! What flows.
 
-use crate::base::digits;
 use crate::error::{Error, Result};
+use crate::numeric::digits;
 
 /// A liquid.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,8 +11,8 @@ use super::grid::Grid;
 use super::pipes::joints::Side;
 use super::system::Shallow;
 use super::terrain::shapes::Shape;
-use crate::base::DVec3;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 
 /// Least height of a flooded gap in which a body is held back (cells): of the pillars of a round one some come as close to the ground as they like.
 const LEAST_GAP: f64 = 0.05;

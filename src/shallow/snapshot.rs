@@ -8,8 +8,8 @@ use super::flow::Flow;
 use super::flow::active::runs;
 use super::scalars::{MOST, find_concentrations};
 use super::system::Shallow;
-use crate::base::cpu::dispatch;
 use crate::error::{Error, Result};
+use crate::numeric::cpu::dispatch;
 
 /// The liquid after a frame.
 ///

@@ -10,8 +10,8 @@ use super::per_column::{Array, PerColumn};
 use super::pipes::{Links, Pipes};
 use super::scalars::check_scalar;
 use super::scalars::shares::{LEVELS, level};
-use crate::base::cpu::dispatch;
 use crate::error::{Error, Result};
+use crate::numeric::cpu::dispatch;
 
 /// How viscosity depends on a scalar: it is the liquid's up to `from`, and `times` that from `to` on; between them it grows with the concentration.
 #[derive(Debug, Clone, Copy, PartialEq)]

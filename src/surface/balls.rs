@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::{Implicit, Isosurface, Particles};
-use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
+use crate::geometry::{DVec3, TriMesh};
 
 /// Places of a lattice, from one distance (m) of its centre to another; from 0 on they are a ball.
 pub fn shell(centre: DVec3, from: f64, to: f64) -> Vec<DVec3> {

@@ -75,8 +75,8 @@ pub use track::lookahead::{Outlook, displaced};
 pub use track::project::{Foot, foot};
 pub use tracker::Tracker;
 
-use crate::base::DVec3;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 
 /// Particles of a frame; all arrays that are not empty have one value for each.
 #[derive(Debug, Clone, Default, PartialEq)]

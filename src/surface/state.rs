@@ -7,10 +7,11 @@ use super::remesh::drift::{Drift, WINDOW};
 use super::remesh::sizes;
 use super::track::prefetch::Ahead;
 use super::tracker::Tracker;
-use crate::base::bytes::{Reader, Writer};
-use crate::base::packed::{self, Magic};
-use crate::base::{DVec3, TriMesh};
 use crate::error::{Error, Result};
+use crate::geometry::{DVec3, TriMesh};
+use crate::numeric::bytes::{Reader, Writer};
+use crate::numeric::packed;
+use crate::numeric::packed::Magic;
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzsrf04";

@@ -25,10 +25,10 @@ use super::track::deep_detail::{Deep, covers, sorted};
 use super::track::fade::fade;
 use super::track::prefetch::Ahead;
 use super::track::project::foot;
-use crate::base::topology::Topology;
-use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::check::topology::Topology;
+use crate::geometry::{DVec3, TriMesh};
 
 /// A detailed mesh that follows particles.
 #[derive(Debug, Clone)]

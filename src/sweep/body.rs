@@ -8,14 +8,14 @@ use xxhash_rust::xxh3::Xxh3;
 use super::chain::{Weights, Window, boundary};
 use super::refine::{edge_error, refine};
 use super::topology::{Simplex, Topology};
-use crate::base::DVec3;
-use crate::base::mesh::{coincident, spacing};
-use crate::base::orientation::{Closing, Orientation};
-use crate::base::weld::{Boundary, STEPS, Weld};
 use crate::context::Context;
 use crate::distance::Face;
 use crate::distance::lattice::{Fixed, Lattice, UNITS};
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::geometry::check::orientation::{Closing, Orientation};
+use crate::geometry::mesh::weld::{Boundary, STEPS, Weld};
+use crate::geometry::mesh::{coincident, spacing};
 use crate::motion::Motion;
 
 /// Length of a step's path relative to the pieces that edges are split into; this value gave the fewest faces and the
@@ -67,7 +67,7 @@ pub struct Shape {
 
 impl Body {
     /// Prepares a motion by its pose at `time` (s): welds vertices that coincide, or on open edges lie within rounding of each other
-    /// ([`Weld`]), leaves out doubled triangles, turns closed parts outward (see [`crate::base::orientation`]) and closes open loops;
+    /// ([`Weld`]), leaves out doubled triangles, turns closed parts outward (see [`crate::geometry::check::orientation`]) and closes open loops;
     /// open parts are turned round where the whole solid would have a negative volume.
     ///
     /// # Errors

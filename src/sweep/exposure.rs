@@ -11,13 +11,13 @@ use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU16, Ordering};
 use rayon::prelude::*;
 
 use super::bins::{Bins, Point};
-use crate::base::blocks::offset;
 use crate::distance::Face;
 use crate::distance::columns::Columns;
 use crate::distance::lattice::floor;
 use crate::distance::lists::Lists;
 use crate::distance::vectors::dot;
 use crate::distance::winding::{Axis, each_crossing};
+use crate::numeric::blocks::offset;
 
 /// Flag of a face that is exposed, or less than [`THIN`] below one that is, somewhere.
 pub const OPEN: u8 = 1;

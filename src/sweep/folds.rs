@@ -14,13 +14,13 @@ use rayon::prelude::*;
 use super::chain::Window;
 use super::passages::{Change, Passage, Place, Poses, Step, Still, face, to_f64};
 use super::topology::{Simplex, Topology};
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::distance::Face;
 use crate::distance::lattice::{Fixed, UNITS};
 use crate::distance::region::{Region, each_block, extent};
 use crate::distance::winding::Lines;
 use crate::error::Result;
+use crate::geometry::DVec3;
 
 /// Intervals of negative winding number on a line that are shorter than this (cells) are ignored.
 const SHORT: f64 = 1e-3;

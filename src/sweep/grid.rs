@@ -5,13 +5,13 @@ use rayon::prelude::*;
 use super::chain::Window;
 use super::voxelise::{ALL, Band, Piece, Scratch, Voxeliser};
 use super::{Body, Settings};
-use crate::base::blocks::{Block, BlockEdit, DIM};
-use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::distance::Face;
 use crate::distance::lattice::{Lattice, UNITS};
 use crate::error::{Error, Result};
+use crate::geometry::{DVec3, TriMesh};
 use crate::motion::{Keys, Rigid};
+use crate::numeric::blocks::{Block, BlockEdit, DIM};
 use crate::vdb::FloatGrid;
 
 /// Blocks per batch that is handed to the grid; bounds the memory besides the grid.
@@ -44,7 +44,7 @@ pub fn chain(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &Sett
     fill(ctx, faces, lattice, settings.half_width)
 }
 
-/// Level set of the solid that a mesh bounds: winding number > 0, vertices that are one corner welded ([`crate::base::weld`]), open
+/// Level set of the solid that a mesh bounds: winding number > 0, vertices that are one corner welded ([`crate::geometry::mesh::weld`]), open
 /// loops closed. Corners that rounding does not decide are a warning of the context.
 ///
 /// # Errors

@@ -2,11 +2,11 @@
 
 use super::chain::STILL;
 use super::topology::{Simplex, Topology};
-use crate::base::DVec3;
 use crate::distance::Face;
 use crate::distance::lattice::{Fixed, UNITS};
 use crate::distance::lists::Lists;
 use crate::distance::region::each_block;
+use crate::geometry::DVec3;
 
 /// Least edge (fixed-point units) of the boxes that tetrahedra and faces are sorted into.
 const BOX: f64 = UNITS as f64;

@@ -2,9 +2,9 @@
 //! The prisms of a bin are tested eight at a time.
 
 use super::bins::Point;
-use crate::base::cpu::dispatch;
 use crate::distance::lattice::{Fixed, UNITS};
 use crate::distance::vectors::{cross, difference, dot, sub};
+use crate::numeric::cpu::dispatch;
 
 /// Prisms tested at once.
 const LANES: usize = 8;

@@ -6,9 +6,9 @@
 use rayon::prelude::*;
 
 use super::topology::{Derived, Simplex, Topology};
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 
 /// Most pieces of an edge in one round.
 const MOST_PIECES: f64 = 4096.0;

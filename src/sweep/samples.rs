@@ -2,9 +2,9 @@
 //! A baseline for tests and benchmarks; with `samples = 1` and no dilation it is Fig. 3.3a.
 
 use super::Body;
-use crate::base::{TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::{TriMesh, Vec3};
 use crate::vdb::{FloatGrid, level_set};
 
 /// Parameters of the thesis' swept volume.

@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// A triangle with its vertices in ascending order: their order decides how prisms are split.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,8 +9,6 @@ use super::depth::{Depths, Near, Volume};
 use super::exposure::Exposure;
 use super::facets::{Facet, facets};
 use super::prism::Prisms;
-use crate::base::blocks::{Mask, Origin, Values};
-use crate::base::lanes::LANES;
 use crate::context::Context;
 use crate::distance::Face;
 use crate::distance::lattice::Lattice;
@@ -21,6 +19,8 @@ use crate::distance::triangle::Triangle;
 use crate::distance::vectors::gap;
 use crate::distance::winding::Lines;
 use crate::error::Result;
+use crate::numeric::blocks::{Mask, Origin, Values};
+use crate::numeric::lanes::LANES;
 
 /// How far from the surface distances are wanted, on each side (cells).
 #[derive(Debug, Clone, Copy, PartialEq)]

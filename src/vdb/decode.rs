@@ -13,8 +13,8 @@ use super::layout::{self, Fault, Layout};
 use super::points;
 use super::refusal::is_of_memory;
 use super::vectors::AnyGrid;
-use crate::base::Points;
 use crate::error::{Error, Result};
+use crate::geometry::Points;
 
 /// OpenVDB's names of the types of grids that are read; a suffix says that values are stored in 16 bits.
 const FLOAT_TYPE: &str = "Tree_float_5_4_3";

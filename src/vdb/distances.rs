@@ -2,10 +2,10 @@
 
 use super::level_set::{from_mesh, to_mesh};
 use super::{FloatGrid, Leaf};
-use crate::base::TriMesh;
-use crate::base::blocks::VOXELS;
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::TriMesh;
+use crate::numeric::blocks::VOXELS;
 
 /// Leaves that are sampled.
 const LEAVES: usize = 512;
@@ -129,9 +129,9 @@ fn differences(leaf: &Leaf<'_>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::DVec3;
-    use crate::base::blocks::{Block, BlockEdit};
     use crate::context::Pool;
+    use crate::geometry::DVec3;
+    use crate::numeric::blocks::{Block, BlockEdit};
     use crate::vdb::GridClass;
     use crate::vdb::level_set::{from_particles, measure};
 

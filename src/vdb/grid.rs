@@ -7,10 +7,10 @@ use cxx::UniquePtr;
 use super::bridge::ffi;
 use super::leaf::{Leaf, LeafMut, Probe, lend, lend_mut};
 use super::{alone, call, fail};
-use crate::base::DVec3;
-use crate::base::blocks::{BlockEdit, Origin};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::numeric::blocks::{BlockEdit, Origin};
 
 /// The meaning of a grid's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -26,8 +26,8 @@ use super::mapping::Mapping;
 use super::parcel::{Contents, unpack};
 use super::points;
 use super::vectors::AnyGrid;
-use crate::base::Points;
 use crate::error::{Error, Result, one_line};
+use crate::geometry::Points;
 use crate::io::manifest;
 
 /// Memory limit of a child for any file (bytes), and for each byte of the file: the most memory per byte is that of a node

@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use super::bridge::ffi::LeafView;
-use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
+use crate::numeric::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 
 /// A leaf to read, of floats by default.
 #[derive(Clone, Copy)]

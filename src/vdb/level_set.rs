@@ -2,10 +2,10 @@
 
 use super::bridge::ffi;
 use super::{FloatGrid, call, fail};
-use crate::base::blocks::Origin;
-use crate::base::{DVec3, TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::{DVec3, TriMesh, Vec3};
+use crate::numeric::blocks::Origin;
 
 /// Accuracy of the tools that renormalise as they go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

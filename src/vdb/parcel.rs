@@ -16,8 +16,8 @@ use super::leaf::{Leaf, LeafValues, Vectors};
 use super::mapping::Mapping;
 use super::parcel_points;
 use super::vectors::{AnyGrid, VectorGrid};
-use crate::base::Points;
-use crate::base::blocks::{Mask, Values};
+use crate::geometry::Points;
+use crate::numeric::blocks::{Mask, Values};
 
 /// The first bytes of a parcel; they change with its format.
 const MAGIC: [u8; 8] = *b"frzpack3";

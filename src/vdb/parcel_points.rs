@@ -5,7 +5,7 @@ use std::io::Write;
 
 use super::parcel::{ALIGN, Cursor, Head};
 use super::points::kind;
-use crate::base::points::{Attribute, Column, Points, Values};
+use crate::geometry::points::{Attribute, Column, Points, Values};
 
 /// A type whose values pass through a parcel as bytes.
 ///

@@ -13,10 +13,10 @@ use super::bridge::ffi;
 use super::file::{WriteOptions, codec_number, named_by_content};
 use super::grid::to_meta;
 use super::{alone, call, decode, fail, guard};
-use crate::base::DVec3;
-use crate::base::points::{Attribute, Column, Points, Values};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::geometry::points::{Attribute, Column, Points, Values};
 
 /// Most points of a grid: OpenVDB counts those of a leaf in 32 bits, and orders are 32-bit indices.
 const MOST: usize = u32::MAX as usize;

@@ -9,10 +9,10 @@ use super::bridge::ffi;
 use super::grid::is_world_fixed;
 use super::leaf::{Leaf, Probe, Vectors, lend};
 use super::{FloatGrid, GridClass, call, fail};
-use crate::base::DVec3;
-use crate::base::blocks::{Mask, Origin};
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::DVec3;
+use crate::numeric::blocks::{Mask, Origin};
 
 /// A leaf of vectors to read.
 pub type VectorLeaf<'a> = Leaf<'a, Vectors>;

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use crate::program::{CUBE, answer_to_sigterm, command, complains, works};
 use crate::turn;
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::{TriMesh, Vec3};
 use frazil::vdb::guard::Guard;
 
 /// The most that an answer may take (a second is promised; the machine may be busy). Work that is left to notice the signal

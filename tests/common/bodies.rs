@@ -3,8 +3,8 @@
 
 use std::collections::HashMap;
 
-use frazil::base::mesh::coincident;
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::mesh::coincident;
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::io::mesh;
 
 use super::character::data;

@@ -1,7 +1,7 @@
 //! A treaded boot, made by code.
 
 use super::shapes::cuboid;
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::{TriMesh, Vec3};
 
 /// Points of a ring around the boot.
 const RING: usize = 40;

@@ -1,8 +1,8 @@
 //! Meshes with the faults that meshes have in practice, the same for each seed, and the solid that is meant by each: bodies that
 //! overlap, touch, are there twice, in one another or inside out; triangles that are turned, doubled, missing, without area or apart.
 
-use frazil::base::mesh::spacing;
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::mesh::spacing;
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 
 use super::bodies::{Body, Dice, any, model};
 

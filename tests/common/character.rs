@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::motion::{Character, Motion, Play};
 
 /// What Blender says; `make skinning-numbers` makes it again.

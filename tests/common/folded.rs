@@ -1,7 +1,7 @@
 //! Skins that fold inside out.
 
-use frazil::base::{DVec3, TriMesh, Vec3};
 use frazil::error::Result;
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::motion::Motion;
 
 use super::shapes::{sphere, tube};

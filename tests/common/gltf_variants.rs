@@ -1,7 +1,7 @@
 //! Valid glTF files that say the same with fewer words: a file with every optional field, all of them with values that change
 //! nothing, and its variants, each without one of these.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::motion::{Character, Motion, Play};
 use serde_json::{Map, Value, json};
 use std::path::Path;

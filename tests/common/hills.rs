@@ -1,7 +1,7 @@
 //! Ground of known height under snow that a ball sweeps, and the grains that lie behind it.
 
 use frazil::Context;
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{self, Cover, layer};
 use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};

@@ -4,9 +4,9 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use frazil::base::arrays::{Number, On};
-use frazil::base::points::{Column, Points, Values};
-use frazil::base::{DVec3, MeshArray, TriMesh};
+use frazil::geometry::mesh::attributes::{Number, On};
+use frazil::geometry::points::{Column, Points, Values};
+use frazil::geometry::{DVec3, MeshArray, TriMesh};
 use frazil::io::{atomic, mesh, particles};
 
 use super::liquids::filled;

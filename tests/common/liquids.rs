@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use frazil::base::points::{Attribute, Column, Points, Values};
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::points::{Attribute, Column, Points, Values};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::io::{mesh, particles};
 use frazil::surface::{Implicit, Isosurface, Params, Particles, SUPPORT, Tracker};
 use frazil::{Context, Pool};

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 
 use super::liquids::filled;
 use super::shapes::sphere;

@@ -1,7 +1,7 @@
 //! Distances from a surface, triangle by triangle: what the library says of them is compared with these.
 
-use frazil::base::bvh::Bvh;
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::spatial::bvh::Bvh;
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use rayon::prelude::*;
 
 /// Distance (m) of each place from a surface. The search begins within `reach` (m), about as far as most places are.

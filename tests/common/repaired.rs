@@ -7,11 +7,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use frazil::base::bvh::Bvh;
-use frazil::base::mesh::spacing;
-use frazil::base::topology::Topology;
-use frazil::base::{DVec3, TriMesh};
 use frazil::distance::triangle::Triangle;
+use frazil::geometry::check::topology::Topology;
+use frazil::geometry::mesh::spacing;
+use frazil::geometry::spatial::bvh::Bvh;
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Repaired, Source, repair};
 use frazil::{Context, Pool};
 

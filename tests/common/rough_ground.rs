@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use frazil::base::Vec3;
+use frazil::geometry::Vec3;
 use frazil::shallow::columns::Columns;
 use frazil::shallow::grid::{Grid, Heights};
 use frazil::shallow::terrain::triangles;

@@ -1,7 +1,7 @@
 //! Shapes whose size is known.
 
-use frazil::base::mesh::coincident;
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::mesh::coincident;
+use frazil::geometry::{TriMesh, Vec3};
 
 /// A box around the origin with the given edges (m), 12 triangles.
 pub fn cuboid(size: [f32; 3]) -> TriMesh {

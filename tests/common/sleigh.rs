@@ -1,7 +1,7 @@
 //! A sleigh, made by code.
 
 use super::shapes::cuboid;
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::{TriMesh, Vec3};
 
 /// Half the length of a runner's straight part, and half the distance between the runners' middles (m).
 const HALF: [f32; 2] = [0.45, 0.28];

@@ -1,7 +1,7 @@
 //! Solids as triangle soup: each triangle has corners of its own, and these are off by some neighbouring 32-bit numbers, as programs
 //! write them that compute a corner once for each of its triangles.
 
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::vdb::FloatGrid;
 
 use super::bodies::{Dice, icosphere};

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::base::TriMesh;
-use frazil::base::points::Values;
+use frazil::geometry::TriMesh;
+use frazil::geometry::points::Values;
 use frazil::io::{mesh, particles};
 use frazil::surface::Particles;
 

@@ -1,7 +1,7 @@
 //! Every wrapped tool of OpenVDB, run once on the same small input: what it makes, as bytes.
 
 use frazil::Context;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::vdb::file::{WriteOptions, to_bytes};
 use frazil::vdb::level_set::{self, Scheme};
 use frazil::vdb::{FloatGrid, MetaValue};

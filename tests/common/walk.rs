@@ -1,6 +1,6 @@
 //! A walk in deep snow, made by code: where each boot is at each frame.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use nalgebra::Rotation3;
 
 use super::boot::{BACK, BALL, HEEL, TOE, rise};

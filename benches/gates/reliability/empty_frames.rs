@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::Command;
 
-use frazil::base::points::{Column, Points, Values};
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::points::{Column, Points, Values};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::io::{mesh, particles};
 
 use crate::common::bodies::Dice;

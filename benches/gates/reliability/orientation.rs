@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Character, Key, Keys, Play, Rigid};
 use frazil::scene::{self, Scene};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};

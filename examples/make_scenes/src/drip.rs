@@ -5,9 +5,9 @@
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
-use frazil::base::arrays::{Number, On};
-use frazil::base::points::{Column, Points, Values};
-use frazil::base::{DVec3, MeshArray, TriMesh};
+use frazil::geometry::mesh::attributes::{Number, On};
+use frazil::geometry::points::{Column, Points, Values};
+use frazil::geometry::{DVec3, MeshArray, TriMesh};
 use frazil::io::{atomic, mesh, particles};
 
 use crate::common::liquids::{filled, turned};

@@ -24,8 +24,8 @@ use common::jelly::Jelly;
 use common::shapes::{cuboid, sphere};
 use common::sleigh::sleigh;
 use common::walk::{Step, walk};
-use frazil::base::points::Points;
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::points::Points;
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::io::{atomic, mesh, points_ply};
 
 fn main() -> frazil::Result<()> {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::{TriMesh, Vec3};
 use frazil::io::mesh;
 
 /// Writes them.

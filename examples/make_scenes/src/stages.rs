@@ -3,7 +3,7 @@
 use std::f32::consts::TAU;
 use std::path::Path;
 
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::{TriMesh, Vec3};
 use frazil::io::mesh;
 
 use super::spills::{sheet, walls};

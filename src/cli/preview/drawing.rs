@@ -1,6 +1,6 @@
 //! How what was read is drawn, and from where.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::render::{Camera, Cloud, Cut, Light, Model, Models, Picture, Plane, Size};
 #[cfg(feature = "vdb")]
 use frazil::render::{Field, SNOW};

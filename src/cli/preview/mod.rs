@@ -11,7 +11,7 @@ mod tint;
 
 use std::path::{Path, PathBuf};
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::io::atomic;
 use frazil::io::mesh::extension;
 use frazil::io::sequence::Pattern;

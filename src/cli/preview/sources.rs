@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::base::{DetailedMesh, Points, TriMesh};
+use frazil::geometry::{DetailedMesh, Points, TriMesh};
 use frazil::io::sequence::Pattern;
 use frazil::motion::{Character, Play, is_gltf};
 #[cfg(feature = "vdb")]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::base::TriMesh;
+use frazil::geometry::TriMesh;
 use frazil::io::mesh;
 use frazil::scene::Scene;
 use frazil::scene::shallow::Around;

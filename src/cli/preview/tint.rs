@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use frazil::base::DetailedMesh;
+use frazil::geometry::DetailedMesh;
 
 use super::sources::Wet;
 
@@ -50,8 +50,8 @@ impl Tint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use frazil::base::arrays::{MeshArray, Number, On};
-    use frazil::base::{TriMesh, Vec3};
+    use frazil::geometry::mesh::attributes::{MeshArray, Number, On};
+    use frazil::geometry::{TriMesh, Vec3};
 
     #[test]
     fn more_of_a_dye_and_more_depth_hide_more() {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use frazil::base::Points;
+use frazil::geometry::Points;
 use frazil::scene::{changes_since, partial};
 use frazil::vdb::{FloatGrid, file, points};
 

@@ -4,7 +4,7 @@ use super::VdbOutput;
 use crate::cli::exit::{Failure, Phase};
 use crate::cli::options::{MeshSpace, Origin, positive, triple};
 use crate::cli::session::Session;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::io::sequence::Pattern;
 use frazil::motion::{Key, Keys, MeshSequence, Morph, Motion, Placed, Rigid};
 use frazil::scene::Frames;

@@ -4,7 +4,7 @@ use gltf::animation::{Interpolation, Property};
 
 use super::file::File;
 use super::nodes::{Local, rotation};
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// Kinks closer together than this are one (s): times in files are 32-bit floats.
 const SAME_TIME: f64 = 1e-5;

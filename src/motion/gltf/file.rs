@@ -9,8 +9,8 @@ use gltf::{Accessor, Document};
 use super::json::{self, Instancing};
 use super::nodes::{Local, rotation};
 use super::{meshopt, uri};
-use crate::base::DVec3;
 use crate::error::{Error, Result, one_line};
+use crate::geometry::DVec3;
 use crate::io::hash::Hasher;
 use crate::io::source;
 

@@ -15,9 +15,9 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::{Drawn, Motion};
-use crate::base::mesh::{renumbered, used};
-use crate::base::{DVec3, TriMesh};
 use crate::error::{Error, Result};
+use crate::geometry::mesh::{renumbered, used};
+use crate::geometry::{DVec3, TriMesh};
 use crate::io::caught::caught;
 use clip::{Clip, JUMP};
 use file::File;

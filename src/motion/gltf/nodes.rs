@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion};
 
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// A node's own place, which a clip may animate.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,7 +9,7 @@ use nalgebra::{Matrix3x4, Matrix4};
 
 use super::file::File;
 use super::nodes::{Local, matrix4};
-use crate::base::{DVec3, Uvs, Vec3};
+use crate::geometry::{DVec3, Uvs, Vec3};
 
 /// A skin: nodes that carry vertices, and from where.
 struct Skin {

@@ -5,10 +5,10 @@ use std::collections::{HashMap, HashSet};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 
-use crate::base::DVec3;
-use crate::base::blocks::{DIM, Mask, Origin, Values, offset};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::numeric::blocks::{DIM, Mask, Origin, Values, offset};
 
 /// Samples along an edge of a block: its own voxels and the first of the next block, so that every place in the block is
 /// interpolated from its samples alone.

@@ -4,10 +4,10 @@ use rayon::prelude::*;
 
 use super::blocks::Fog;
 use super::walk::{Here, along, entry};
-use crate::base::DVec3;
-use crate::base::blocks::DIM;
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::DVec3;
+use crate::numeric::blocks::DIM;
 
 /// Voxels between two samples of light: it changes less from place to place than the density does.
 const SPACING: usize = 2;

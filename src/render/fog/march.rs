@@ -6,7 +6,7 @@
 
 use super::light::LitFogs;
 use super::walk::along;
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 use crate::render::camera::{Camera, Size};
 use crate::render::shade::{Colour, SUN, SURROUNDINGS};
 
@@ -124,7 +124,7 @@ fn lobe(cosine: f64) -> f64 {
 mod tests {
     use super::super::blocks::{Fog, Part, Placement};
     use super::*;
-    use crate::base::blocks::{Mask, Origin, Values};
+    use crate::numeric::blocks::{Mask, Origin, Values};
     use crate::{Context, Pool};
 
     const CELL: f64 = 0.05;

@@ -1,8 +1,8 @@
 //! Along a ray from block to block, past empty blocks and nodes (Amanatides and Woo 1987, on two levels).
 
 use super::blocks::{Fog, Look, NODE};
-use crate::base::DVec3;
-use crate::base::blocks::DIM;
+use crate::geometry::DVec3;
+use crate::numeric::blocks::DIM;
 
 /// A ray on its way through a fog.
 struct Walk<'a> {

@@ -2,9 +2,9 @@
 
 use super::obstacles;
 use super::terrain::Terrain;
-use crate::base::TriMesh;
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::TriMesh;
 use crate::io::seen::Seen;
 use crate::scene::Scene;
 

@@ -1,9 +1,9 @@
 //! Places of a terrain that sources, drains and absorbers move with.
 
 use super::Shallow;
-use crate::base::deviation::{Nearest, NearestTree};
-use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
+use crate::geometry::check::deviation::{Nearest, NearestTree};
+use crate::geometry::{DVec3, TriMesh};
 
 /// A triangle whose height is so small a share of its longest edge has no inside.
 const NEEDLE: f64 = 1e-10;
@@ -73,7 +73,7 @@ fn shares(corners: [DVec3; 3], place: DVec3) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::Vec3;
+    use crate::geometry::Vec3;
 
     #[test]
     fn a_place_moves_as_its_triangle_does() {

@@ -2,9 +2,9 @@
 
 use super::inputs::united;
 use super::{Inputs, Point, Shallow, kept, obstacles, points, pours};
-use crate::base::TriMesh;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::TriMesh;
 use crate::scene::Scene;
 use crate::shallow::flows::FlowPoint;
 use crate::shallow::remap::Moved;

@@ -47,7 +47,7 @@ pub(super) fn frame(of: &Shallow, columns: u64, triangles: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::{TriMesh, Vec3};
+    use crate::geometry::{TriMesh, Vec3};
     use crate::io::mesh::{Carried, ply_bytes};
     use crate::scene::Scene;
     use crate::scene::shallow::mesh::Drawn;

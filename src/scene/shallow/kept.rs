@@ -1,9 +1,10 @@
 //! The liquid at a frame as bytes: its own state, and the obstacles and flow points that it had, which others may take the place of.
 
-use crate::base::DVec3;
-use crate::base::bytes::{Reader, Writer};
-use crate::base::packed::{self, Magic};
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::numeric::bytes::{Reader, Writer};
+use crate::numeric::packed;
+use crate::numeric::packed::Magic;
 use crate::shallow::flows::{FlowPoint, Kind, Pulse};
 use crate::shallow::terrain::shapes::Shape;
 use crate::shallow::{Shallow, Stains};

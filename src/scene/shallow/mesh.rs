@@ -1,9 +1,9 @@
 //! The surface of the liquid, and what is in the air of it, as one mesh, and its files.
 
 use super::{Files, Shallow as Of};
-use crate::base::arrays::{Number, On};
-use crate::base::{MeshArray, TriMesh, Vec3};
 use crate::error::Result;
+use crate::geometry::mesh::attributes::{Number, On};
+use crate::geometry::{MeshArray, TriMesh, Vec3};
 use crate::shallow::Shallow;
 use crate::shallow::falls::Droplet;
 use crate::shallow::falls::mesh::{Balls, Target as BallTarget};

@@ -3,8 +3,8 @@
 use nalgebra::Rotation3;
 
 use super::{Form, Obstacle, Shallow};
-use crate::base::{DVec3, TriMesh, Vec3};
 use crate::error::Result;
+use crate::geometry::{DVec3, TriMesh, Vec3};
 use crate::io::seen::Seen;
 use crate::motion::{Key, Keys};
 use crate::scene::KeyPose;

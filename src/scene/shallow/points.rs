@@ -1,8 +1,8 @@
 //! Sources, drains and absorbers of a scene, at its frames.
 
 use super::{Inputs, Point, Shallow};
-use crate::base::TriMesh;
 use crate::error::{Error, Result};
+use crate::geometry::TriMesh;
 use crate::scene::Scene;
 use crate::shallow::{self, flows::FlowPoint};
 

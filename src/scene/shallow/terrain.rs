@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use super::{ImagePlace, Shallow};
-use crate::base::orientation::Orientation;
-use crate::base::weld::Weld;
-use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::check::orientation::Orientation;
+use crate::geometry::mesh::weld::Weld;
+use crate::geometry::{DVec3, TriMesh};
 use crate::io::mesh::{extension, parse_polygons_from};
 use crate::io::seen::Seen;
 use crate::motion::Space;
@@ -180,7 +180,7 @@ fn relief(image: &grey::Grey, place: ImagePlace) -> TriMesh {
         |axis: usize, index: usize| place.size[axis] * ((index as f64 + 0.5) / image.size[axis] as f64 - 0.5);
     let height = |index: usize| black + f64::from(image.values[index]) * (white - black);
     let point = |index: usize| {
-        crate::base::Vec3::new(
+        crate::geometry::Vec3::new(
             at(0, index % across) as f32,
             height(index) as f32,
             at(1, index / across) as f32,

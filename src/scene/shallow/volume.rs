@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::Shallow;
-use crate::base::DVec3;
-use crate::base::blocks::{Block, BlockEdit, DIM, Origin, VOXELS, offset, origin_of};
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::DVec3;
 use crate::io::usd::{Field, Holds};
+use crate::numeric::blocks::{Block, BlockEdit, DIM, Origin, VOXELS, offset, origin_of};
 use crate::scene::Scene;
 use crate::scene::shot::Volume;
 use crate::shallow;

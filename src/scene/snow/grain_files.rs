@@ -8,9 +8,9 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use super::base;
-use crate::base::points::{Column, Points, Values};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::points::{Column, Points, Values};
 use crate::io::hash::Hasher;
 use crate::io::mesh::extension;
 use crate::scene::Scene;
@@ -398,7 +398,7 @@ fn read(stored: &Stored, frame: i32) -> Result<(Points, Metadata)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::DVec3;
+    use crate::geometry::DVec3;
 
     /// Points with these identities, heights and trapped flags.
     fn points(all: &[(i64, f32, bool)]) -> Points {

@@ -10,9 +10,9 @@ use super::grain_files::{self, WHOLE_EVERY, ordered, told_apart};
 use super::grain_keys::material;
 use super::inputs::Inputs;
 use super::{base, drift};
-use crate::base::{DVec3, Points, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::{DVec3, Points, TriMesh};
 use crate::io::manifest::Keeps;
 use crate::io::{points_ply, usd_points};
 use crate::scene::shot::{

@@ -8,9 +8,9 @@ use serde::Serialize;
 
 use super::course::Course;
 use super::mist_keys::mist_params;
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 use crate::scene::Scene;
 use crate::scene::shot::Stored;
 use crate::snow::mist::{self, LEAST, Params};

@@ -1,8 +1,8 @@
 //! Heights of the ground and of the snow's top, for `check`: what an object goes into.
 
 use super::Inputs;
-use crate::base::bvh::Bvh;
-use crate::base::{DVec3, TriMesh};
+use crate::geometry::spatial::bvh::Bvh;
+use crate::geometry::{DVec3, TriMesh};
 use crate::snow::base_layer::initial::{Cover, Ground};
 
 /// The ground and the snow on it, as far as heights at a place are known before the layer is made.

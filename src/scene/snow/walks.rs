@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::base::DVec3;
 use crate::error::Result;
+use crate::geometry::DVec3;
 use crate::motion::{Character, Keys, Motion, Placed, Play, gait, is_gltf};
 use crate::scene::{Object, Scene};
 

@@ -9,9 +9,9 @@ use super::disk::FrameSize;
 use super::inputs::all_files;
 use super::memory::Most;
 use super::time::read;
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 use crate::scene::{Scene, Value};
 use crate::surface::{Particles, disagreement};
 

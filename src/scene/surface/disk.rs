@@ -1,8 +1,8 @@
 //! How much space the files of a mesh that follows a liquid will need.
 
 use super::Files;
-use crate::base::arrays::On;
-use crate::base::{DetailedMesh, MeshArray};
+use crate::geometry::mesh::attributes::On;
+use crate::geometry::{DetailedMesh, MeshArray};
 
 /// Bytes of a 32-bit float in a text, with what stands around it.
 const TEXT: u64 = 12;
@@ -91,7 +91,7 @@ fn ply(output: Files, detail: &DetailedMesh) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::{TriMesh, Uvs, Vec3};
+    use crate::geometry::{TriMesh, Uvs, Vec3};
     use crate::io::mesh::{Carried, ply_bytes};
 
     #[test]
@@ -104,7 +104,7 @@ mod tests {
         let array = |name: &str, on, count: usize| MeshArray {
             name: name.into(),
             on,
-            number: crate::base::arrays::Number::F64,
+            number: crate::geometry::mesh::attributes::Number::F64,
             values: vec![1.0; count],
         };
         let arrays =

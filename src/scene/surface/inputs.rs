@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use super::time::Liquid;
 use super::{Surface, sculpts};
-use crate::base::arrays::{Number, On};
-use crate::base::faults::Faults;
-use crate::base::orientation::{Closing, Orientation};
-use crate::base::{DetailedMesh, MeshArray, TriMesh, mesh as base_mesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::check::faults::Faults;
+use crate::geometry::check::orientation::{Closing, Orientation};
+use crate::geometry::mesh::attributes::{Number, On};
+use crate::geometry::{DetailedMesh, MeshArray, TriMesh, mesh as base_mesh};
 use crate::io::mesh::{extension, parse_polygons_from};
 use crate::io::seen::Seen;
 use crate::io::sequence::Pattern;

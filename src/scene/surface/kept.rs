@@ -1,10 +1,11 @@
 //! What a mesh that was rebuilt carries, in the exact state of a frame.
 
-use crate::base::arrays::{Number, On};
-use crate::base::bytes::{Reader, Writer};
-use crate::base::packed::{self, Magic};
-use crate::base::{DetailedMesh, MeshArray, Uvs};
 use crate::error::{Error, Result};
+use crate::geometry::mesh::attributes::{Number, On};
+use crate::geometry::{DetailedMesh, MeshArray, Uvs};
+use crate::numeric::bytes::{Reader, Writer};
+use crate::numeric::packed;
+use crate::numeric::packed::Magic;
 use crate::surface::{Params, Tracker};
 
 /// Magic bytes, including the version.
@@ -119,8 +120,8 @@ fn wrong() -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::{DVec3, TriMesh};
     use crate::context::{Context, Pool};
+    use crate::geometry::{DVec3, TriMesh};
     use crate::surface::balls::{own_surface, two_balls};
 
     /// A mesh that was rebuilt where two balls met, the one that it began with, and what it carries.

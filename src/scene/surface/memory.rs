@@ -41,7 +41,7 @@ use rayon::prelude::*;
 use super::Surface;
 use super::disk::FrameSize;
 use super::time::KEPT;
-use crate::base::{DVec3, DetailedMesh};
+use crate::geometry::{DVec3, DetailedMesh};
 use crate::surface::Particles;
 
 /// Bytes that every run takes.
@@ -235,8 +235,8 @@ fn shell(places: &[DVec3], spacing: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::arrays::{MeshArray, Number, On};
-    use crate::base::{TriMesh, Vec3};
+    use crate::geometry::mesh::attributes::{MeshArray, Number, On};
+    use crate::geometry::{TriMesh, Vec3};
     use crate::surface::{Node, Source};
 
     /// Particles in a cube of so many spacings.

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use super::inputs::{REPLACED, lasting, read_mesh};
 use super::{Inputs, Surface};
-use crate::base::arrays::{Number, On};
-use crate::base::{DetailedMesh, MeshArray, Uvs};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::mesh::attributes::{Number, On};
+use crate::geometry::{DetailedMesh, MeshArray, Uvs};
 use crate::io::sequence::Pattern;
 use crate::scene::Frames;
 
@@ -210,7 +210,7 @@ fn of_vertices(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::{TriMesh, Vec3};
+    use crate::geometry::{TriMesh, Vec3};
 
     fn array(name: &str, on: On, number: Number, values: &[f64]) -> MeshArray {
         MeshArray { name: name.into(), on, number, values: values.to_vec() }

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::Surface;
-use crate::base::DVec3;
-use crate::base::points::Values;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::geometry::points::Values;
 use crate::io::mesh::extension;
 use crate::io::particles::{self, Cloud};
 use crate::io::seen::Seen;

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use super::walk::{At, Walk, reads};
 use super::{Inputs, Surface, kept};
-use crate::base::arrays::{Number, On};
-use crate::base::{DetailedMesh, MeshArray, TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::mesh::attributes::{Number, On};
+use crate::geometry::{DetailedMesh, MeshArray, TriMesh, Vec3};
 use crate::io::manifest::Keeps;
 use crate::io::usd_looks::Look;
 use crate::io::{mesh, usd, usd_primvars};

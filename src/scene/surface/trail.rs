@@ -1,8 +1,8 @@
 //! How vertices go from a frame to the next, through changes of the mesh.
 
 use super::walk::Way;
-use crate::base::topology::around;
-use crate::base::{DVec3, Vec3};
+use crate::geometry::check::topology::around;
+use crate::geometry::{DVec3, Vec3};
 use crate::surface::Change;
 
 /// How often vertices that were made take the mean velocity of those around them.

@@ -3,9 +3,9 @@
 use std::sync::atomic::AtomicBool;
 
 use super::Detail;
-use crate::base::cpu::FlushDenormals;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::numeric::cpu::FlushDenormals;
 use crate::shallow::Shallow;
 use crate::shallow::flow::bands::attended;
 use crate::shallow::flow::stop::Stop;

@@ -6,7 +6,7 @@
 
 use super::rests::{Load, Rests, change, of_column};
 use super::{Cells, FINE};
-use crate::base::cpu::dispatch;
+use crate::numeric::cpu::dispatch;
 use crate::shallow::Shallow;
 use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::flow::fast;

@@ -10,7 +10,7 @@ use super::parts::{Parts, indices};
 use super::places::Place;
 use super::rows::Ground;
 use super::transfer::take_along;
-use crate::base::cpu::dispatch;
+use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{NONE, STRIP, strip_mut, strip_of};
 use crate::shallow::scalars::amounts::{Act, Changes};
 use crate::shallow::scalars::shares::{LEVELS, MOST, integer, level, nearest, share};

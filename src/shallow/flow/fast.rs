@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use super::active::Active;
 use super::flux::{Step, greater, lesser};
-use crate::base::cpu::dispatch;
+use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{NONE, STRIP, resize_part, strip_from, strip_of};
 use crate::shallow::per_column::{Array, PerColumn};
 

@@ -18,7 +18,7 @@ use super::places::{PAD, Place};
 use super::scale;
 use super::transfer::{find_woken, move_units};
 use super::walls::Walls;
-use crate::base::cpu::dispatch;
+use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::pipes::Pipes;
 use crate::shallow::scalars::MOST;

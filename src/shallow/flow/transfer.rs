@@ -3,7 +3,7 @@
 //! Without it thin films freeze: blood of 1 um on a slope of 0.5 moves 0.03 units a step.
 
 use super::scale::Around;
-use crate::base::cpu::dispatch;
+use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{STRIP, strip_mut};
 use crate::shallow::scalars::shares::nearest;
 

@@ -4,7 +4,7 @@
 //! discharge is that of level ground over (1 + S^2)^2. Rises are differences of integers, so that nothing depends on the side from which
 //! they are seen.
 
-use crate::base::cpu::dispatch;
+use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
 
 /// Slopes are taken as at most this steep (60 degrees): a step of the ground is no slope, and liquid falls over its edge.

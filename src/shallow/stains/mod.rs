@@ -13,8 +13,8 @@ use xxhash_rust::xxh3::xxh3_128;
 use super::scalars::MOST;
 use super::scalars::amounts::Account;
 use super::system::Shallow;
-use crate::base::Vec3;
 use crate::error::{Error, Result};
+use crate::geometry::Vec3;
 use wet::Wet;
 
 /// What nobody sees is none, before it is so little that processors differ.

@@ -14,8 +14,8 @@
 use xxhash_rust::xxh3::xxh3_128;
 
 use super::Stains;
-use crate::base::bytes::Reader;
 use crate::error::{Error, Result};
+use crate::numeric::bytes::Reader;
 
 const MAGIC: [u8; 8] = *b"frzstn\0\x01";
 const SEAL: usize = 16;

@@ -1,6 +1,6 @@
 //! Which columns are wet at the vertices of a mesh.
 
-use crate::base::Vec3;
+use crate::geometry::Vec3;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
 use crate::shallow::flow::Flow;
 use crate::shallow::flow::active::runs;

@@ -11,8 +11,8 @@
 use xxhash_rust::xxh3::xxh3_128;
 
 use super::{LAST, MOST_FLUX, Put, SEAL, SUMS, Saved, is_over, part, parts, refused};
-use crate::base::bytes::Reader;
 use crate::error::{Error, Result};
+use crate::numeric::bytes::Reader;
 use crate::shallow::Shallow;
 use crate::shallow::detail::rests::Load;
 use crate::shallow::detail::{Cells, Detail, check_near};

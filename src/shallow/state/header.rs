@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use super::{Put, heads};
-use crate::base::bytes::Reader;
 use crate::error::Result;
+use crate::numeric::bytes::Reader;
 use crate::shallow::columns::STRIP;
 use crate::shallow::falls::{LIP, PACKET};
 use crate::shallow::flow::active::runs;

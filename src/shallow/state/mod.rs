@@ -34,9 +34,9 @@ use super::grid::{BOTTOMLESS, TOP};
 use super::pipes::Border;
 use super::remap::Parcel;
 use super::system::Shallow;
-use crate::base::bytes::Reader;
-use crate::base::cpu::dispatch;
 use crate::error::{Error, Result};
+use crate::numeric::bytes::Reader;
+use crate::numeric::cpu::dispatch;
 use header::{ARRAYS, Counts, HEADER, Header, MAGIC, SEAL, SHARE, VERSION};
 use scalars::Scalars;
 

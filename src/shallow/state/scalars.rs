@@ -11,8 +11,8 @@ use std::ops::Range;
 
 use super::header::{Counts, SCALAR, SHARE};
 use super::{Put, Saved, get, part, parts, refused};
-use crate::base::bytes::Reader;
 use crate::error::Result;
+use crate::numeric::bytes::Reader;
 use crate::shallow::columns::STRIP;
 use crate::shallow::falls::{Packet, Waiting};
 use crate::shallow::flow::active::runs;

@@ -3,7 +3,7 @@
 use super::links::Scene;
 use super::strips::{Found, Span, State, count, some};
 use super::{Columns, STRIP};
-use crate::base::cpu::dispatch;
+use crate::numeric::cpu::dispatch;
 
 /// Finds the wet columns, and the strips whose quartets may have one.
 pub(super) fn find_wet(scene: Scene<'_>, active: Option<&[bool]>, found: &mut Found) {

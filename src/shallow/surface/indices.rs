@@ -7,7 +7,7 @@ use super::groups::{Search, each_odd_triangle};
 use super::links::Scene;
 use super::strips::{Found, some};
 use super::{Indices, STRIP};
-use crate::base::cpu::dispatch;
+use crate::numeric::cpu::dispatch;
 
 /// Indices of a pair of triangles.
 const PAIR: usize = 6;

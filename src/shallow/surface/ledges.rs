@@ -8,8 +8,8 @@
 
 use super::silhouette::Silhouette;
 use super::{Columns, Counts};
-use crate::base::Vec3;
 use crate::error::{Error, Result};
+use crate::geometry::Vec3;
 
 /// How far hems are from the middle of their cell where no mesh says where the ground ends (cells).
 const HALF: f32 = 0.5;

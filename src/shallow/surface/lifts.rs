@@ -21,8 +21,8 @@
 use std::ops::Range;
 
 use super::links::{Scene, find_above};
-use crate::base::Vec3;
 use crate::error::{Error, Result};
+use crate::geometry::Vec3;
 use crate::shallow::columns::{Columns, STRIP, Strip};
 
 /// Where Eq. 4.38 is cut off: the least h_v - b_k, in cells.

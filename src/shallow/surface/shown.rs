@@ -3,7 +3,7 @@
 
 use super::strips::Found;
 use super::{Columns, Depths, Layout, STRIP};
-use crate::base::cpu::dispatch;
+use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{strip_mut, strip_of};
 use crate::shallow::grid::TOP;
 

@@ -6,8 +6,8 @@ use std::ops::Range;
 use super::ledges::{Hem, Ledges};
 use super::links::RING;
 use super::{Columns, Depths, Surface};
-use crate::base::Vec3;
 use crate::error::Result;
+use crate::geometry::Vec3;
 use crate::shallow::grid::Grid;
 
 /// Finds the silhouette of the ground; keeps its memory.

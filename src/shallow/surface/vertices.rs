@@ -8,7 +8,7 @@ use super::links::Scene;
 use super::normals::{Normals, Shown, upright};
 use super::strips::{Found, Span};
 use super::{Depths, Layout, MOST, NONE, STRIP, Target, Up};
-use crate::base::cpu::dispatch;
+use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::strip_of;
 
 /// Velocity at the surface over the mean (Eq. 4.4).

@@ -1,7 +1,7 @@
 //! Which way the triangles of a terrain face: closed parts outward.
 
-use crate::base::TriMesh;
-use crate::base::orientation::{Closing, Orientation};
+use crate::geometry::TriMesh;
+use crate::geometry::check::orientation::{Closing, Orientation};
 
 /// The orientation of a terrain's mesh, or of a mesh that stands on it. Open sheets stay as they are, as one that faces up is ground; but
 /// where the whole mesh is inside out, its closed parts by their volume and its sheets facing down everywhere, these are turned

@@ -157,7 +157,7 @@ impl Ground {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::DVec3;
+    use crate::geometry::DVec3;
     use crate::shallow::grid::BOTTOMLESS;
 
     const GRID: Grid = Grid { cell: 1.0, origin: [0.0; 2], size: [6, 5] };

@@ -2,8 +2,8 @@
 
 use super::Solids;
 use super::solids::{Solid, unite};
-use crate::base::DVec3;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 use crate::shallow::grid::{BOTTOMLESS, Grid, Heights, TOP};
 
 /// Places of a batch.

@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use super::solids::Solid;
-use crate::base::DVec3;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 use crate::shallow::grid::{Grid, Heights};
 
 /// How far axes of a cuboid may be from unit vectors that are perpendicular to each other.

@@ -18,9 +18,9 @@ use super::crossings::{Crossed, Facet};
 use super::lines::{LANES, Lines, Outline, Spans};
 use super::piles::{Piles, keep_room};
 use super::solids::Solid;
-use crate::base::Vec3;
-use crate::base::cpu::{FlushDenormals, dispatch};
 use crate::error::{Error, Result};
+use crate::geometry::Vec3;
+use crate::numeric::cpu::{FlushDenormals, dispatch};
 use crate::shallow::grid::{Grid, Heights};
 
 /// So many lines of a triangle are asked without a look at its edges.

@@ -9,8 +9,8 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use rayon::prelude::*;
 
 use super::filling;
-use crate::base::blocks::{Origin, Values};
 use crate::error::Result;
+use crate::numeric::blocks::{Origin, Values};
 use crate::vdb::{FloatGrid, Probe};
 
 /// Cells of a column block, at `x << 3 | z`.
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn cells_are_numbered_by_x_and_z() {
-        use crate::base::blocks::offset;
+        use crate::numeric::blocks::offset;
         assert_eq!(cell_of(offset(3, 7, 5)), 3 << 3 | 5);
         assert_eq!(cell_of(offset(7, 0, 0)), 7 << 3);
     }

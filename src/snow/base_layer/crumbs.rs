@@ -10,9 +10,9 @@ use rayon::prelude::*;
 use super::columns::{CELLS, add_by_cell};
 use super::edit::{self, Edit, Scale};
 use super::filling;
-use crate::base::blocks::{BlockEdit, Mask, Origin, VOXELS, Values, offset};
 use crate::context::Context;
 use crate::error::Result;
+use crate::numeric::blocks::{BlockEdit, Mask, Origin, VOXELS, Values, offset};
 use crate::vdb::FloatGrid;
 
 /// Voxels around an island whose distances may be to it: a band of three cells, and one more.
@@ -271,7 +271,7 @@ fn values_of(block: Option<&BlockEdit>, scale: Scale) -> Box<Values> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::blocks::Block;
+    use crate::numeric::blocks::Block;
 
     #[test]
     fn parts_of_a_block_are_found_by_their_size() {

@@ -5,7 +5,7 @@
 
 use super::columns::{CELLS, add_by_cell, filled};
 use super::filling;
-use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
+use crate::numeric::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::sweep::Piece;
 use crate::vdb::Probe;
 

@@ -5,7 +5,7 @@
 //! that side's slope up to where both meet (subcell resolution: Harten 1989). Where two planes meet that is exact.
 
 use super::columns::filled;
-use crate::base::blocks::Values;
+use crate::numeric::blocks::Values;
 
 /// Distance (cells) from the centre beyond which next to nothing of a surface at an edge is in a voxel.
 const FAR: f32 = 0.75;

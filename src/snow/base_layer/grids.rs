@@ -1,9 +1,9 @@
 //! The grids of a layer, whole or as the blocks that a step changed.
 
 use super::empty_removed;
-use crate::base::blocks::{Block, BlockEdit, VOXELS};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::numeric::blocks::{Block, BlockEdit, VOXELS};
 use crate::vdb::{FloatGrid, Leaf, MetaValue, Ready};
 
 /// Metadata of `surface`: the snow's volume (m3), exactly as the layer counts it.

@@ -4,12 +4,12 @@
 //! a chain that count +1, solids count so far below zero that no prism fills them: one pass of winding
 //! numbers then gives the layer, without the ghost surfaces that CSG of coincident faces leaves.
 
-use crate::base::mesh::coincident;
-use crate::base::orientation::{Closing, Orientation};
-use crate::base::weld::Weld;
-use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::check::orientation::{Closing, Orientation};
+use crate::geometry::mesh::coincident;
+use crate::geometry::mesh::weld::Weld;
+use crate::geometry::{DVec3, TriMesh};
 use crate::sweep::{Face, Fixed, Lattice, Topology, Weights, Window, boundary, fill};
 use crate::vdb::FloatGrid;
 

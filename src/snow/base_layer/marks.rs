@@ -6,9 +6,9 @@ use rayon::prelude::*;
 
 use super::BaseLayer;
 use super::columns::{self, Column, Columns, Heights};
-use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::numeric::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::vdb::Probe;
 
 /// The new snow of one block, and where it differs from the old.

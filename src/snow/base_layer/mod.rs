@@ -24,10 +24,10 @@ pub use grids::{Changes, Grids};
 pub use noise::displace;
 pub use reach::Reach;
 
-use crate::base::DVec3;
-use crate::base::blocks::{BlockEdit, DIM, Origin};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::numeric::blocks::{BlockEdit, DIM, Origin};
 use crate::snow::NoiseParams;
 use crate::sweep::{
     Band, Body, Face, Lattice, Piece, Scratch, Settings, TOLERANCE, UNITS, Voxeliser, Window,

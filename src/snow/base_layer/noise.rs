@@ -10,9 +10,9 @@ use fastnoise_lite::{FastNoiseLite, NoiseType};
 use rayon::prelude::*;
 
 use super::edit::{self, Scale};
-use crate::base::blocks::{Block, BlockEdit, Origin, Values, offset};
 use crate::context::Context;
 use crate::error::Result;
+use crate::numeric::blocks::{Block, BlockEdit, Origin, Values, offset};
 use crate::snow::NoiseParams;
 use crate::sweep::{Piece, Settings};
 use crate::vdb::{FloatGrid, Leaf, level_set};

@@ -2,9 +2,9 @@
 //!
 //! Motion out there does not change the snow: only the parts of a step in which a body may touch it are swept.
 
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 use crate::sweep::{Body, Lattice, REACH, UNITS, Window, too_far};
 
 /// Fractions of an interval at which poses are sampled; no steady rotation looks the same at all of them.

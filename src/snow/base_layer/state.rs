@@ -8,9 +8,9 @@ use rayon::prelude::*;
 use xxhash_rust::xxh3::{Xxh3, xxh3_64, xxh3_128};
 
 use super::{BaseLayer, Changes, Params};
-use crate::base::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::numeric::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::vdb::{FloatGrid, Leaf, Probe};
 
 const MAGIC: [u8; 8] = *b"frz base";

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::base::blocks::{Mask, Origin};
 use crate::error::Result;
+use crate::numeric::blocks::{Mask, Origin};
 use crate::vdb::{FloatGrid, Probe};
 
 /// Voxels of each block whose value is below the background: what lies farther outside cannot lose snow.
@@ -59,7 +59,7 @@ fn dilated([own, below_x, above_x, below_y, above_y, below_z, above_z]: &[Mask; 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::blocks::offset;
+    use crate::numeric::blocks::offset;
 
     #[test]
     fn a_mask_grows_by_one_voxel_across_blocks() {

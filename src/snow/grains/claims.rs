@@ -3,8 +3,8 @@
 
 use super::shell::Shell;
 use super::surroundings::{Bounds, Object, bounds};
-use crate::base::DVec3;
 use crate::error::Result;
+use crate::geometry::DVec3;
 
 /// Count of poses that are examined in a step.
 const MOMENTS: u32 = 9;

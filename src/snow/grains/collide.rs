@@ -4,7 +4,7 @@ use super::contacts::Batch;
 use super::rest;
 use super::rows::{Part, Row, SUPPORTED, Shared};
 use super::solve::Coefficients;
-use crate::base::lanes::{LaneMask, Lanes};
+use crate::numeric::lanes::{LaneMask, Lanes};
 
 /// Share of an overlap that a sub-step removes.
 const REMOVED: f32 = 0.8;
@@ -246,8 +246,8 @@ impl Contact {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::DVec3;
     use crate::context::{Context, Pool};
+    use crate::geometry::DVec3;
     use crate::snow::grains::Params;
     use crate::snow::grains::heap::{Colliders, Division, Heap};
 

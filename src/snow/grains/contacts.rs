@@ -10,8 +10,8 @@ use rayon::prelude::*;
 
 use super::layout::{ALL_CELLS, Block, CELLS, EDGE, Home, Layout, NONE};
 use super::rows::{Row, V, norm, sub};
-use crate::base::cpu::dispatch;
-use crate::base::lanes::{LANES, Lanes};
+use crate::numeric::cpu::dispatch;
+use crate::numeric::lanes::{LANES, Lanes};
 
 /// Largest gap (diameters) between the anchors of a pair: pairs are found again once a grain is half as far from its anchor.
 /// Less than the edge of a cell minus a diameter.

@@ -16,10 +16,10 @@ use super::layout::{At, EDGE, world};
 use super::rest;
 use super::rows::{Row, V, add};
 use super::surfaces::{Side, Surfaces};
-#[cfg(test)]
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::Result;
+#[cfg(test)]
+use crate::geometry::DVec3;
 
 /// Edge of a cell (diameters): it holds 2 x 2 x 2 grains side by side.
 const CELL: f32 = 2.0;
@@ -393,8 +393,8 @@ fn scattered(cell: Cell, eighth: usize) -> V {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::mesh::TriMesh;
     use crate::context::Pool;
+    use crate::geometry::mesh::TriMesh;
     use crate::snow::grains::heap::Floor;
     use crate::snow::grains::shell::Shell;
 

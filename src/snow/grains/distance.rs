@@ -11,8 +11,8 @@ use super::layout::{At, world};
 use super::rest;
 use super::rows::{Row, norm};
 use super::shell::Shell;
-use crate::base::DVec3;
 use crate::error::Result;
+use crate::geometry::DVec3;
 
 /// Speed above which a grain is fast, in sqrt(g d): a slower one rises by at most d / 32, too little to leave the hollow
 /// between the grains below it.

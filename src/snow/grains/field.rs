@@ -6,8 +6,8 @@ use super::contacts::SKIN;
 use super::layout::{At, Block, EDGE, Layout};
 use super::rows::{Row, V, dot, norm, scaled};
 use super::touch::{BASE, Touch};
-use crate::base::blocks::{DIM, offset};
 use crate::error::Result;
+use crate::numeric::blocks::{DIM, offset};
 use crate::vdb::{FloatGrid, Probe};
 
 /// A level set as a collider.

@@ -6,8 +6,8 @@
 use rayon::prelude::*;
 
 use super::shell::Shell;
-use crate::base::weld::Weld;
-use crate::base::{DVec3, TriMesh};
+use crate::geometry::mesh::weld::Weld;
+use crate::geometry::{DVec3, TriMesh};
 
 /// A mesh that does not move and has a front.
 #[derive(Clone)]

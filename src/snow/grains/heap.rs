@@ -13,9 +13,9 @@ pub use super::shell::Shell;
 use super::solve::{Coefficients, Motion, sub_step};
 use super::touch::{self, Touch};
 use super::trapped;
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 
 /// A level plane that grains lie on.
 #[derive(Debug, Clone, Copy, PartialEq)]

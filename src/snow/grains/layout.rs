@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use super::contacts::{Batch, Held, SKIN, THIN_SKIN};
 use super::rows::{Row, Shared, V, add, dot, norm, scaled};
 use super::touch::Touch;
-use crate::base::DVec3;
-use crate::base::lanes::LANES;
+use crate::geometry::DVec3;
+use crate::numeric::lanes::LANES;
 
 /// Edge of a block (diameters). At least twice the reach of a contact.
 pub const EDGE: f32 = 8.0;
@@ -428,7 +428,7 @@ pub fn locate(world: DVec3, diameter: f64) -> (At, V) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::cpu::FlushDenormals;
+    use crate::numeric::cpu::FlushDenormals;
 
     #[test]
     fn every_place_settles_in_a_block() {

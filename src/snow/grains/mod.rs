@@ -49,11 +49,11 @@ mod trapped;
 
 use std::collections::{BTreeMap, HashSet};
 
-use crate::base::DVec3;
-use crate::base::blocks::{DIM, Origin};
-use crate::base::points::{Attribute, Column, Points, Values};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::geometry::points::{Attribute, Column, Points, Values};
+use crate::numeric::blocks::{DIM, Origin};
 
 use claims::Claims;
 use heap::{Division, Heap};

@@ -3,9 +3,9 @@
 //! [`Shell::nearest`].
 
 use super::shell::{Best, Nearest, Shell};
-use crate::base::DVec3;
-use crate::base::cpu::dispatch;
-use crate::base::lanes::{LANES, Lanes};
+use crate::geometry::DVec3;
+use crate::numeric::cpu::dispatch;
+use crate::numeric::lanes::{LANES, Lanes};
 
 /// The leaves of a mesh near some positions.
 #[derive(Default)]

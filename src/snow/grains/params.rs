@@ -4,8 +4,8 @@ use super::density;
 use super::heap::Division;
 use super::rest::Rest;
 use super::solve::Coefficients;
-use crate::base::DVec3;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 use crate::snow::grain_friction;
 
 /// How snow becomes grains and how they behave.

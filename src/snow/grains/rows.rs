@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use crate::base::lanes::{LANES, Lanes};
+use crate::numeric::lanes::{LANES, Lanes};
 
 /// Three components.
 pub type V = [f32; 3];

@@ -7,7 +7,7 @@ use super::rest;
 use super::rows::{Row, Shared, V, dot, norm, scaled, sub};
 use super::shell::Shell;
 use super::touch::Touch;
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// Working memory of one thread.
 #[derive(Default)]

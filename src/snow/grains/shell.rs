@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use super::ground::RIM_CORNER;
 use super::rows::{Row, dot};
 use super::touch::{FIRST_SHELL, Touch};
-use crate::base::DVec3;
-use crate::base::lanes::LANES;
+use crate::geometry::DVec3;
+use crate::numeric::lanes::LANES;
 
 /// Vertices that one task measures.
 const VERTICES: usize = 4096;

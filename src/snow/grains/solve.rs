@@ -22,10 +22,10 @@ use super::layout::{Block, Layout};
 use super::rest::{self, Rest};
 use super::rows::{Part, Row, Shared, V, add, dot, norm, scaled, sub};
 use super::touch::Touch;
-use crate::base::cpu::dispatch;
-use crate::base::lanes::Lanes;
 use crate::context::Context;
 use crate::error::Result;
+use crate::numeric::cpu::dispatch;
+use crate::numeric::lanes::Lanes;
 
 /// Constants of a sub-step.
 #[derive(Debug, Clone, Copy)]
@@ -407,7 +407,7 @@ fn prefetch(rows: Shared<'_, Row>, batch: Option<&Batch>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::cpu::FlushDenormals;
+    use crate::numeric::cpu::FlushDenormals;
     use crate::snow::grains::Params;
     use crate::snow::grains::heap::Division;
     use crate::snow::grains::rows::SUPPORTED;

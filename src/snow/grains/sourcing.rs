@@ -8,10 +8,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use crate::base::DVec3;
-use crate::base::blocks::{BlockEdit, DIM, Origin, VOXELS};
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::DVec3;
+use crate::numeric::blocks::{BlockEdit, DIM, Origin, VOXELS};
 use crate::snow::base_layer::{filled, filling};
 use crate::vdb::{FloatGrid, Probe};
 

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::Grains;
 use super::heap::Heap;
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// Position (m) and velocity (m/s) at the beginning of a step.
 pub type Start = (DVec3, [f32; 3]);

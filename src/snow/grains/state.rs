@@ -8,10 +8,11 @@ use super::heap::Heap;
 use super::layout::{EDGE, holds};
 use super::rows::Row;
 use super::touch::Touch;
-use crate::base::DVec3;
-use crate::base::bytes::{Reader, Writer};
-use crate::base::packed::{self, Magic};
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::numeric::bytes::{Reader, Writer};
+use crate::numeric::packed;
+use crate::numeric::packed::Magic;
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzgrn06";

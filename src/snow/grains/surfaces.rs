@@ -7,8 +7,8 @@ use super::nearby::Nearby;
 use super::rows::{V, dot};
 use super::shell::{DEPTHS, Shell};
 use super::trapped::DEEP;
-use crate::base::DVec3;
 use crate::error::Result;
+use crate::geometry::DVec3;
 
 /// Search distance for surfaces (diameters): more than the longest step of a crowd's path, which starts anywhere in a cell with
 /// edges of two diameters and ends at the centre of the next, so that a mesh between the two is near both.

@@ -5,8 +5,8 @@ use super::ground::{FRICTION, Ground};
 use super::heap::{Colliders, Floor};
 use super::shell::Shell;
 use super::{Base, Params};
-use crate::base::{DVec3, TriMesh};
 use crate::error::Result;
+use crate::geometry::{DVec3, TriMesh};
 use crate::sweep::Body;
 
 /// Inputs of a step of grains.

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::base::DVec3;
 use crate::flow::{Coord, Flow, tiles::FACES};
+use crate::geometry::DVec3;
 
 /// Cells between two places.
 const SPACING: usize = 4;

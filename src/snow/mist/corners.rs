@@ -1,9 +1,9 @@
 //! Corners of cells, and level sets at them.
 
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::Result;
 use crate::flow::Coord;
+use crate::geometry::DVec3;
 use crate::snow::grains::field::Window;
 use crate::vdb::FloatGrid;
 

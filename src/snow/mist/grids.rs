@@ -3,11 +3,11 @@
 use rayon::prelude::*;
 
 use super::Mist;
-use crate::base::DVec3;
-use crate::base::blocks::{Block, BlockEdit, Mask};
 use crate::context::Context;
 use crate::error::Result;
 use crate::flow::{Coord, Tile};
+use crate::geometry::DVec3;
+use crate::numeric::blocks::{Block, BlockEdit, Mask};
 use crate::vdb::{FloatGrid, GridClass, VectorEdit, VectorGrid};
 
 /// Grids of mist, whose voxels are its cells: their centres lie half a cell off multiples of it.

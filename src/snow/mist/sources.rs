@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use super::{LEAST, Params};
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::flow::{Coord, Tile};
+use crate::geometry::DVec3;
 
 /// Farthest place of a grain from the origin on an axis (cells).
 const FARTHEST_CELL: f64 = 1e7;

@@ -1,9 +1,10 @@
 //! The exact state of mist as bytes, from which a run resumes.
 
 use super::Mist;
-use crate::base::bytes::{Reader, Writer};
-use crate::base::packed::{self, Magic};
 use crate::error::{Error, Result};
+use crate::numeric::bytes::{Reader, Writer};
+use crate::numeric::packed;
+use crate::numeric::packed::Magic;
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzmst01";

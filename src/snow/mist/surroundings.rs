@@ -10,10 +10,10 @@ use rayon::prelude::*;
 
 use super::corners::{Grid, Lattice};
 use super::{Mist, Source, shares};
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::Result;
 use crate::flow::{Coord, Faces, Solids, Tiles};
+use crate::geometry::DVec3;
 use crate::snow::grains::shell::Shell;
 use crate::snow::grains::{FASTEST_OBJECT, HOLES};
 use crate::sweep::{self, Body, Settings};

@@ -6,10 +6,10 @@ use fastnoise_lite::{FastNoiseLite, NoiseType};
 use rayon::prelude::*;
 
 use super::{Params, coarse};
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::Result;
 use crate::flow::Flow;
+use crate::geometry::DVec3;
 
 /// Curl of the noises, in units of their size, whose root mean square is 1 (measured by the test).
 const UNIT: f64 = 0.231_8;

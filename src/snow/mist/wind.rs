@@ -2,10 +2,10 @@
 
 use super::coarse;
 use super::params::FASTEST_WIND;
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::flow::Flow;
+use crate::geometry::DVec3;
 
 /// Time (s) in which the air takes half of the difference to the wind.
 const RESPONSE: f64 = 0.1;

@@ -5,10 +5,10 @@
 
 use super::fill;
 use super::spheres::{Spheres, Squares};
-use crate::base::DVec3;
-use crate::base::blocks::{Block, BlockEdit, DIM, VOXELS, Values};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::numeric::blocks::{Block, BlockEdit, DIM, VOXELS, Values};
 use crate::vdb::{DENSITY_SCALE_KEY, FloatGrid, GridClass, Leaf, MetaValue, Tile};
 
 /// What the thesis multiplies the density of base and grains by when it renders them (1/m, as renderers take a density).

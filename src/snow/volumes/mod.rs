@@ -13,9 +13,9 @@ pub mod fog;
 mod spheres;
 pub mod united;
 
-use crate::base::blocks::BlockEdit;
 use crate::context::Context;
 use crate::error::Result;
+use crate::numeric::blocks::BlockEdit;
 use crate::vdb::FloatGrid;
 use rayon::prelude::*;
 

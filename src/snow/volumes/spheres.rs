@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-use crate::base::DVec3;
-use crate::base::blocks::{DIM, Origin, VOXELS, Values, offset};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::numeric::blocks::{DIM, Origin, VOXELS, Values, offset};
 
 /// Farthest voxel from the origin.
 const FARTHEST: f64 = (1 << 30) as f64;

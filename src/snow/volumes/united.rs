@@ -6,10 +6,10 @@
 
 use super::fill;
 use super::spheres::{Spheres, Squares};
-use crate::base::DVec3;
-use crate::base::blocks::{Block, BlockEdit, DIM, Origin, VOXELS, Values, offset};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::numeric::blocks::{Block, BlockEdit, DIM, Origin, VOXELS, Values, offset};
 use crate::vdb::{FloatGrid, Probe};
 
 /// Largest voxel (radii of a grain): what is smaller than one and a half voxels is lost between them.

@@ -7,12 +7,12 @@ use rayon::prelude::*;
 
 use super::implicit::{Implicit, SIDE};
 use super::isosurface::Isosurface;
-use crate::base::blocks::{DIM, VOXELS, Values, offset};
-use crate::base::lanes::LANES;
 use crate::context::Context;
 use crate::distance::nearest::{Search, search};
 use crate::distance::triangle::Triangle;
 use crate::error::Result;
+use crate::numeric::blocks::{DIM, VOXELS, Values, offset};
+use crate::numeric::lanes::LANES;
 use crate::surface::particles::grid::Coord;
 use crate::surface::track::deep_detail::reach_in;
 

@@ -8,10 +8,10 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::kernel::{Near, SUPPORT, values};
-use crate::base::DVec3;
-use crate::base::lanes::LANES;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::numeric::lanes::LANES;
 use crate::surface::particles::grid::{Cells, Coord};
 
 /// Nodes along the edge of a patch.

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::implicit::{Implicit, NODES, SIDE};
 use super::marching_cubes::cases;
-use crate::base::{DVec3, TriMesh};
+use crate::geometry::{DVec3, TriMesh};
 use crate::surface::particles::grid::Coord;
 
 /// No vertex.

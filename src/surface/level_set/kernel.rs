@@ -6,8 +6,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::thickness::Spread;
-use crate::base::cpu::dispatch;
-use crate::base::lanes::{LANES, Lanes};
+use crate::numeric::cpu::dispatch;
+use crate::numeric::lanes::{LANES, Lanes};
 
 /// Radius within which particles count (spacings).
 pub const SUPPORT: f64 = 4.0;

@@ -1,9 +1,9 @@
 //! Signed distances as a level set of OpenVDB.
 
 use super::band::Distances;
-use crate::base::blocks::{Block, BlockEdit, DIM};
 use crate::context::Context;
 use crate::error::Result;
+use crate::numeric::blocks::{Block, BlockEdit, DIM};
 use crate::vdb::FloatGrid;
 
 /// Half width of the narrow band (cells).

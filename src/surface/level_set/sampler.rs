@@ -1,7 +1,7 @@
 //! Tricubic interpolation of signed distances (Catmull-Rom splines on each axis), with its gradient.
 
 use super::band::Distances;
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 use crate::surface::particles::grid::Coord;
 
 /// Reads distances near one place after the other; nodes are kept while the place stays in its cell.

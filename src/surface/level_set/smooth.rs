@@ -6,9 +6,9 @@
 
 use rayon::prelude::*;
 
-use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::{DVec3, TriMesh};
 use crate::surface::particles::specks::root;
 
 /// Frequency (0 to 2; 0 is a constant) up to which a pass takes nothing away: k_PB.
@@ -178,8 +178,8 @@ impl Parts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::Vec3;
     use crate::context::Pool;
+    use crate::geometry::Vec3;
 
     /// An octahedron with its corners so far from a centre (m).
     fn octahedron(centre: [f32; 3], size: f32) -> TriMesh {

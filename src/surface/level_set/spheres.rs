@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use super::openvdb::HALF_WIDTH;
-use crate::base::DVec3;
-use crate::base::blocks::{DIM, VOXELS};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::numeric::blocks::{DIM, VOXELS};
 use crate::vdb::FloatGrid;
 use crate::vdb::level_set::from_particles;
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::base::cpu::dispatch;
-use crate::base::lanes::{LANES, Lanes};
+use crate::numeric::cpu::dispatch;
+use crate::numeric::lanes::{LANES, Lanes};
 
 /// Spread of the places, over that on all axes, below which the map does not follow the ways in that direction.
 const FLAT: f64 = 0.004;

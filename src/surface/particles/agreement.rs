@@ -5,8 +5,8 @@ use std::collections::{HashMap, HashSet};
 
 use super::grid::{Coord, cell_of};
 use super::paths::Paths;
-use crate::base::DVec3;
 use crate::error::Result;
+use crate::geometry::DVec3;
 use crate::surface::Particles;
 use crate::surface::report::StepReport;
 

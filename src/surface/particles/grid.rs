@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::base::DVec3;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 
 /// Coordinate of a cell.
 pub type Coord = [i32; 3];

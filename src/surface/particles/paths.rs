@@ -8,8 +8,8 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::agreement::Mismatch;
-use crate::base::DVec3;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 use crate::surface::Particles;
 
 /// The ways of particles that are there in both frames.

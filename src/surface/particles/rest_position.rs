@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::affine_fit::{Near, sums};
 use super::grid::{Cells, Coord};
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 use crate::surface::Particles;
 use crate::surface::repair::Source;
 use crate::surface::topology::change::Change;

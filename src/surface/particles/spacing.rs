@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// Particles whose neighbours are looked at, and those that are enough to know about how large the spacing is.
 const LOOKED_AT: [usize; 2] = [256, 32];

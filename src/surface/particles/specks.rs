@@ -1,8 +1,8 @@
 //! Groups of a few particles apart from all others: spray that makes no surface worth having.
 
 use super::grid::Cells;
-use crate::base::DVec3;
 use crate::error::Result;
+use crate::geometry::DVec3;
 
 /// Which particles at places (m), whose spacing is `spacing` (m), belong to groups of fewer than `least`. Two are of one group where
 /// the cells of one spacing that hold them touch.

@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 
 use super::grid::Cells;
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::DVec3;
 
 /// Radius within which particles count (spacings); it is doubled where there are none.
 const RADIUS: f64 = 2.0;

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use super::fans::{Edge, Fans};
 use super::shape::is_upright;
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// Neighbours of a vertex from which on they are too many for a rule.
 const MOST: usize = 24;

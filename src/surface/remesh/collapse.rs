@@ -3,7 +3,7 @@
 use super::fans::{Collapse, Fans};
 use super::shape::{is_upright, normal, quality};
 use super::{between, mean};
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// How much normals spread on a ridge or in a corner: two planes of the same area do where they meet at 30 degrees.
 const SPREAD: f64 = 0.0625;
@@ -126,7 +126,7 @@ mod tests {
     use super::super::Source;
     use super::super::tests::{Body, sphere};
     use super::*;
-    use crate::base::TriMesh;
+    use crate::geometry::TriMesh;
 
     #[test]
     fn ridges_and_corners_are_told_from_smooth_places() {

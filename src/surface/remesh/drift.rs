@@ -2,7 +2,7 @@
 //! their lengths have changed. Without that, lengths near a limit of improvement would be remade for ever by particles that only tremble.
 //! Projection does not count: where the surface depends on few particles, as on thin sheets, it moves ten times as far as they tremble.
 
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// Steps from one reference to the next.
 pub(in crate::surface) const WINDOW: u32 = 8;

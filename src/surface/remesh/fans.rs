@@ -3,7 +3,7 @@
 //! "Topology preserving edge contraction").
 
 use super::{Improvable, Size, Source, mean};
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// Of a vertex around which no triangle has come or gone.
 const NONE: u32 = u32::MAX;
@@ -370,7 +370,7 @@ fn drop_marked<T>(values: &mut Vec<T>, marks: &[bool]) {
 mod tests {
     use super::super::tests::Body;
     use super::*;
-    use crate::base::TriMesh;
+    use crate::geometry::TriMesh;
 
     /// A cube of 8 vertices and 12 triangles.
     fn cube() -> Body {

@@ -61,7 +61,7 @@ mod tests {
     use super::super::Source;
     use super::super::tests::Body;
     use super::*;
-    use crate::base::DVec3;
+    use crate::geometry::DVec3;
 
     /// Two triangles along an edge, of which the second is turned up around it (degrees).
     fn kite(height: f64, turn: f64) -> Body {

@@ -2,7 +2,7 @@
 
 use super::fans::Fans;
 use super::shape::{is_upright, least_angle, normal};
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// Share of the way that a vertex moves.
 const SHARE: f64 = 0.5;

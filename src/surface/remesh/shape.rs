@@ -1,6 +1,6 @@
 //! Shapes of triangles.
 
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// Least cosine between the normals of a triangle before and after a change: beyond that it turns over.
 const UPRIGHT: f64 = 0.2;

@@ -2,7 +2,7 @@
 //! what trembles around a limit would be remade in every frame.
 
 use super::{Improvable, TOO_LONG, TOO_SHORT};
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// Change of a length since the reference from which on an edge is not at rest (targets, and [`Improvable::tremble`]). Particles at
 /// rest that tremble by 0.02 spacings change lengths by up to 0.02 targets, and by 0.01 spacings.

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use super::shape::{least_angle, normal};
-use crate::base::topology::Topology;
 use crate::context::Pool;
 use crate::error::Error;
+use crate::geometry::check::topology::Topology;
 use crate::surface::balls;
 use crate::surface::remesh::*;
 

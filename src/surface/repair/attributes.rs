@@ -9,9 +9,9 @@ use rayon::prelude::*;
 use super::Source;
 use super::traced::{Traced, is_mask};
 use super::weights::{Weights, alone, between, blended, heaviest, weights};
-use crate::base::arrays::{DetailedMesh, MeshArray, On};
-use crate::base::deviation::NearestTree;
-use crate::base::{DVec3, TriMesh, Uvs, Vec3};
+use crate::geometry::check::deviation::NearestTree;
+use crate::geometry::mesh::attributes::{DetailedMesh, MeshArray, On};
+use crate::geometry::{DVec3, TriMesh, Uvs, Vec3};
 
 /// Vertices or triangles of a task.
 pub(super) const GRAIN: usize = 1024;
@@ -263,8 +263,8 @@ impl<'a> Origins<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::arrays::Number;
     use crate::context::{Context, Pool};
+    use crate::geometry::mesh::attributes::Number;
     use crate::surface::repair::repair;
 
     fn array(name: &str, on: On, number: Number, values: &[f64]) -> MeshArray {

@@ -3,8 +3,9 @@
 use rayon::prelude::*;
 
 use super::prepare::rotated;
-use crate::base::edges::{edge_uses, imbalance, is_same_edge, parts_of};
-use crate::base::{Vec3, doubles};
+use crate::geometry::Vec3;
+use crate::geometry::check::duplicates;
+use crate::geometry::check::edges::{edge_uses, imbalance, is_same_edge, parts_of};
 
 /// Which triangles have the vertices of others and go. Of those that are turned the same way the first stays. Where two are turned
 /// opposite ways none does: they are a sheet folded onto itself, which encloses nothing. But where such sheets are closed
@@ -56,5 +57,5 @@ pub(super) fn copies(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u32]) 
         // Adding zero makes -0 and 0 the same.
         [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f32::to_bits)
     };
-    doubles::copies(parts, |_| true, |triangle| rotated(triangles[triangle].map(position)))
+    duplicates::copies(parts, |_| true, |triangle| rotated(triangles[triangle].map(position)))
 }

@@ -10,8 +10,8 @@ use super::exact::{GridFace, Point, Traced, beside, on_edge, to_cells, trace};
 use super::pierces::Pierces;
 use super::polygon;
 use super::region::CellSet;
-use crate::base::DVec3;
 use crate::distance::lattice::Fixed;
+use crate::geometry::DVec3;
 use crate::surface::particles::grid::Coord;
 
 /// Triangles a task looks at.

@@ -6,7 +6,7 @@ use super::Source;
 use super::cut::{Cut, Shape, Trouble};
 use super::exact::{GridEdge, Point};
 use super::fill::Fill;
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// A mesh that is being rebuilt; places in cells.
 pub struct Draft {

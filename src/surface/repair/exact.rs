@@ -4,9 +4,9 @@
 //! than the last, as in [`crate::distance::winding`]): no vertex lies on a plane, no edge of the mesh meets an edge of the grid, and
 //! what one triangle says of their common edge its neighbour says too.
 
-use crate::base::DVec3;
 use crate::distance::lattice::{Fixed, UNITS};
 use crate::distance::winding::{Axis, passes_left};
+use crate::geometry::DVec3;
 use crate::surface::particles::grid::Coord;
 
 /// An edge of the grid: its axis and its lesser node.

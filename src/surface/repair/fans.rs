@@ -3,7 +3,7 @@
 //! preserving edge contraction"). Vertices and triangles of the mesh that came in are not touched.
 
 use super::{Draft, Source};
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// A change of the mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -244,7 +244,7 @@ pub(super) mod tests {
     use std::f64::consts::TAU;
 
     use super::*;
-    use crate::base::topology::Topology;
+    use crate::geometry::check::topology::Topology;
 
     /// Quads of a torus around its axis, and across its tube.
     const AROUND: u32 = 80;

@@ -6,11 +6,11 @@ use super::cut::Shape;
 use super::exact::{around, beside, cell_of, passages};
 use super::prepare::Closed;
 use super::region::CellSet;
-use crate::base::faults::meeting_pairs;
-use crate::base::topology::{bodies, faulty};
-use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::check::faults::meeting_pairs;
+use crate::geometry::check::topology::{bodies, faulty};
+use crate::geometry::{DVec3, TriMesh};
 use crate::surface::particles::grid::Coord;
 
 /// Pierces so near to each other are at one place (cells).

@@ -7,8 +7,8 @@ use std::collections::BTreeSet;
 use std::iter::repeat_n;
 
 use super::prepare::{Closed, rotated};
-use crate::base::edges::{Use, is_same_edge, runs, sides};
-use crate::base::{DVec3, PolygonMesh, Vec3};
+use crate::geometry::check::edges::{Use, is_same_edge, runs, sides};
+use crate::geometry::{DVec3, PolygonMesh, Vec3};
 
 /// Most corners of a ring that is cut into triangles between them: cutting larger ones takes too long.
 const MOST_CORNERS: usize = 500;
@@ -165,7 +165,7 @@ mod tests {
     use super::super::prepare::Prepared;
     use super::super::prepare::tests::{checked, cube, soup};
     use super::*;
-    use crate::base::TriMesh;
+    use crate::geometry::TriMesh;
 
     #[test]
     fn an_open_cube_gets_its_face() {

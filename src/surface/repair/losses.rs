@@ -1,8 +1,8 @@
 //! What a repair has lost of a mesh, by its area, its volume and its bounds.
 
 use super::prepare::Closed;
-use crate::base::faults::counted_area;
-use crate::base::{DVec3, TriMesh};
+use crate::geometry::check::faults::counted_area;
+use crate::geometry::{DVec3, TriMesh};
 
 /// Of the area and of the volume, if less is left, something is missing.
 const HALF: f64 = 0.5;

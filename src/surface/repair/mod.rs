@@ -47,11 +47,11 @@ use self::fill::{Rim, fill};
 use self::prepare::{Closed, prepare};
 use self::region::grow;
 use super::particles::grid::Coord;
-use crate::base::topology::Topology;
-use crate::base::{DVec3, TriMesh, Vec3};
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
 use crate::error::{Error, Result};
+use crate::geometry::check::topology::Topology;
+use crate::geometry::{DVec3, TriMesh, Vec3};
 
 pub use self::attributes::carried;
 pub use self::losses::Losses;
@@ -341,7 +341,7 @@ fn finished(
     };
     let positions = draft.places.iter().enumerate().map(place).collect();
     let mesh = TriMesh { positions, triangles: draft.triangles };
-    let used = crate::base::mesh::used(mesh.positions.len(), &mesh.triangles);
+    let used = crate::geometry::mesh::used(mesh.positions.len(), &mesh.triangles);
     let names: Vec<u32> = used.unwrap_or_else(|| (0..mesh.positions.len() as u32).collect());
     let original = |name: &u32| ((*name as usize) < own).then_some(*name);
     let vertices = names.iter().map(original).collect();
@@ -352,8 +352,8 @@ fn finished(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::faults::Faults;
     use crate::context::Pool;
+    use crate::geometry::check::faults::Faults;
     use crate::surface::balls;
 
     /// A sphere of 2048 triangles.

@@ -2,8 +2,9 @@
 
 use super::cut::{Half, Shape};
 use super::exact::Point;
-use crate::base::ears::{self, turn};
-use crate::base::monotone;
+use crate::geometry::triangulate::ear_clipping;
+use crate::geometry::triangulate::ear_clipping::turn;
+use crate::geometry::triangulate::monotone;
 
 /// Most corners of a polygon that is cut ear by ear.
 const FEW_CORNERS: usize = 200;
@@ -42,7 +43,7 @@ pub fn polygons(shape: &Shape, triangle: u32, halves: Vec<Half>) -> Option<Vec<[
             return None;
         }
         let flat: Vec<[f64; 2]> = ring.iter().map(|(_, at)| *at).collect();
-        let cut = if flat.len() > FEW_CORNERS { monotone::triangles } else { ears::triangles };
+        let cut = if flat.len() > FEW_CORNERS { monotone::triangles } else { ear_clipping::triangles };
         out.extend(cut(&flat).into_iter().map(|corners| corners.map(|at| ring[at].0)));
     }
     Some(out)

@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 use super::copies::{copies, doubled, is_balanced};
 use super::holes::close;
-use crate::base::edges::{Use, agree, edge_uses, is_same_edge, parts_of, side, sound};
-use crate::base::orient::is_flat;
-use crate::base::weld::Weld;
-use crate::base::{DVec3, TriMesh, Vec3};
+use crate::geometry::check::edges::{Use, agree, edge_uses, is_same_edge, parts_of, side, sound};
+use crate::geometry::check::predicates::is_flat;
+use crate::geometry::mesh::weld::Weld;
+use crate::geometry::{DVec3, TriMesh, Vec3};
 
 /// What was done to a mesh before anything was cut.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

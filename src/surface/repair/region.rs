@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use super::exact::{GridEdge, around, end};
 use super::pierces::Pierces;
-use crate::base::blocks::{Mask, origin_of};
+use crate::numeric::blocks::{Mask, origin_of};
 use crate::surface::particles::grid::Coord;
 
 /// A set of cells, in blocks of 8 x 8 x 8.

@@ -10,7 +10,7 @@
 
 use super::traced::{Chart, Charts, longest};
 use super::weights::{Weights, between};
-use crate::base::{TriMesh, Uvs};
+use crate::geometry::{TriMesh, Uvs};
 
 /// A coordinate, or a difference of two.
 type Pair = [f64; 2];

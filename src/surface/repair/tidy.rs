@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 
 use super::fans::{Change, Fans, flipped};
 use super::{Draft, Source};
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// Quality below which a triangle is a sliver: what a repaired mesh promises, 1e-4, with a margin.
 const LEAST: f64 = 4e-4;
@@ -304,7 +304,7 @@ impl<'a> Tidy<'a> {
 mod tests {
     use super::super::fans::tests::{split, split_edge, torus};
     use super::*;
-    use crate::base::topology::Topology;
+    use crate::geometry::check::topology::Topology;
 
     fn is_watertight(draft: &Draft) -> bool {
         let arrays =

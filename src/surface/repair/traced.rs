@@ -11,9 +11,9 @@ use super::Source;
 use super::attributes::GRAIN;
 use super::texture::textured;
 use super::weights::{Weights, blended, weights};
-use crate::base::arrays::{DetailedMesh, MeshArray, Number, On};
-use crate::base::deviation::NearestTree;
-use crate::base::{DVec3, TriMesh};
+use crate::geometry::check::deviation::NearestTree;
+use crate::geometry::mesh::attributes::{DetailedMesh, MeshArray, Number, On};
+use crate::geometry::{DVec3, TriMesh};
 
 /// A triangle is torn where its corners were farther apart at the first frame than so many times its longest edge and a spacing: liquid
 /// that was drawn together by less shows a texture that is drawn together.
@@ -242,7 +242,7 @@ fn nearest_to(middle: DVec3, [a, b, c]: &[DVec3; 3]) -> DVec3 {
 mod tests {
     use super::super::carried;
     use super::*;
-    use crate::base::{Uvs, Vec3};
+    use crate::geometry::{Uvs, Vec3};
 
     /// Cells along an edge of the sheet, and the vertices of it that were made again.
     const SIDE: usize = 16;

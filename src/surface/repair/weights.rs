@@ -1,7 +1,7 @@
 //! Numbers at a place on a triangle, from those of its corners.
 
-use crate::base::DVec3;
-use crate::base::arrays::{MeshArray, Number};
+use crate::geometry::DVec3;
+use crate::geometry::mesh::attributes::{MeshArray, Number};
 
 /// Arrays whose 8-bit integers are shares of a colour: they are interpolated, as floats are.
 const COLOURS: [&str; 4] = ["red", "green", "blue", "alpha"];

@@ -4,12 +4,12 @@
 use super::hidden::Everywhere;
 use super::mesh_distance::Gamma;
 use super::particle_count::Crowd;
-use crate::base::DVec3;
-use crate::base::mesh::used;
-use crate::base::topology::around;
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
 use crate::error::Result;
+use crate::geometry::DVec3;
+use crate::geometry::check::topology::around;
+use crate::geometry::mesh::used;
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::sampler::Sampler;
@@ -195,7 +195,7 @@ pub fn change(
     let vertices = names.iter().map(place).collect();
     Ok(Some(Change {
         vertices,
-        triangles: crate::base::mesh::renumbered(&draft.triangles, &names),
+        triangles: crate::geometry::mesh::renumbered(&draft.triangles, &names),
         origins: names.iter().map(|name| ((*name as usize) < own).then_some(*name)).collect(),
         sources: draft.sources,
         before: unfit.vertices.to_vec(),
@@ -283,8 +283,8 @@ fn flagged(unfit: &Unfit<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::faults::Faults;
     use crate::context::Pool;
+    use crate::geometry::check::faults::Faults;
     use crate::surface::balls::{own_surface, two_balls};
     use crate::surface::{Params, Tracker};
 

@@ -9,10 +9,10 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::uncovered_parts::Parts;
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::distance::triangle::Triangle;
 use crate::error::Result;
+use crate::geometry::DVec3;
 use crate::surface::level_set::implicit::{Implicit, SIDE};
 use crate::surface::level_set::isosurface::Isosurface;
 use crate::surface::particles::grid::{Coord, cell_of};

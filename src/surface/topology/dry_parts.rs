@@ -2,9 +2,10 @@
 
 use super::change::Change;
 use super::particle_count::{Bounds, Crowd, are_inside, seen_from};
-use crate::base::DVec3;
-use crate::base::mesh::{renumbered, used};
-use crate::base::topology::{self, bodies};
+use crate::geometry::DVec3;
+use crate::geometry::check::topology;
+use crate::geometry::check::topology::bodies;
+use crate::geometry::mesh::{renumbered, used};
 use crate::surface::repair::Source;
 
 impl Change {

@@ -18,12 +18,12 @@ use rayon::prelude::*;
 
 use super::mesh_distance::{between, far, node};
 use super::particle_count::{Bounds, is_within};
-use crate::base::DVec3;
-use crate::base::blocks::{VOXELS, offset};
-use crate::base::topology::{bodies, parts};
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
 use crate::error::Result;
+use crate::geometry::DVec3;
+use crate::geometry::check::topology::{bodies, parts};
+use crate::numeric::blocks::{VOXELS, offset};
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::sampler::Sampler;
@@ -356,9 +356,9 @@ fn each_place([a, b, c]: [DVec3; 3], mut see: impl FnMut(DVec3)) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::faults::Faults;
-    use crate::base::{TriMesh, Vec3};
     use crate::context::Pool;
+    use crate::geometry::check::faults::Faults;
+    use crate::geometry::{TriMesh, Vec3};
     use crate::surface::balls::{numbered, own_surface, shell, two_balls};
     use crate::surface::{Params, Tracker};
 

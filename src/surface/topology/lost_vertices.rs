@@ -1,7 +1,7 @@
 //! Vertices that have lost the surface: particles that fly apart carry them far away, and the triangles between would be spikes through
 //! all that is there. Where the mesh is rebuilt anyway they go with the vertices around them instead.
 
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 
 /// How far from a vertex that found the surface others follow it (edges).
 const RINGS: usize = 16;

@@ -6,14 +6,14 @@ use std::collections::{BTreeSet, HashMap};
 use rayon::prelude::*;
 
 use super::matching::{Matching, Node, match_topology};
-use crate::base::DVec3;
-use crate::base::blocks::{DIM, VOXELS, Values, offset};
-use crate::base::lanes::LANES;
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
 use crate::distance::nearest::{Search, search as find};
 use crate::distance::triangle::Triangle;
 use crate::error::Result;
+use crate::geometry::DVec3;
+use crate::numeric::blocks::{DIM, VOXELS, Values, offset};
+use crate::numeric::lanes::LANES;
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::{Implicit, SIDE};
 use crate::surface::particles::grid::Coord;

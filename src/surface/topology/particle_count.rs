@@ -4,9 +4,9 @@
 //! all others less than half a spacing from it. So those beside a part count too, if any lies inside.
 
 use super::mesh_distance::between;
-use crate::base::bvh::Bvh;
-use crate::base::deviation::NearestTree;
-use crate::base::{DVec3, TriMesh};
+use crate::geometry::check::deviation::NearestTree;
+use crate::geometry::spatial::bvh::Bvh;
+use crate::geometry::{DVec3, TriMesh};
 use crate::surface::particles::grid::{Coord, cell_of};
 
 /// A direction along which no edges of made meshes run.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::particle_count::{Bounds, Crowd, are_inside, seen_from};
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::isosurface::Isosurface;
 use crate::surface::particles::grid::{Coord, cell_of};

@@ -10,9 +10,9 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::DVec3;
 use crate::surface::Particles;
 use crate::surface::params::Params;
 use crate::surface::particles::affine_fit::{Map, Near, Sums, sums};

@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::base::DVec3;
-use crate::base::blocks::DIM;
+use crate::geometry::DVec3;
+use crate::numeric::blocks::DIM;
 use crate::surface::particles::grid::{Coord, cell_of};
 use crate::surface::tracker::{DRIFT, REACH, Tracker, WIDER};
 

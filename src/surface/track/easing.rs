@@ -4,12 +4,12 @@
 
 use rayon::prelude::*;
 
-use crate::base::deviation::NearestTree;
-use crate::base::mesh::{renumbered, used};
-use crate::base::topology::{around, bodies};
-use crate::base::{DVec3, TriMesh, Vec3};
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::check::deviation::NearestTree;
+use crate::geometry::check::topology::{around, bodies};
+use crate::geometry::mesh::{renumbered, used};
+use crate::geometry::{DVec3, TriMesh, Vec3};
 use crate::surface::repair::{Source, weights};
 use crate::surface::topology::change::Change;
 

@@ -3,11 +3,11 @@
 
 use std::collections::HashSet;
 
-use crate::base::faults::meeting_pairs;
-use crate::base::mesh::{renumbered, used};
-use crate::base::{DVec3, TriMesh};
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::check::faults::meeting_pairs;
+use crate::geometry::mesh::{renumbered, used};
+use crate::geometry::{DVec3, TriMesh};
 use crate::surface::particles::grid::{Coord, cell_of};
 
 /// How often the displacements of triangles that meet are halved, and in how many rounds they are taken back whole after that; then all are.

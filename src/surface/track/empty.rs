@@ -73,9 +73,9 @@ impl Tracker {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::DVec3;
-    use crate::base::faults::Faults;
     use crate::context::Pool;
+    use crate::geometry::DVec3;
+    use crate::geometry::check::faults::Faults;
     use crate::surface::Params;
     use crate::surface::balls::{numbered, own_surface, shell};
 

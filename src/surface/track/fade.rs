@@ -2,7 +2,7 @@
 //!
 //! Delta halves in a given time, and becomes less the more the mesh is strained around a vertex. What is painted to last does not.
 
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 use crate::surface::tracker::Tracker;
 
 /// The distance that each vertex is to keep after a step of `dt` (s) that carries the vertices to places (m).

@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 
 use super::easing::{Eased, Leads, eased};
 use super::easing_limit::{Displaced, uncrossed};
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::DVec3;
 use crate::surface::Particles;
 use crate::surface::report::StepReport;
 use crate::surface::tracker::Tracker;

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::base::DVec3;
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::DVec3;
 use crate::surface::Particles;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::isosurface::Isosurface;

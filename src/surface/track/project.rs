@@ -4,7 +4,7 @@
 //! The thesis' formulas are read so: phi and its gradient are those at the current x*, and delta is signed as phi, which the last
 //! formula needs on the inside.
 
-use crate::base::DVec3;
+use crate::geometry::DVec3;
 use crate::surface::level_set::sampler::Sampler;
 
 /// Shares of the way to phi = 0 that a step goes: a large one, for as many steps as that mostly takes, then the thesis' own (2.3.2),

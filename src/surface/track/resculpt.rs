@@ -1,8 +1,8 @@
 //! A mesh that was edited by hand takes the place of the one that has followed the particles up to then.
 
-use crate::base::TriMesh;
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::TriMesh;
 use crate::surface::Particles;
 use crate::surface::report::StepReport;
 use crate::surface::tracker::Tracker;
@@ -38,8 +38,8 @@ impl Tracker {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::{DVec3, Vec3};
     use crate::context::Pool;
+    use crate::geometry::{DVec3, Vec3};
     use crate::surface::Params;
     use crate::surface::balls::{numbered, own_surface, shell};
 

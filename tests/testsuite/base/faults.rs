@@ -1,8 +1,8 @@
 //! Faults of meshes made to have them: fans, edges, and triangles that meet where they should not, to the last bit.
 
 use crate::common::shapes;
-use frazil::base::faults::Faults;
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::check::faults::Faults;
+use frazil::geometry::{TriMesh, Vec3};
 
 fn mesh(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> TriMesh {
     TriMesh { positions: positions.iter().map(|p| Vec3::from(*p)).collect(), triangles: triangles.to_vec() }

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 use std::path::PathBuf;
 
 use crate::common::shapes;
-use frazil::base::bvh::Bvh;
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::spatial::bvh::Bvh;
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::io::mesh;
 use frazil::io::sequence::Pattern;
 use frazil::motion::{Key, Keys, MeshSequence, Motion, Placed, Rigid, Space, Up};

@@ -1,8 +1,8 @@
 //! Which corners of triangle soup are one: solids by code with corners that are off by rounding, and what must stay apart.
 
-use frazil::base::mesh::coincident;
-use frazil::base::weld::Weld;
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::mesh::coincident;
+use frazil::geometry::mesh::weld::Weld;
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 
 use crate::common::bodies::Dice;
 use crate::common::soups::solids;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::common::shapes::{cuboid, sphere, torus};
 use crate::program::{CUBE, complains, fails, frazil, works};
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::{TriMesh, Vec3};
 use frazil::io::mesh;
 use serde_json::{Value, json};
 

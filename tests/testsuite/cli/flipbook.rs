@@ -5,8 +5,8 @@ use std::fs::File;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use frazil::base::blocks::{Block, BlockEdit};
 use frazil::io::manifest::{Keeps, Manifest, Written};
+use frazil::numeric::blocks::{Block, BlockEdit};
 use frazil::vdb::file::{WriteOptions, to_bytes};
 use frazil::vdb::{FloatGrid, GridClass};
 use frazil::{Context, Pool};

@@ -3,7 +3,7 @@
 use crate::common::shapes;
 use crate::picture::Picture;
 use crate::program::{CUBE, fails, works};
-use frazil::base::blocks::{Block, BlockEdit};
+use frazil::numeric::blocks::{Block, BlockEdit};
 use frazil::vdb::file::{self, WriteOptions};
 use frazil::vdb::level_set::{self, Scheme};
 use frazil::vdb::{FloatGrid, GridClass};

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 
 use crate::program::{fails, works};
 

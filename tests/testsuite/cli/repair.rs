@@ -6,8 +6,8 @@ use std::path::Path;
 
 use crate::common::hero;
 use crate::program::{CUBE, fails, works};
-use frazil::base::arrays::{DetailedMesh, MeshArray, Number, On};
-use frazil::base::{TriMesh, Uvs, Vec3};
+use frazil::geometry::mesh::attributes::{DetailedMesh, MeshArray, Number, On};
+use frazil::geometry::{TriMesh, Uvs, Vec3};
 use frazil::io::mesh;
 use serde_json::{Value, json};
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::common::bodies::Dice;
 use crate::common::soups::solids;
 use crate::program::{fails, frazil, works};
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::io::mesh;
 use serde_json::Value;
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::common::character;
 use crate::common::shapes;
 use crate::program::{self, works};
-use frazil::base::TriMesh;
+use frazil::geometry::TriMesh;
 use frazil::io::mesh;
 use serde_json::Value;
 use tempfile::TempDir;

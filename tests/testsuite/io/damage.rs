@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use crate::common::character;
 use crate::common::shapes;
 use crate::program::{self, CUBE, complains, fails, frazil, works};
-use frazil::base::blocks::{Block, BlockEdit};
+use frazil::numeric::blocks::{Block, BlockEdit};
 use frazil::vdb::file::{Compression, WriteOptions};
 use frazil::vdb::guard::Guard;
 use frazil::vdb::{FloatGrid, MetaValue, file, layout, level_set};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::common::shapes::{blob, cuboid};
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::{TriMesh, Vec3};
 use frazil::io::{atomic, mesh};
 use proptest::prelude::*;
 

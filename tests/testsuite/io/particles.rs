@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use frazil::base::DVec3;
-use frazil::base::points::{Column, Points, Values};
+use frazil::geometry::DVec3;
+use frazil::geometry::points::{Column, Points, Values};
 use frazil::io::particles::{self, Cloud};
 
 use crate::common::caches::{IDS, KINDS, PLACES, VELOCITIES, Vtu, bgeo, vtk, zipped};

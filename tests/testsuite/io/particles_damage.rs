@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use frazil::base::DVec3;
-use frazil::base::points::Values;
+use frazil::geometry::DVec3;
+use frazil::geometry::points::Values;
 use frazil::io::particles::{self, Cloud};
 
 use super::particles::parse;

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use frazil::base::{DVec3, PolygonMesh, TriMesh, Vec3};
+use frazil::geometry::{DVec3, PolygonMesh, TriMesh, Vec3};
 use frazil::io::{mesh, particles};
 use proptest::prelude::*;
 

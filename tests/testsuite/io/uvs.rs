@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::common::usda::numbers;
 use crate::program::works;
-use frazil::base::PolygonMesh;
+use frazil::geometry::PolygonMesh;
 use frazil::io::mesh;
 
 /// A cube of 0.4 m as .obj: its vertices in an order that no face follows, one that no face names, quads and seams.

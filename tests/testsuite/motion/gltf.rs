@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::common::character;
 use crate::common::hero;
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::motion::{Character, Key, Keys, Motion, Placed, Play, Space};
 use frazil::sweep::Body;
 use proptest::prelude::*;

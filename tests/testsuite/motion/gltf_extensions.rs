@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::motion::{Character, Motion, Play};
 use serde_json::json;
 

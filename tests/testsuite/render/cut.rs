@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use frazil::base::blocks::{Block, BlockEdit};
 use frazil::io::mesh;
+use frazil::numeric::blocks::{Block, BlockEdit};
 use frazil::render::Field;
 use frazil::vdb::file::WriteOptions;
 use frazil::vdb::{FloatGrid, GridClass, file};

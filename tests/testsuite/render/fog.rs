@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use frazil::base::blocks::{Block, BlockEdit};
-use frazil::base::points::{Column, Points, Values};
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::points::{Column, Points, Values};
+use frazil::geometry::{DVec3, TriMesh};
+use frazil::numeric::blocks::{Block, BlockEdit};
 use frazil::render::{Camera, Cloud, Fog, Light, Model, Models, Picture, Size};
 use frazil::vdb::{FloatGrid, GridClass, MetaValue, file};
 use frazil::{Context, Pool};

@@ -1,7 +1,7 @@
 //! Points in pictures: spheres where they are, as large as they are, in front of and behind meshes.
 
-use frazil::base::points::{Column, Points, Values};
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::points::{Column, Points, Values};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::render::{Camera, Cloud, Light, Model, Models, Picture, Size};
 use frazil::{Context, Pool};
 

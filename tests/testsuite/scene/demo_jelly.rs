@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::io::mesh;
 use nalgebra::Matrix3;
 

@@ -2,7 +2,7 @@
 
 use crate::common::boot::{left_boot, right_boot};
 use crate::common::walk::walk;
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::motion::{Key, Keys};
 
 const DEPTH: f64 = 0.08;

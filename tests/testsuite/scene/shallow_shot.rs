@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::{TriMesh, Vec3};
 use frazil::io::mesh;
 use serde_json::Value;
 

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use frazil::base::TriMesh;
+use frazil::geometry::TriMesh;
 use frazil::io::mesh;
 use frazil::vdb::{FloatGrid, GridClass, file};
 

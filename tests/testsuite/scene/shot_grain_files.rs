@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use frazil::base::DVec3;
-use frazil::base::points::{Column, Points, Values};
+use frazil::geometry::DVec3;
+use frazil::geometry::points::{Column, Points, Values};
 use frazil::io::manifest::{Manifest, Written};
 use frazil::scene::RebuildGrains;
 use frazil::vdb::file::{self, WriteOptions};

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::shot_grains::{folder, grains};
 use crate::program::{CUBE, fails, frazil, works};
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::io::points_ply;
 
 /// Points as a .ply file: x, y, z, vx, vy, vz of each.

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::shot_grains::folder;
 use crate::common::character::output;
 use crate::program::{fails, frazil, kill_at, works};
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::vdb::AnyGrid;
 use frazil::vdb::file::{read, read_any, to_bytes, write};
 

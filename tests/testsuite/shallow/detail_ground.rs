@@ -1,6 +1,6 @@
 //! Level of detail where all cells are near, where ground moves, and where bodies cross the edge.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::params::{Friction, Pace};
 use frazil::shallow::pipes::Border;

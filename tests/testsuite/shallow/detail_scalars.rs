@@ -1,6 +1,6 @@
 //! What liquid in cells of two sizes carries: none of it is lost, what is uniform stays so, and states have it.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::params::Pace;

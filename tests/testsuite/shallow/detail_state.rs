@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::shallow::columns::NONE;
 use frazil::shallow::detail::surface::{Surface, bound};
 use frazil::shallow::surface::{Counts, Depths, Indices, Layout, Target, Up};

@@ -1,6 +1,6 @@
 //! Liquid that falls freely: where it goes, where it lands, and that none of it is lost on the way.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::shallow::falls::mesh::{Balls, Target, bound};
 use frazil::shallow::falls::{Droplet, Falls};
 use frazil::shallow::flows::{FlowPoint, Kind};

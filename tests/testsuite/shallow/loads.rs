@@ -1,7 +1,7 @@
 //! What the liquid does to bodies: their weight in it, a dam, a stream, and what they displace.
 
 use frazil::Context;
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::shallow::liquid::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::terrain::shapes::Shape;

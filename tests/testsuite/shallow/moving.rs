@@ -1,6 +1,6 @@
 //! Terrain that moves takes its liquid along, and none is lost.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights, TOP};
 use frazil::shallow::liquid::Liquid;

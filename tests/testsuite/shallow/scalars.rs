@@ -1,6 +1,6 @@
 //! What the liquid carries: amounts add up to the last one, and concentrations stay between those that came in.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::params::Pace;

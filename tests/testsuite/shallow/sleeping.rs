@@ -1,6 +1,6 @@
 //! Pools come to rest and sleep, and nothing depends on whether they do.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::shallow::params::Pace;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Params, Shallow};

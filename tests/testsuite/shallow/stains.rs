@@ -1,7 +1,7 @@
 //! What liquid leaves on the ground: stains that come, go and move with the mesh, and liquid that the ground absorbs.
 
 use frazil::Context;
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::{TriMesh, Vec3};
 use frazil::shallow::grid::{Grid, Heights};
 use frazil::shallow::liquid::Liquid;
 use frazil::shallow::stains::Absorbing;

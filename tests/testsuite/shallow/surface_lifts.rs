@@ -3,7 +3,7 @@
 use super::surface_mesh::{Mesh, build_with, columns, ground, pool, units};
 use crate::common::bodies::Dice;
 use crate::common::rough_ground::{Kind, rough};
-use frazil::base::Vec3;
+use frazil::geometry::Vec3;
 use frazil::shallow::columns::{Columns, NONE};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, TOP};
 use frazil::shallow::surface::lifts::{Distance, Fitted, Lifts};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use frazil::base::Vec3;
+use frazil::geometry::Vec3;
 use frazil::shallow::columns::Columns;
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::surface::ledges::Ledges;

@@ -1,7 +1,7 @@
 //! The base layer against analytic volumes and against itself.
 
 use crate::common::shapes::{cuboid, sphere};
-use frazil::base::{DVec3, Vec3};
+use frazil::geometry::{DVec3, Vec3};
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::NoiseParams;
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};

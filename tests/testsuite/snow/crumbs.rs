@@ -1,7 +1,7 @@
 //! Crumbs: an island of few voxels is taken away with all that it held, a larger one stays.
 
 use crate::common::shapes::cuboid;
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::{TriMesh, Vec3};
 use frazil::motion::{Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params, StepReport};

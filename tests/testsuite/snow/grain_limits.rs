@@ -2,7 +2,7 @@
 
 use super::grains::on_floor;
 use crate::common::shapes::sphere;
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};

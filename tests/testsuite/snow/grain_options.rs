@@ -1,7 +1,7 @@
 //! Options of grains: rest by distance, and drag by local density.
 
 use crate::common::shapes::sphere;
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::grains::{Base, Grains, Object, Params, Surroundings};
 use frazil::sweep::Body;

@@ -1,6 +1,6 @@
 //! Single grains on slopes: they rest below an angle and slide above it.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::snow::grain_friction::of_repose;
 use frazil::snow::grains::heap::{Colliders, Division, Floor, Heap};
 use frazil::snow::grains::{Base, Grains, Params, Surroundings};

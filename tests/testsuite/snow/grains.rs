@@ -1,8 +1,8 @@
 //! Grains of a small layer into which a ball is pressed: balances, the same bytes whatever does the work, damage.
 
 use crate::common::shapes::sphere;
-use frazil::base::points::Values;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::points::Values;
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};

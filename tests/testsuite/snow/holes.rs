@@ -1,7 +1,7 @@
 //! Objects with holes: grains stay out of small ones, and lie in what is wide open.
 
 use crate::common::shapes::sphere;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::grains::{Base, Grains, Object, Params, Surroundings};
 use frazil::sweep::Body;

@@ -1,7 +1,7 @@
 //! The snow before anything moves, against the volumes that it must have.
 
 use crate::common::shapes::cuboid;
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::{TriMesh, Vec3};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::vdb::{FloatGrid, level_set};
 use frazil::{Context, Pool};

@@ -1,7 +1,7 @@
 //! Mist: what it flows around, wind, exact states, and what a step refuses.
 
-use frazil::base::DVec3;
 use frazil::flow::{Faces, Solids, Tiles};
+use frazil::geometry::DVec3;
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::mist::{Around, Boundary, Grids, Mist, Params, Source, Start, Surroundings, Wind};
@@ -35,7 +35,7 @@ fn grain(place: [f64; 3], velocity: [f32; 3]) -> Source {
 }
 
 /// A body that moves along x at a speed (m/s) from a place (m).
-fn moving(mesh: frazil::base::TriMesh, from: [f64; 3], speed: f64) -> Body {
+fn moving(mesh: frazil::geometry::TriMesh, from: [f64; 3], speed: f64) -> Body {
     let key =
         |time: f64| Key { time, at: DVec3::from(from) + DVec3::x() * (speed * time), turn: DVec3::zeros() };
     Body::new(Box::new(Rigid::new(mesh, Keys::new(vec![key(0.0), key(1.0)]).unwrap())), 0.0).unwrap()

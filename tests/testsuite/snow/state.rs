@@ -1,7 +1,7 @@
 //! A layer's saved state: a layer resumed from it equals one that never stopped, and damaged states are refused.
 
 use crate::common::shapes::sphere;
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params};

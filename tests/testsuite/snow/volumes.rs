@@ -1,6 +1,6 @@
 //! Densities and the united surface against formulas, and the same bytes whatever does the work.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::volumes::{fog, united};
 use frazil::vdb::file::to_bytes;

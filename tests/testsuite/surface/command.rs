@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use frazil::base::DVec3;
-use frazil::base::points::{Attribute, Column, Points, Values};
+use frazil::geometry::DVec3;
+use frazil::geometry::points::{Attribute, Column, Points, Values};
 use frazil::io::{mesh, particles};
 
 use crate::common::liquids::filled;
@@ -71,7 +71,7 @@ fn specks_go_a_box_cuts_and_attributes_come_along() {
         let text = fs::read(folder.join("run.json")).unwrap();
         serde_json::from_slice::<serde_json::Value>(&text).unwrap()[name].as_u64().unwrap() as usize
     };
-    let parts = |mesh: &frazil::base::TriMesh| mesh.euler_characteristic() / 2;
+    let parts = |mesh: &frazil::geometry::TriMesh| mesh.euler_characteristic() / 2;
     works(folder, make);
     assert_eq!(parts(&mesh::read(&folder.join("out.ply")).unwrap()), 2);
     works(folder, &format!("{make} --min-drop 6 --attributes v,heat"));

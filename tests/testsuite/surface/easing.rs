@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use frazil::base::points::{Attribute, Column, Values};
-use frazil::base::{DVec3, DetailedMesh, Points, Vec3};
+use frazil::geometry::points::{Attribute, Column, Values};
+use frazil::geometry::{DVec3, DetailedMesh, Points, Vec3};
 use frazil::io::{mesh, particles};
 
 use crate::common::character::{are_same, output};

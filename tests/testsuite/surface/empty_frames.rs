@@ -4,8 +4,8 @@ use std::fs;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use frazil::base::DVec3;
-use frazil::base::points::{Column, Points, Values};
+use frazil::geometry::DVec3;
+use frazil::geometry::points::{Column, Points, Values};
 use frazil::io::{mesh, particles};
 
 use crate::program::{fails, works};

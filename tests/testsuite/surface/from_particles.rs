@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
 
-use frazil::base::TriMesh;
-use frazil::base::points::{Attribute, Column, Points, Values};
+use frazil::geometry::TriMesh;
+use frazil::geometry::points::{Attribute, Column, Points, Values};
 use frazil::io::{mesh, particles};
 use frazil::vdb::file::{self, WriteOptions};
 use frazil::vdb::{FloatGrid, GridClass, level_set};
@@ -53,7 +53,7 @@ fn near(value: f64, expected: f64, part: f64) {
 /// How far normals of a drop's surface turn from its middle's direction (rad): the root of the mean square.
 fn roughness(mesh: &TriMesh) -> f64 {
     let normals = mesh.normals();
-    let turned = |(normal, place): (&frazil::base::Vec3, &frazil::base::Vec3)| {
+    let turned = |(normal, place): (&frazil::geometry::Vec3, &frazil::geometry::Vec3)| {
         f64::from((normal - place.normalize()).norm_squared())
     };
     let sum: f64 = normals.iter().zip(&mesh.positions).map(turned).sum();

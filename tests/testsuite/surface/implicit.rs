@@ -1,6 +1,6 @@
 //! The particles' own surface: against plain sums, and closed.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::surface::{Implicit, Isosurface};
 
 use crate::common::liquids::{ball, context, filled, plain_phi, two_clouds};

@@ -1,6 +1,6 @@
 //! The liquids of known motion that gates use: their motion is what it says it is.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 
 use crate::common::made_sets::{Set, Vortex, sets};
 

@@ -1,7 +1,7 @@
 //! Two bodies that pass by each other: the mesh is one where their particles' surface is, and nowhere else.
 
-use frazil::base::DVec3;
-use frazil::base::topology::bodies;
+use frazil::geometry::DVec3;
+use frazil::geometry::check::topology::bodies;
 use frazil::surface::{Params, Tracker};
 
 use crate::common::liquids::{context, filled, numbered, own_surface};

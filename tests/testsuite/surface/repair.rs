@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use frazil::base::faults::Faults;
-use frazil::base::mesh::coincident;
-use frazil::base::topology::Topology;
-use frazil::base::{TriMesh, Vec3};
+use frazil::geometry::check::faults::Faults;
+use frazil::geometry::check::topology::Topology;
+use frazil::geometry::mesh::coincident;
+use frazil::geometry::{TriMesh, Vec3};
 use frazil::surface::{RepairReport, Repaired, Source, repair};
 
 use crate::common::bodies::{icosphere, models};

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use frazil::base::arrays::{MeshArray, Number, On};
-use frazil::base::points::{Attribute, Column, Values};
-use frazil::base::{DVec3, DetailedMesh, Points, TriMesh, Uvs, Vec3};
+use frazil::geometry::mesh::attributes::{MeshArray, Number, On};
+use frazil::geometry::points::{Attribute, Column, Values};
+use frazil::geometry::{DVec3, DetailedMesh, Points, TriMesh, Uvs, Vec3};
 use frazil::io::{mesh, particles};
 
 use crate::common::character::{are_same, output};

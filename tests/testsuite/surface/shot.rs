@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use frazil::base::arrays::{MeshArray, Number, On};
-use frazil::base::points::{Attribute, Column, Values};
-use frazil::base::{DVec3, DetailedMesh, Points, TriMesh, Uvs};
+use frazil::geometry::mesh::attributes::{MeshArray, Number, On};
+use frazil::geometry::points::{Attribute, Column, Values};
+use frazil::geometry::{DVec3, DetailedMesh, Points, TriMesh, Uvs};
 use frazil::io::{mesh, particles};
 
 use crate::common::character::output;
@@ -278,7 +278,7 @@ fn velocities_alone_are_enough_and_ids_alone_too() {
             ),
         );
         let mesh = frame(folder, name, 4).mesh;
-        let far = |(place, first): (&frazil::base::Vec3, &frazil::base::Vec3)| {
+        let far = |(place, first): (&frazil::geometry::Vec3, &frazil::geometry::Vec3)| {
             (place.cast::<f64>() - motion(first.cast(), 3.0)).norm() / ball.spacing
         };
         let most = mesh.positions.iter().zip(&ball.mesh.positions).map(far).fold(0.0, f64::max);
@@ -306,7 +306,7 @@ fn velocities_are_brought_into_the_shot_s_space_under_any_name() {
         points.attributes.push(Attribute { name: "Velocity".into(), values: speed });
         particles::write(&folder.join(format!("up.{frame:04}.bgeo")), &points, false).unwrap();
     }
-    let places = |p: &frazil::base::Vec3| frazil::base::Vec3::new(p.x, -p.z, p.y) * 100.0;
+    let places = |p: &frazil::geometry::Vec3| frazil::geometry::Vec3::new(p.x, -p.z, p.y) * 100.0;
     let positions = ball.mesh.positions.iter().map(places).collect();
     let mesh = TriMesh { positions, triangles: ball.mesh.triangles.clone() };
     mesh::write(&folder.join("up.ply"), &mesh).unwrap();

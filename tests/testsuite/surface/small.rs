@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use frazil::base::points::{Attribute, Column, Values};
-use frazil::base::topology::bodies;
-use frazil::base::{DVec3, Points, TriMesh, Vec3};
+use frazil::geometry::check::topology::bodies;
+use frazil::geometry::points::{Attribute, Column, Values};
+use frazil::geometry::{DVec3, Points, TriMesh, Vec3};
 use frazil::io::{mesh, particles};
 use frazil::surface::{Implicit, Isosurface};
 

@@ -1,6 +1,6 @@
 //! Sheets and threads of liquid that are drawn out until they are thinner than their particles are apart: the surface encloses their mass.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::surface::{Params, Tracker};
 use nalgebra::{Rotation3, Unit};
 

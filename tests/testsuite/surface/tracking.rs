@@ -1,6 +1,6 @@
 //! Meshes that follow particles whose motion is known.
 
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::surface::{Params, Tracker, Weighting};
 
 use crate::common::liquids::{ball, context, filled, follow, numbered, turned};

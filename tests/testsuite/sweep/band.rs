@@ -1,7 +1,7 @@
 //! What turns keeps its narrow band: neighbour voxels of opposite sign have values that fit together.
 
 use crate::common::shapes;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::sweep::{self, Body, Settings};
 use frazil::vdb::{FloatGrid, level_set};

@@ -1,7 +1,7 @@
 //! The exact sweep against what can be known otherwise: formulas, sampled poses, and what must not matter.
 
 use crate::common::shapes;
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::motion::{Key, Keys, Morph, Motion, Rigid};
 use frazil::sweep::{self, Body, Settings};
 use frazil::vdb::{FloatGrid, file, level_set};

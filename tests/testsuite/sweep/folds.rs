@@ -2,7 +2,7 @@
 
 use crate::common::folded::{Elbow, Mirrored};
 use crate::common::shapes;
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::motion::{Key, Keys, Motion, Rigid};
 use frazil::sweep::{self, Body, Settings};
 use frazil::vdb::{FloatGrid, level_set};

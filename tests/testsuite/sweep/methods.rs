@@ -1,7 +1,7 @@
 //! The thesis' ways to sweep (Fig. 3.3) beside the chain, on a ball whose sweep is a capsule.
 
 use crate::common::shapes;
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::sweep::{self, Body, SamplesSettings, Settings};
 use frazil::vdb::{FloatGrid, level_set};

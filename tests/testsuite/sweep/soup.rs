@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use frazil::base::{DVec3, TriMesh, Vec3};
+use frazil::geometry::{DVec3, TriMesh, Vec3};
 use frazil::motion::{Key, Keys, Morph, Motion, Placed, Rigid, Space, Up};
 use frazil::snow::base_layer::initial::{self, Cover, Ground};
 use frazil::surface::repair;

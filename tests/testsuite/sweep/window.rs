@@ -1,7 +1,7 @@
 //! Only what can touch the window costs anything.
 
 use crate::common::shapes;
-use frazil::base::DVec3;
+use frazil::geometry::DVec3;
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::sweep::{Body, Lattice, Settings, UNITS, Window, voxelise, voxelise_within};
 use frazil::{Context, Pool};

@@ -5,8 +5,8 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use frazil::base::DVec3;
-use frazil::base::points::{Column, Points, Values};
+use frazil::geometry::DVec3;
+use frazil::geometry::points::{Column, Points, Values};
 use frazil::vdb::file::{Compression, WriteOptions};
 use frazil::vdb::guard::Guard;
 use frazil::vdb::{FloatGrid, MetaValue, file, points};

@@ -3,8 +3,8 @@
 
 use crate::common::shapes::{cuboid, sphere};
 use crate::common::tools;
-use frazil::base::TriMesh;
-use frazil::base::blocks::{Block, BlockEdit};
+use frazil::geometry::TriMesh;
+use frazil::numeric::blocks::{Block, BlockEdit};
 use frazil::vdb::file::{self, WriteOptions, to_bytes};
 use frazil::vdb::level_set::{self, Scheme};
 use frazil::vdb::{FloatGrid, MetaValue};
@@ -15,7 +15,7 @@ fn context(threads: usize) -> Context {
 }
 
 fn at(mut mesh: TriMesh, [x, y, z]: [f32; 3]) -> TriMesh {
-    mesh.positions.iter_mut().for_each(|p| *p += frazil::base::Vec3::new(x, y, z));
+    mesh.positions.iter_mut().for_each(|p| *p += frazil::geometry::Vec3::new(x, y, z));
     mesh
 }
 

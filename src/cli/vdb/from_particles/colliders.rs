@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::base::TriMesh;
+use frazil::geometry::TriMesh;
 use frazil::io::sequence::Pattern;
 use frazil::surface::HALF_WIDTH;
 use frazil::sweep::{Settings, voxelise_within};

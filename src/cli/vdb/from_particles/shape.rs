@@ -1,7 +1,7 @@
 //! The surface of one frame: a mesh, and the level set that fits it.
 
 use clap::ValueEnum;
-use frazil::base::{DVec3, TriMesh};
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{
     Distances, HALF_WIDTH, Implicit, Isosurface, is_sphere_radius, level_set, smooth, spheres,
 };

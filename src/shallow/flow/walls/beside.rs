@@ -4,7 +4,7 @@
 //! depth counts little: by the profile's part of the mean of phi^2. Where both surfaces stand apart as the ground does, up to a cell's edge, there is no
 //! wall but a slope, with a film on it. A dry edge that is not higher holds nothing back.
 
-use crate::base::cpu::dispatch;
+use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_mut, strip_of};
 use crate::shallow::flow::flux::{Step, greater, lesser};
 

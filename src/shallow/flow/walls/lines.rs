@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use super::{Liquid, Numbers, spread, within};
-use crate::base::cpu::dispatch;
+use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_mut, strip_of};
 use crate::shallow::flow::fast::{NORMAL, unpacked};
 use crate::shallow::flow::flux::{Step, greater, lesser};

@@ -151,8 +151,8 @@ impl Matching {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::DVec3;
     use crate::context::Pool;
+    use crate::geometry::DVec3;
 
     const SOLVERS: [Solver; 2] = [Solver::Sor, Solver::Gradients];
     /// How far the grid of two balls reaches from the origin on each axis (cells).

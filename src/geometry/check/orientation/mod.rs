@@ -9,11 +9,11 @@
 mod nesting;
 mod pieces;
 
-use self::pieces::Pieces;
 use super::edges::{edge_uses, imbalance, is_same_edge, parts_of};
 use super::topology::collapsed;
-use super::weld::Weld;
-use super::{DVec3, DetailedMesh, TriMesh};
+use crate::geometry::mesh::weld::Weld;
+use crate::geometry::{DVec3, DetailedMesh, TriMesh};
+use pieces::Pieces;
 
 /// What an open part bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Arrays of numbers that a mesh carries besides its places and texture coordinates: colours, masks, whatever its file has.
 
-use super::mesh::used;
-use super::{TriMesh, Uvs};
+use super::used;
+use crate::geometry::{TriMesh, Uvs};
 
 /// The type of an array's numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -139,7 +139,7 @@ impl DetailedMesh {
 
 impl MeshArray {
     /// The same for triangles: `corners` are theirs among those of the faces, `faces` the faces that they are of.
-    pub(super) fn of_triangles(self, corners: &[[usize; 3]], faces: &[usize]) -> Self {
+    pub(in crate::geometry) fn of_triangles(self, corners: &[[usize; 3]], faces: &[usize]) -> Self {
         let values = match self.on {
             On::Vertices => self.values,
             On::Corners => corners.as_flattened().iter().map(|&corner| self.values[corner]).collect(),

@@ -5,8 +5,8 @@
 //! 3.3): n corners take some n log n steps. Predicates are exact, on whole numbers. A polygon that touches or crosses itself
 //! may get diagonals that cross, or pieces that are not monotone: the former are left out, the latter cut ear by ear.
 
-use super::ears;
-use super::ears::Point;
+use super::ear_clipping;
+use super::ear_clipping::Point;
 
 /// Size of the square that the points are rounded into: finer than the 24 bits of their coordinates, and twice an area
 /// still fits 64 bits.
@@ -30,7 +30,10 @@ pub fn triangles(points: &[Point]) -> Vec<[usize; 3]> {
         cut.clear();
         if !cut_monotone(&places, &rank, &piece, &mut cut) {
             let own: Vec<Point> = piece.iter().map(|&corner| points[ring[corner]]).collect();
-            cut = ears::triangles(&own).into_iter().map(|triangle| triangle.map(|i| piece[i])).collect();
+            cut = ear_clipping::triangles(&own)
+                .into_iter()
+                .map(|triangle| triangle.map(|i| piece[i]))
+                .collect();
         }
         out.extend(cut.iter().map(|triangle| triangle.map(|corner| ring[corner])));
     }

@@ -1,9 +1,11 @@
 //! Meshes of polygons, and their triangles.
 
-use super::ears::{self, turn};
-use super::mesh::validate;
-use super::{DVec3, DetailedMesh, MeshArray, TriMesh, Uvs, Vec3, monotone};
+use super::validate;
 use crate::error::{Error, Result};
+use crate::geometry::triangulate::ear_clipping;
+use crate::geometry::triangulate::ear_clipping::turn;
+use crate::geometry::triangulate::monotone;
+use crate::geometry::{DVec3, DetailedMesh, MeshArray, TriMesh, Uvs, Vec3};
 
 /// Most corners of a polygon: cutting it takes some 300 bytes for each, which no limit of memory sees.
 const MOST_CORNERS: usize = 1 << 22;
@@ -132,7 +134,7 @@ impl PolygonMesh {
         if (0..count).all(|i| turn(flat[(i + count - 1) % count], flat[i], flat[(i + 1) % count]) >= 0.0) {
             return fan(&mut each);
         }
-        let cut = if count > FEW_CORNERS { monotone::triangles } else { ears::triangles };
+        let cut = if count > FEW_CORNERS { monotone::triangles } else { ear_clipping::triangles };
         cut(&flat).into_iter().for_each(each);
     }
 }

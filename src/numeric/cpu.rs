@@ -59,10 +59,10 @@ macro_rules! dispatch {
         fn avx2($($name: $kind),*) $(-> $out)? {
             $body($($name),*)
         }
-        match $crate::base::cpu::cpu_level() {
+        match $crate::numeric::cpu::cpu_level() {
             // SAFETY: the level was detected on this processor.
             #[cfg(target_arch = "x86_64")]
-            $crate::base::cpu::CpuLevel::Avx512 | $crate::base::cpu::CpuLevel::Avx2 => unsafe {
+            $crate::numeric::cpu::CpuLevel::Avx512 | $crate::numeric::cpu::CpuLevel::Avx2 => unsafe {
                 avx2($($name),*)
             },
             _ => $body($($name),*),
@@ -79,13 +79,13 @@ macro_rules! dispatch {
         fn avx512($($name: $kind),*) $(-> $out)? {
             $body($($name),*)
         }
-        match $crate::base::cpu::cpu_level() {
+        match $crate::numeric::cpu::cpu_level() {
             // SAFETY: the level was detected on this processor.
             #[cfg(target_arch = "x86_64")]
-            $crate::base::cpu::CpuLevel::Avx512 => unsafe { avx512($($name),*) },
+            $crate::numeric::cpu::CpuLevel::Avx512 => unsafe { avx512($($name),*) },
             // SAFETY: the level was detected on this processor.
             #[cfg(target_arch = "x86_64")]
-            $crate::base::cpu::CpuLevel::Avx2 => unsafe { avx2($($name),*) },
+            $crate::numeric::cpu::CpuLevel::Avx2 => unsafe { avx2($($name),*) },
             _ => $body($($name),*),
         }
     }};

@@ -2,11 +2,13 @@
 
 use super::nesting::{ASLANT, Shape, Turns, turns};
 use super::{Closing, Fate, Orientation};
-use crate::base::bvh::Bvh;
-use crate::base::doubles::{Doubles, copies};
-use crate::base::edges::{Agreement, Use, agree, edge_uses, imbalance, is_same_edge, parts_of, sound};
-use crate::base::topology::Sets;
-use crate::base::{DVec3, TriMesh};
+use crate::geometry::check::duplicates::{Doubles, copies};
+use crate::geometry::check::edges::{
+    Agreement, Use, agree, edge_uses, imbalance, is_same_edge, parts_of, sound,
+};
+use crate::geometry::check::topology::Sets;
+use crate::geometry::spatial::bvh::Bvh;
+use crate::geometry::{DVec3, TriMesh};
 
 /// Volumes of parts up to this many cubes of their size are none: rounding makes as much.
 const ROUNDING: f64 = 1e-12;

@@ -1,6 +1,6 @@
 //! A tree of boxes over a mesh's triangles, for queries by ray and by box.
 
-use super::{DVec3, TriMesh, Vec3};
+use crate::geometry::{DVec3, TriMesh, Vec3};
 
 /// Most triangles in a leaf.
 const LEAF: usize = 4;

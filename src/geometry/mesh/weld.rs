@@ -16,9 +16,9 @@
 //!
 //! The nearest corners are joined first, and never both ends of an edge: a triangle that is as thin as the rounding is kept.
 
-use super::DVec3;
-use super::mesh::coincident;
-use super::topology::Sets;
+use super::coincident;
+use crate::geometry::DVec3;
+use crate::geometry::check::topology::Sets;
 
 /// Corners may lie so many neighbouring 32-bit numbers apart on each axis.
 pub const STEPS: i64 = 4;
@@ -173,7 +173,7 @@ impl Ruler {
         let half = 0.5 * (0..3).map(side).fold(0.0, f32::max);
         // A power of two is where steps change.
         let from = f32::from_bits(half.to_bits() & 0x7f80_0000);
-        (from > 0.0 && from.is_finite()).then(|| Self { from, step: super::mesh::spacing(f64::from(from)) })
+        (from > 0.0 && from.is_finite()).then(|| Self { from, step: super::spacing(f64::from(from)) })
     }
 
     fn measure(self, places: &[[f32; 3]]) -> Vec<[i64; 3]> {

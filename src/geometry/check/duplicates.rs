@@ -5,16 +5,16 @@ use rayon::prelude::*;
 use super::edges::{Use, imbalance, is_same_edge, parts_of};
 
 /// What is there twice among triangles.
-pub(super) struct Doubles {
+pub(in crate::geometry) struct Doubles {
     /// Of each triangle whether it goes: it has the vertices of one before it, in any order.
-    pub(super) is_double: Vec<bool>,
+    pub(in crate::geometry) is_double: Vec<bool>,
     /// Of each triangle whether there is one that is turned the other way.
-    pub(super) is_two_sided: Vec<bool>,
+    pub(in crate::geometry) is_two_sided: Vec<bool>,
 }
 
 impl Doubles {
     /// Of triangles with these edges. Doubled triangles stay where they are the common walls of closed parts, which cancel.
-    pub(super) fn of(triangles: &[[u32; 3]], uses: &[Use]) -> Self {
+    pub(in crate::geometry) fn of(triangles: &[[u32; 3]], uses: &[Use]) -> Self {
         let count = triangles.len();
         let mut out = Self { is_double: vec![false; count], is_two_sided: vec![false; count] };
         let by_vertices = |(&[a, b, c], number): (&[u32; 3], u32)| {

@@ -5,7 +5,7 @@
 //! of 4.2 and 4.3); else its terms are summed without error as an expansion (theorem 10). Products of two coordinates have
 //! 48 bits and those of three 72, within the range of exponents: nothing overflows or underflows.
 
-use super::{DVec3, Vec3};
+use crate::geometry::{DVec3, Vec3};
 
 /// Largest relative error of one rounded operation.
 const EPSILON: f64 = f64::EPSILON / 2.0;

@@ -4,8 +4,8 @@
 //! Predicates* (Journal of Graphics Tools 8, 2003), with corners and edges in common. Two triangles whose planes differ meet
 //! along the line in which the planes do; the sign of four points orders the ends of both triangles there.
 
-use super::Vec3;
-use super::orient::{orient2d, orient3d};
+use super::predicates::{orient2d, orient3d};
+use crate::geometry::Vec3;
 
 /// How two triangles meet elsewhere than in the corners, or the edge, that they have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub enum Meeting {
 
 type Triangle = [Vec3; 3];
 
-/// How two triangles meet. Corners at the same place are in common; both have an area ([`super::orient::is_flat`]), and
+/// How two triangles meet. Corners at the same place are in common; both have an area ([`super::predicates::is_flat`]), and
 /// finite coordinates.
 pub fn meeting(first: &[Vec3; 3], second: &[Vec3; 3]) -> Meeting {
     let common = first.map(|corner| second.iter().position(|other| *other == corner));

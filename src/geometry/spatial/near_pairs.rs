@@ -7,7 +7,7 @@
 use std::cmp::Reverse;
 
 use super::bvh::Bvh;
-use super::{DVec3, TriMesh, Vec3};
+use crate::geometry::{DVec3, TriMesh, Vec3};
 
 /// Most triangles around a vertex that is no hub.
 const MOST: u32 = 16;
@@ -18,7 +18,7 @@ const MARGIN: f64 = 1e-6;
 type Span = (Vec3, Vec3);
 
 /// The triangles of a mesh, in trees of boxes.
-pub(super) struct Near<'a> {
+pub(in crate::geometry) struct Near<'a> {
     mesh: &'a TriMesh,
     /// Triangles without a hub.
     others: Boxes,
@@ -39,7 +39,7 @@ struct Fan {
 
 impl<'a> Near<'a> {
     /// Sorts triangles with an area each, and corners by place.
-    pub(super) fn of(mesh: &'a TriMesh) -> Self {
+    pub(in crate::geometry) fn of(mesh: &'a TriMesh) -> Self {
         let mut near = Self {
             mesh,
             others: Boxes::new(std::iter::empty()),
@@ -67,7 +67,7 @@ impl<'a> Near<'a> {
 
     /// Shows triangles that a triangle may meet elsewhere than in common corners and edges, or along a common edge; over
     /// all triangles every such pair is seen once, from one of its two sides.
-    pub(super) fn of_triangle(&self, triangle: usize, mut see: impl FnMut(usize)) {
+    pub(in crate::geometry) fn of_triangle(&self, triangle: usize, mut see: impl FnMut(usize)) {
         let (own, here) = (self.fan_of[triangle], span(self.mesh, triangle));
         self.others.touching(here, |other| {
             if own.is_some() || other > triangle {
@@ -147,8 +147,8 @@ impl Boxes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::meeting::{Meeting, meeting};
-    use crate::base::orient::is_flat;
+    use crate::geometry::check::intersection::{Meeting, meeting};
+    use crate::geometry::check::predicates::is_flat;
 
     /// Triangles on a coarse lattice, most of them around the first few vertices.
     fn tangle(seed: u64) -> TriMesh {

@@ -2,14 +2,14 @@
 
 use rayon::prelude::*;
 
-use super::bvh::Bvh;
-use super::meeting::{Meeting, meeting};
-use super::mesh::{coincident, used};
-use super::near::Near;
-use super::orient::is_flat;
+use super::intersection::{Meeting, meeting};
+use super::predicates::is_flat;
 use super::topology::{Survey, Topology, collapsed, firsts, groups, parts};
-use super::weld::Weld;
-use super::{DVec3, TriMesh};
+use crate::geometry::mesh::weld::Weld;
+use crate::geometry::mesh::{coincident, used};
+use crate::geometry::spatial::bvh::Bvh;
+use crate::geometry::spatial::near_pairs::Near;
+use crate::geometry::{DVec3, TriMesh};
 
 /// Triangles a task looks at.
 const GRAIN: usize = 512;
@@ -298,8 +298,8 @@ impl Pairs {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Vec3;
     use super::*;
+    use crate::geometry::Vec3;
 
     fn tetrahedron(at: f32) -> TriMesh {
         let shift = Vec3::new(at, at, at);

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use crate::base::bvh::Bvh;
-use crate::base::deviation::Facet;
-use crate::base::{DVec3, TriMesh, Vec3};
+use crate::geometry::check::deviation::Facet;
+use crate::geometry::spatial::bvh::Bvh;
+use crate::geometry::{DVec3, TriMesh, Vec3};
 
 /// Directions along which no edges of made meshes run: two of three decide.
 pub(super) const ASLANT: [DVec3; 3] = [

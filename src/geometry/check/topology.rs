@@ -76,26 +76,26 @@ pub fn bodies(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
 }
 
 /// Edges and fans of triangles with three different vertices each.
-pub(super) struct Survey {
+pub(in crate::geometry) struct Survey {
     /// Edges with one triangle, lesser vertex first.
-    pub(super) open: Vec<[u32; 2]>,
+    pub(in crate::geometry) open: Vec<[u32; 2]>,
     /// Edges with more than two triangles, lesser vertex first.
-    pub(super) crowded: Vec<[u32; 2]>,
+    pub(in crate::geometry) crowded: Vec<[u32; 2]>,
     /// Edges whose two triangles disagree, lesser vertex first.
-    pub(super) turned: Vec<[u32; 2]>,
+    pub(in crate::geometry) turned: Vec<[u32; 2]>,
     /// See [`Topology::non_manifold_vertices`].
-    pub(super) non_manifold: Vec<u32>,
+    pub(in crate::geometry) non_manifold: Vec<u32>,
     edges: usize,
     /// Fans of all vertices.
     fans: usize,
     /// Of each triangle the first one of its body: the part that hangs together by edges.
-    pub(super) body: Vec<u32>,
+    pub(in crate::geometry) body: Vec<u32>,
     bodies: usize,
     triangles: usize,
 }
 
 impl Survey {
-    pub(super) fn of(vertices: usize, triangles: &[[u32; 3]]) -> Self {
+    pub(in crate::geometry) fn of(vertices: usize, triangles: &[[u32; 3]]) -> Self {
         let corners = triangles.as_flattened();
         let (mut fans, mut bodies) = (Sets::new(corners.len()), Sets::new(triangles.len()));
         let mut on_crowded = vec![false; vertices];
@@ -139,7 +139,7 @@ impl Survey {
 
     /// Handles, summed over all bodies, where the surface is closed and no edge crowded. A vertex with several fans counts as
     /// that many, and bodies that touch in one are apart.
-    pub(super) fn genus(&self) -> Option<i64> {
+    pub(in crate::geometry) fn genus(&self) -> Option<i64> {
         let closed = self.open.is_empty() && self.crowded.is_empty() && self.triangles > 0;
         let euler = self.fans as i64 - self.edges as i64 + self.triangles as i64;
         closed.then_some(self.bodies as i64 - euler / 2)
@@ -147,12 +147,12 @@ impl Survey {
 }
 
 /// Whether a triangle names a vertex twice.
-pub(super) fn collapsed([a, b, c]: [u32; 3]) -> bool {
+pub(in crate::geometry) fn collapsed([a, b, c]: [u32; 3]) -> bool {
     a == b || b == c || c == a
 }
 
 /// Of each triangle whether none before it has the same vertices, in any order.
-pub(super) fn firsts(triangles: &[[u32; 3]]) -> Vec<bool> {
+pub(in crate::geometry) fn firsts(triangles: &[[u32; 3]]) -> Vec<bool> {
     let sorted = |(mut corners, index): ([u32; 3], u32)| {
         corners.sort_unstable();
         (corners, index)
@@ -208,7 +208,7 @@ pub fn around<T: Default + Copy + std::ops::AddAssign>(
 }
 
 /// Count of connected groups among those of so many vertices that links name.
-pub(super) fn groups(vertices: usize, links: impl Iterator<Item = [u32; 2]>) -> usize {
+pub(in crate::geometry) fn groups(vertices: usize, links: impl Iterator<Item = [u32; 2]>) -> usize {
     let (mut sets, mut named) = (Sets::new(vertices), vec![false; vertices]);
     for link in links {
         link.iter().for_each(|&vertex| named[vertex as usize] = true);
@@ -219,14 +219,14 @@ pub(super) fn groups(vertices: usize, links: impl Iterator<Item = [u32; 2]>) -> 
 
 /// Disjoint sets: each index leads to a lesser one of its set, the least to itself.
 #[derive(Clone)]
-pub(super) struct Sets(Vec<u32>);
+pub(in crate::geometry) struct Sets(Vec<u32>);
 
 impl Sets {
-    pub(super) fn new(count: usize) -> Self {
+    pub(in crate::geometry) fn new(count: usize) -> Self {
         Self((0..count as u32).collect())
     }
 
-    pub(super) fn root(&mut self, mut at: u32) -> u32 {
+    pub(in crate::geometry) fn root(&mut self, mut at: u32) -> u32 {
         while self.0[at as usize] != at {
             let up = self.0[self.0[at as usize] as usize];
             self.0[at as usize] = up;
@@ -235,7 +235,7 @@ impl Sets {
         at
     }
 
-    pub(super) fn join(&mut self, a: u32, b: u32) {
+    pub(in crate::geometry) fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         self.0[a.max(b) as usize] = a.min(b);
     }

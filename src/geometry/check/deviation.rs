@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::{DVec3, TriMesh, Vec3};
+use crate::geometry::{DVec3, TriMesh, Vec3};
 
 /// Most triangles in a leaf.
 const LEAF: usize = 4;
@@ -157,9 +157,9 @@ pub struct Nearest {
 
 /// A place on a facet, with the square of its distance (m2).
 #[derive(Clone, Copy)]
-pub(super) struct Found {
+pub(in crate::geometry) struct Found {
     place: DVec3,
-    pub(super) square: f64,
+    pub(in crate::geometry) square: f64,
     facet: usize,
 }
 
@@ -292,7 +292,7 @@ fn square_to((low, high): &Span, point: DVec3) -> f64 {
 }
 
 /// A triangle.
-pub(super) struct Facet {
+pub(in crate::geometry) struct Facet {
     corners: [Vec3; 3],
     triangle: u32,
     /// Whether only its edges are searched.
@@ -300,7 +300,7 @@ pub(super) struct Facet {
 }
 
 impl Facet {
-    pub(super) fn new(corners: [Vec3; 3], triangle: u32) -> Self {
+    pub(in crate::geometry) fn new(corners: [Vec3; 3], triangle: u32) -> Self {
         let [a, b, c] = corners.map(|corner| corner.cast::<f64>());
         let (ab, ac) = (b - a, c - a);
         let square = ab.cross(&ac).norm_squared();
@@ -311,7 +311,7 @@ impl Facet {
     /// Its place nearest to a point: over the face where the point lies on the inner side of all edges, else on one of these
     /// (Ericson, Real-Time Collision Detection, 2005, 5.1.5). The regions are told by planes along the edges and not, as there, by
     /// products of projections, whose rounding grows with the square of a needle's length.
-    pub(super) fn found(&self, point: DVec3, facet: usize) -> Found {
+    pub(in crate::geometry) fn found(&self, point: DVec3, facet: usize) -> Found {
         let [a, b, c] = self.corners.map(|corner| corner.cast::<f64>());
         let edges = [(a, b), (b, c), (c, a)];
         let normal = (b - a).cross(&(c - a));

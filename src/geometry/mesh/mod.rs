@@ -1,5 +1,10 @@
 //! Triangle meshes.
 
+pub mod attributes;
+pub mod polygons;
+pub mod uvs;
+pub mod weld;
+
 use super::{DVec3, Vec3};
 use crate::error::{Error, Result};
 

@@ -1,0 +1,18 @@
+//! Plain data that every room shares; knows no file format and no OpenVDB.
+
+pub mod check;
+pub mod mesh;
+pub mod points;
+pub mod spatial;
+pub(crate) mod triangulate;
+
+/// A point, direction or velocity in 32 bits: fields and mesh vertices (m, m/s).
+pub type Vec3 = nalgebra::Vector3<f32>;
+/// A point or direction in 64 bits: poses, transforms, conserved sums.
+pub type DVec3 = nalgebra::Vector3<f64>;
+
+pub use mesh::TriMesh;
+pub use mesh::attributes::{DetailedMesh, MeshArray};
+pub use mesh::polygons::PolygonMesh;
+pub use mesh::uvs::Uvs;
+pub use points::Points;

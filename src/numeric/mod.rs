@@ -1,0 +1,11 @@
+//! Numbers: vector instructions, blocks of voxels, and exact states as bytes.
+
+pub mod blocks;
+pub mod bytes;
+#[doc(hidden)]
+pub mod cpu;
+#[doc(hidden)]
+pub mod digits;
+#[doc(hidden)]
+pub mod lanes;
+pub mod packed;
