@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use frazil::geometry::DVec3;
-use frazil::io::points_ply;
+use frazil::io::particles::ply;
 
 use crate::columns::{self, D};
 use crate::harness::Harness;
@@ -45,7 +45,7 @@ fn collapsed(folder: &Path, places: &[DVec3]) -> Vec<DVec3> {
     let run = run.arg("snow").arg(folder.join("scene.toml")).arg("-o").arg(folder.join("out"));
     assert!(run.args(["-q", "--threads", "2"]).stderr(Stdio::null()).status().expect("frazil").success());
     let last = folder.join(format!("out/grains/grains.{FRAMES:04}.ply"));
-    let end = points_ply::read(&last).expect("grains").places;
+    let end = ply::read(&last).expect("grains").places;
     assert_eq!(end.len(), places.len(), "none is lost");
     end
 }

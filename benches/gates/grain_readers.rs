@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use frazil::io::usd_points;
+use frazil::io::usd;
 use frazil::snow::grains::Grains;
 use frazil::vdb::file::WriteOptions;
 use frazil::vdb::points;
@@ -51,7 +51,7 @@ pub fn run(h: &mut Harness) {
             return;
         };
         let [file, seen] = ["grains.usda", "ours"].map(|name| folder.path().join(name));
-        std::fs::write(&file, usd_points::frame("grains", FRAME, 24.0, &grains.points())).expect("a file");
+        std::fs::write(&file, usd::points::frame("grains", FRAME, 24.0, &grains.points())).expect("a file");
         std::fs::write(&seen, &ours).expect("a file");
         let answer = clients::usd_reads_grains(&python, &file, &seen, FRAME);
         let said = answer.as_ref().unwrap_or_else(|said| said);

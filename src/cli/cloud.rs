@@ -4,10 +4,12 @@ use std::path::{Path, PathBuf};
 
 use frazil::geometry::points::Values;
 use frazil::geometry::{DVec3, Points};
+use frazil::io::files::atomic;
+use frazil::io::files::sequence::Pattern;
 use frazil::io::mesh::extension;
+use frazil::io::particles::ply;
 use frazil::io::particles::{self, Cloud};
-use frazil::io::sequence::Pattern;
-use frazil::io::{atomic, points_ply, usd_points};
+use frazil::io::usd::points;
 use frazil::motion::Space;
 use frazil::scene::{FrameChoice, Frames};
 use frazil::{Error, Result};
@@ -79,7 +81,7 @@ pub fn is_one(input: &Path, output: &Path, frames: Option<&FrameChoice>) -> Resu
         }
         _ => Some(input.to_path_buf()).filter(|path| path.is_file()),
     };
-    one.map_or(Ok(false), |one| points_ply::holds_points(&one))
+    one.map_or(Ok(false), |one| ply::holds_points(&one))
 }
 
 /// Points of a file, and whether their voxels are more than a way to hold them.
@@ -194,7 +196,7 @@ impl Conversion<'_> {
             "usda" => {
                 let stem = self.input.file_stem().unwrap_or_default().to_string_lossy().into_owned();
                 let name = stem.split(['%', '#', '$', '.']).next().unwrap_or_default();
-                atomic::write_bytes(path, usd_points::frame(name, frame, self.fps, points).as_bytes())
+                atomic::write_bytes(path, points::frame(name, frame, self.fps, points).as_bytes())
             }
             _ => particles::write(path, points, *has_voxels),
         }

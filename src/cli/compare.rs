@@ -6,7 +6,7 @@ use frazil::geometry::TriMesh;
 use frazil::geometry::check::deviation::{
     Deviation, NearestTree, from_surface, from_vertices, second_differences,
 };
-use frazil::io::sequence::Pattern;
+use frazil::io::files::sequence::Pattern;
 use frazil::scene::FrameChoice;
 use frazil::{Context, Error, io};
 use serde_json::{Map, Value, json};

@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use frazil::geometry::mesh::attributes::On;
 use frazil::geometry::{MeshArray, TriMesh, Uvs, Vec3};
+use frazil::io;
+use frazil::io::files::atomic;
+use frazil::io::files::sequence::Pattern;
 use frazil::io::mesh::extension;
-use frazil::io::sequence::Pattern;
-use frazil::io::usd_points::VELOCITIES;
-use frazil::io::{self, atomic, usd};
+use frazil::io::usd;
+use frazil::io::usd::points::VELOCITIES;
 use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs};
 use frazil::scene::{FrameChoice, Frames};
 use serde_json::json;

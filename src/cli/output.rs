@@ -21,7 +21,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
     if path.is_dir() {
         return Err(Error::file(path, "is a folder, not a file to write"));
     }
-    if frazil::io::atomic::is_stream(path) {
+    if frazil::io::files::atomic::is_stream(path) {
         return Ok(());
     }
     let folder = match path.parent() {
@@ -50,7 +50,7 @@ pub fn refuse_input<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a Path>)
 /// Refuses to write a report over something else than a report.
 pub fn check_report(path: &Path) -> Result<()> {
     check_writable(path)?;
-    if !path.is_file() || frazil::io::atomic::is_stream(path) {
+    if !path.is_file() || frazil::io::files::atomic::is_stream(path) {
         return Ok(());
     }
     let bytes = std::fs::read(path).map_err(|error| Error::io(path, "read", error))?;
@@ -75,5 +75,5 @@ pub fn check_folder(folder: &Path) -> Result<()> {
 pub fn write_json(path: &Path, value: &serde_json::Value) -> Result<()> {
     let mut text = serde_json::to_string_pretty(value).expect("plain values become JSON");
     text.push('\n');
-    frazil::io::atomic::write_bytes(path, text.as_bytes())
+    frazil::io::files::atomic::write_bytes(path, text.as_bytes())
 }

@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 
 use frazil::geometry::mesh::attributes::On;
 use frazil::geometry::{DVec3, DetailedMesh, MeshArray, TriMesh};
+use frazil::io;
+use frazil::io::files::atomic;
+use frazil::io::files::sequence::Pattern;
 use frazil::io::mesh::extension;
-use frazil::io::sequence::Pattern;
-use frazil::io::{self, atomic, usd};
+use frazil::io::usd;
 use frazil::motion::{Character, is_gltf};
 use frazil::scene::{FrameChoice, Frames};
 use frazil::surface::{Prepared, Repaired, carry_attributes, repair};

@@ -58,7 +58,7 @@ impl Session {
         let signals = Signals::install(ctx.cancel_flags())
             .map_err(|error| Failure::refused(format!("cannot install signal handlers: {error}")))?;
         let [cancel, _] = ctx.cancel_flags();
-        frazil::io::source::stop_when(cancel.clone());
+        frazil::io::files::source::stop_when(cancel.clone());
         #[cfg(feature = "vdb")]
         guard::install(Guard {
             // The program as it runs, even if its file was replaced meanwhile.

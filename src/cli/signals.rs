@@ -49,7 +49,7 @@ impl Signals {
             }
             std::thread::sleep(GRACE);
             let code = code.load(Ordering::Relaxed) as u8;
-            frazil::io::atomic::abandon();
+            frazil::io::files::atomic::abandon();
             exit::say_stopped(code);
             // Destructors of other threads' data must not run.
             signal_hook::low_level::exit(code.into());

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use frazil::io::sequence::Pattern;
+use frazil::io::files::sequence::Pattern;
 use frazil::scene::{Frames, Scene, surface};
 
 use super::exit::{Failure, Phase};
@@ -77,7 +77,7 @@ impl Args {
 /// The frames of a sequence that are there, from the first to the last.
 fn there(particles: &Path) -> frazil::Result<Frames> {
     let Some(pattern) = Pattern::parse(particles) else {
-        frazil::io::source::open(particles)?;
+        frazil::io::files::source::open(particles)?;
         return Ok(Frames { first: 1, last: 1 });
     };
     let there = pattern.frames()?;

@@ -7,9 +7,9 @@ use super::drawn::Faces;
 use super::{Drawn, Motion, between};
 use crate::error::{Error, Result};
 use crate::geometry::{DVec3, PolygonMesh, Vec3};
+use crate::io::files::sequence::Pattern;
 use crate::io::mesh;
-use crate::io::seen::Seen;
-use crate::io::sequence::Pattern;
+use crate::io::records::input_hashes::Seen;
 
 /// Frames kept in memory: the two around the current time.
 const KEPT: usize = 2;

@@ -20,7 +20,7 @@ impl Picture {
     /// As [`Picture::png`]; what the system refuses.
     pub fn write(&self, path: &Path) -> Result<()> {
         let bytes = self.png().map_err(|error| Error::file(path, error.to_string()))?;
-        crate::io::atomic::write_bytes(path, &bytes)
+        crate::io::files::atomic::write_bytes(path, &bytes)
     }
 
     /// The bytes of a PNG file.

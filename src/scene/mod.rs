@@ -24,7 +24,7 @@ pub use text::{FrameChoice, Frames, Override, Value, Values, reference, template
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
-use crate::io::sequence::Pattern;
+use crate::io::files::sequence::Pattern;
 use crate::motion::Space;
 use crate::snow::NoiseParams;
 use std::path::{Path, PathBuf};

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::Scene;
-use crate::io::sequence::Pattern;
+use crate::io::files::sequence::Pattern;
 use crate::io::usd;
 
 /// The sequences of the objects that move, each with its offset (frames).

@@ -84,7 +84,7 @@ enum Source<'a> {
 /// # Errors
 /// A file that cannot be read, is not a regular file, is cut short or contradicts itself.
 pub(super) fn check(path: &Path) -> Result<Layout> {
-    let file = crate::io::source::open(path)?;
+    let file = crate::io::files::source::open(path)?;
     layout::read(BufReader::new(file)).map_err(|fault| match fault {
         Fault::Io(error) => Error::io(path, "read", error),
         Fault::Content(what) => Error::file(path, what),
@@ -95,7 +95,7 @@ fn source(path: &Path) -> Result<Source<'_>> {
     let layout = check(path)?;
     // A stream is read from memory, where its end is noticed.
     if layout.is_stream() {
-        let stored = stored(&crate::io::source::read(path)?);
+        let stored = stored(&crate::io::files::source::read(path)?);
         return stored.map_err(|what| Error::file(path, what));
     }
     let name = path.to_str().ok_or_else(|| Error::file(path, "the name is not valid UTF-8"))?;

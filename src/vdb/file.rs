@@ -8,7 +8,7 @@ use super::vectors::{AnyGrid, GridRef};
 use super::{decode, distances, guard, layout};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::io::hash::Hasher;
+use crate::io::files::hash::Hasher;
 
 /// How values are packed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -66,7 +66,7 @@ const UUID: std::ops::Range<usize> = 21..57;
 /// # Errors
 /// As [`to_bytes`], or what the operating system reports.
 pub fn write(path: &Path, grids: &[&FloatGrid], options: &WriteOptions) -> Result<()> {
-    crate::io::atomic::write_bytes(path, &to_bytes(grids, options)?)
+    crate::io::files::atomic::write_bytes(path, &to_bytes(grids, options)?)
 }
 
 /// As [`write()`], of grids of any kind.
@@ -74,7 +74,7 @@ pub fn write(path: &Path, grids: &[&FloatGrid], options: &WriteOptions) -> Resul
 /// # Errors
 /// As there.
 pub fn write_any(path: &Path, grids: &[GridRef<'_>], options: &WriteOptions) -> Result<()> {
-    crate::io::atomic::write_bytes(path, &any_to_bytes(grids, options)?)
+    crate::io::files::atomic::write_bytes(path, &any_to_bytes(grids, options)?)
 }
 
 /// The bytes of a .vdb file.

@@ -28,7 +28,7 @@ use super::points;
 use super::vectors::AnyGrid;
 use crate::error::{Error, Result, one_line};
 use crate::geometry::Points;
-use crate::io::manifest;
+use crate::io::records::manifest;
 
 /// Memory limit of a child for any file (bytes), and for each byte of the file: the most memory per byte is that of a node
 /// above the leaves, 260 kB for at least 8 kB, or of a leaf, 2.2 kB for at least 129 bytes.

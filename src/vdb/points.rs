@@ -87,7 +87,7 @@ pub fn to_bytes(ctx: &Context, name: &str, points: &Points, options: &WriteOptio
 /// # Errors
 /// As there, or what the operating system reports.
 pub fn write(ctx: &Context, path: &Path, name: &str, points: &Points, options: &WriteOptions) -> Result<()> {
-    crate::io::atomic::write_bytes(path, &to_bytes(ctx, name, points, options)?)
+    crate::io::files::atomic::write_bytes(path, &to_bytes(ctx, name, points, options)?)
 }
 
 /// The points of the grid of that name; without a name those of the file's first grid of points. Codecs of 16 and 8 bits are

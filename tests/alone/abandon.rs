@@ -1,7 +1,7 @@
 //! A process that ends at once leaves no file that it has begun. Other writers of this process would lose theirs.
 
 use crate::turn;
-use frazil::io::atomic;
+use frazil::io::files::atomic;
 
 #[test]
 fn what_is_begun_goes_when_a_process_ends_at_once() {

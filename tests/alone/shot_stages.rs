@@ -9,7 +9,7 @@ use std::time::Duration;
 use crate::common::character::output;
 use crate::program::CUBE;
 use crate::turn;
-use frazil::io::manifest::Keeps;
+use frazil::io::records::manifest::Keeps;
 use frazil::scene::shot::verify::verify;
 use frazil::scene::shot::{FrameFiles, Kind, Report, Run, Settings, Stage, Stepped, Stepping, Stored, To};
 use frazil::scene::{FrameChoice, Inputs, Scene, snow};

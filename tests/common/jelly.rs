@@ -7,7 +7,8 @@ use std::path::Path;
 use frazil::geometry::mesh::attributes::{Number, On};
 use frazil::geometry::points::{Column, Points, Values};
 use frazil::geometry::{DVec3, MeshArray, TriMesh};
-use frazil::io::{atomic, mesh, particles};
+use frazil::io::files::atomic;
+use frazil::io::{mesh, particles};
 
 use super::liquids::filled;
 use super::shapes::globe;

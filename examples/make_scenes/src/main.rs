@@ -26,7 +26,9 @@ use common::sleigh::sleigh;
 use common::walk::{Step, walk};
 use frazil::geometry::points::Points;
 use frazil::geometry::{DVec3, TriMesh, Vec3};
-use frazil::io::{atomic, mesh, points_ply};
+use frazil::io::files::atomic;
+use frazil::io::mesh;
+use frazil::io::particles::ply;
 
 fn main() -> frazil::Result<()> {
     let folder = std::env::args().nth(1).unwrap_or_else(|| "target/demo".into());
@@ -39,7 +41,7 @@ fn main() -> frazil::Result<()> {
     mesh::write(&folder.join("ball.obj"), &sphere(0.18, 32))?;
     mesh::write(&folder.join("sleigh.obj"), &sleigh())?;
     mesh::write(&folder.join("drifts.obj"), &drifts())?;
-    atomic::write_bytes(&folder.join("column.ply"), &points_ply::to_bytes(&column()?)?)?;
+    atomic::write_bytes(&folder.join("column.ply"), &ply::to_bytes(&column()?)?)?;
     atomic::write_bytes(&folder.join("hero.glb"), &hero::glb())?;
     // Some 15,000 particles under 144,000 triangles.
     Jelly::new(0.0125, 190).write(folder)?;

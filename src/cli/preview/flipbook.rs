@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use frazil::io::{atomic, sequence::Pattern};
+use frazil::io::files::atomic;
+use frazil::io::files::sequence::Pattern;
 use frazil::render::{Gif, Palette, Picture, delays};
 use frazil::{Error, Result};
 

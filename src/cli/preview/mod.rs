@@ -12,9 +12,9 @@ mod tint;
 use std::path::{Path, PathBuf};
 
 use frazil::geometry::DVec3;
-use frazil::io::atomic;
+use frazil::io::files::atomic;
+use frazil::io::files::sequence::Pattern;
 use frazil::io::mesh::extension;
-use frazil::io::sequence::Pattern;
 use frazil::render::{Camera, Light, Plane, Size};
 use frazil::scene::FrameChoice;
 

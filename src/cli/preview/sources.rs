@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use frazil::geometry::{DetailedMesh, Points, TriMesh};
-use frazil::io::sequence::Pattern;
+use frazil::io::files::sequence::Pattern;
 use frazil::motion::{Character, Play, is_gltf};
 #[cfg(feature = "vdb")]
 use frazil::vdb::FloatGrid;

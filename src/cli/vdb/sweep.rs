@@ -5,7 +5,7 @@ use crate::cli::exit::{Failure, Phase};
 use crate::cli::options::{MeshSpace, Origin, positive, triple};
 use crate::cli::session::Session;
 use frazil::geometry::{DVec3, TriMesh};
-use frazil::io::sequence::Pattern;
+use frazil::io::files::sequence::Pattern;
 use frazil::motion::{Key, Keys, MeshSequence, Morph, Motion, Placed, Rigid};
 use frazil::scene::Frames;
 use frazil::sweep::{self, Body, SamplesSettings, Settings};

@@ -11,8 +11,8 @@ use super::nodes::{Local, rotation};
 use super::{meshopt, uri};
 use crate::error::{Error, Result, one_line};
 use crate::geometry::DVec3;
-use crate::io::hash::Hasher;
-use crate::io::source;
+use crate::io::files::hash::Hasher;
+use crate::io::files::source;
 
 /// A parsed file with its binary data.
 pub(super) struct File {

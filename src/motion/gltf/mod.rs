@@ -18,7 +18,7 @@ use super::{Drawn, Motion};
 use crate::error::{Error, Result};
 use crate::geometry::mesh::{renumbered, used};
 use crate::geometry::{DVec3, TriMesh};
-use crate::io::caught::caught;
+use crate::io::files::caught::caught;
 use clip::{Clip, JUMP};
 use file::File;
 use nodes::Node;

@@ -7,7 +7,7 @@ use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 
 use crate::error::Result;
-use crate::io::source;
+use crate::io::files::source;
 
 /// Why a buffer cannot be had: behind its name.
 pub(super) type Told<T> = std::result::Result<T, String>;

@@ -5,7 +5,7 @@ use super::terrain::Terrain;
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::TriMesh;
-use crate::io::seen::Seen;
+use crate::io::records::input_hashes::Seen;
 use crate::scene::Scene;
 
 /// The surroundings of a scene's liquid at a frame (m).

@@ -36,7 +36,7 @@ pub use {
 
 use super::text::{Value, Values};
 use super::{KeyPose, Role};
-use crate::io::sequence::Pattern;
+use crate::io::files::sequence::Pattern;
 use crate::motion::{Space, Up};
 use crate::shallow::falls::Falls;
 use crate::shallow::flows::FlowPoint;

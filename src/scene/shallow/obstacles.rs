@@ -5,7 +5,7 @@ use nalgebra::Rotation3;
 use super::{Form, Obstacle, Shallow};
 use crate::error::Result;
 use crate::geometry::{DVec3, TriMesh, Vec3};
-use crate::io::seen::Seen;
+use crate::io::records::input_hashes::Seen;
 use crate::motion::{Key, Keys};
 use crate::scene::KeyPose;
 use crate::shallow::terrain::shapes::Shape;

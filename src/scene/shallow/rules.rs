@@ -2,8 +2,8 @@
 
 use super::{Form, Obstacle, Shallow, scalars};
 use crate::error::Result;
+use crate::io::files::sequence::Pattern;
 use crate::io::mesh::{EXTENSIONS, extension};
-use crate::io::sequence::Pattern;
 use crate::scene::text::{Table, Value, Values};
 
 impl Shallow {

@@ -9,9 +9,10 @@ use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{MeshArray, TriMesh};
-use crate::io::manifest::Keeps;
-use crate::io::usd_looks::Look;
-use crate::io::{mesh, usd, usd_primvars};
+use crate::io::records::manifest::Keeps;
+use crate::io::usd::materials::Look;
+use crate::io::usd::primvars;
+use crate::io::{mesh, usd};
 use crate::scene::shot::{
     CONTENT, Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Report, Settings, Stage, Stepped, Stepping,
     Stored, To, Volume,
@@ -204,7 +205,7 @@ impl Stage for Liquid<'_> {
 
     fn clip(&self) -> Option<Clip<'_>> {
         let arrays = Drawn::empty(self.of).arrays(self.of.output);
-        let primvars = usd_primvars::primvars(&arrays.iter().collect::<Vec<&MeshArray>>());
+        let primvars = primvars::primvars(&arrays.iter().collect::<Vec<&MeshArray>>());
         let mesh = MovingMesh { name: NAME.into(), look: self.look(), uvs: None, primvars };
         Some(Clip { kind: NAME, manifest: MANIFEST, prims: Prims::Meshes(vec![mesh]) })
     }

@@ -8,20 +8,19 @@ use crate::error::{Error, Result};
 use crate::geometry::check::orientation::Orientation;
 use crate::geometry::mesh::weld::Weld;
 use crate::geometry::{DVec3, TriMesh};
+#[cfg(feature = "vdb")]
+use crate::io::files::hash;
+#[cfg(feature = "cli")]
+use crate::io::image;
 use crate::io::mesh::{extension, parse_polygons_from};
-use crate::io::seen::Seen;
+use crate::io::records::input_hashes::Seen;
 use crate::motion::Space;
 use crate::shallow::grid::{Grid, Heights};
 use crate::shallow::terrain::facing::facing;
+use crate::shallow::terrain::height;
+use crate::shallow::terrain::sampler;
 use crate::shallow::terrain::{Solids, triangles};
-#[cfg(feature = "cli")]
-use crate::{io::grey, shallow::terrain::height};
-#[cfg(feature = "vdb")]
-use crate::{
-    io::hash,
-    shallow::terrain::sampler,
-    vdb::{FloatGrid, GridClass, file},
-};
+use crate::vdb::{FloatGrid, GridClass, file};
 
 /// What the liquid flows over (m).
 pub(super) enum Terrain {
@@ -29,7 +28,7 @@ pub(super) enum Terrain {
     Mesh(TriMesh),
     /// A grey image around the origin.
     #[cfg(feature = "cli")]
-    Image(grey::Grey, ImagePlace),
+    Image(image::Grey, ImagePlace),
     /// A level set.
     #[cfg(feature = "vdb")]
     Grid(FloatGrid),
@@ -163,7 +162,7 @@ pub(super) fn read_mesh(path: &Path, space: Space, seen: &Seen) -> Result<TriMes
 
 #[cfg(feature = "cli")]
 fn of_image(path: &Path, place: ImagePlace, seen: &Seen) -> Result<Terrain> {
-    Ok(Terrain::Image(grey::parse(path, &seen.read(path)?)?, place))
+    Ok(Terrain::Image(image::parse(path, &seen.read(path)?)?, place))
 }
 
 #[cfg(not(feature = "cli"))]
@@ -173,7 +172,7 @@ fn of_image(path: &Path, _place: ImagePlace, _seen: &Seen) -> Result<Terrain> {
 
 /// A point of each pixel, at its middle.
 #[cfg(feature = "cli")]
-fn relief(image: &grey::Grey, place: ImagePlace) -> TriMesh {
+fn relief(image: &image::Grey, place: ImagePlace) -> TriMesh {
     let [across, down] = image.size;
     let [black, white] = place.heights;
     let at =

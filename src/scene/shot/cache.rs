@@ -11,10 +11,10 @@ use super::settings::{self, Settings};
 use super::stage::Stage;
 use super::stored::Stored;
 use crate::error::{Error, Result};
-use crate::io::hash::Hasher;
-use crate::io::manifest::Manifest;
-use crate::io::sealed;
-use crate::io::seen::Seen;
+use crate::io::files::hash::Hasher;
+use crate::io::records::checksummed;
+use crate::io::records::input_hashes::Seen;
+use crate::io::records::manifest::Manifest;
 use crate::scene::FrameChoice;
 
 /// Frames from one on were made with these settings.
@@ -85,7 +85,7 @@ impl Cache {
     pub fn open(stage: &dyn Stage, seen: &Arc<Seen>, folder: &Path, asked: Asked<'_>) -> Result<Self> {
         let settings = stage.settings()?;
         let path = record_path(folder, stage);
-        let mut record: Record = sealed::read(&path)?.unwrap_or_default();
+        let mut record: Record = checksummed::read(&path)?.unwrap_or_default();
         let mut stored = Stored::read(folder, stage.name())?;
         refuse_asked(stage, asked, &stored)?;
         let Asked { first, frames, from } = asked.of(stage, &stored);
@@ -149,7 +149,7 @@ impl Cache {
         upstream: &[&Stored],
     ) -> Result<()> {
         let stored = Stored::read(folder, stage.name())?;
-        let record: Record = sealed::read(&record_path(folder, stage))?.unwrap_or_default();
+        let record: Record = checksummed::read(&record_path(folder, stage))?.unwrap_or_default();
         // Frames that are not there are reported by themselves.
         let Some(last) = record.segments.last().filter(|_| stored.frames().next().is_some()) else {
             return Ok(());
@@ -178,8 +178,8 @@ impl Cache {
             self.stored.remove(&manifest)?;
         }
         let path = record_path(self.stored.folder(), stage);
-        if sealed::read(&path)?.as_ref() != Some(&self.record) {
-            sealed::write(&path, &self.record)?;
+        if checksummed::read(&path)?.as_ref() != Some(&self.record) {
+            checksummed::write(&path, &self.record)?;
         }
         Ok(())
     }

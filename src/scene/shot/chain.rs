@@ -7,9 +7,9 @@ use std::sync::Arc;
 use super::stage::Stage;
 use super::stored::Stored;
 use crate::error::{Error, Result};
-use crate::io::hash::Hasher;
-use crate::io::manifest::{Manifest, Written};
-use crate::io::seen::Seen;
+use crate::io::files::hash::Hasher;
+use crate::io::records::input_hashes::Seen;
+use crate::io::records::manifest::{Manifest, Written};
 
 /// Hashes of the frames from a start on.
 pub(super) struct Chain {

@@ -10,7 +10,8 @@ use super::stage::Stage;
 use super::stored::record_of;
 use super::usd;
 use crate::error::{Error, Result};
-use crate::io::{atomic, hash, sealed};
+use crate::io::files::{atomic, hash};
+use crate::io::records::checksummed;
 use crate::scene::FrameChoice;
 
 /// The scene with its defaults.
@@ -65,7 +66,7 @@ impl Own {
     /// A record that is damaged.
     pub fn read<'s>(folder: &Path, stages: impl Iterator<Item = &'s dyn Stage>) -> Result<Self> {
         let folder = folder.to_path_buf();
-        let written: Option<Files> = sealed::read(&folder.join("state").join(FILES))?;
+        let written: Option<Files> = checksummed::read(&folder.join("state").join(FILES))?;
         let mut known = written.clone().unwrap_or_default();
         for stage in stages {
             let before = known.stages.remove(stage.name()).and_then(|begun| begun.frames);
@@ -193,7 +194,7 @@ impl Own {
 
     fn save(&mut self) -> Result<()> {
         if self.written.as_ref() != Some(&self.known) {
-            sealed::write(&self.folder.join("state").join(FILES), &self.known)?;
+            checksummed::write(&self.folder.join("state").join(FILES), &self.known)?;
             self.written = Some(self.known.clone());
         }
         Ok(())

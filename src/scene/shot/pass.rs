@@ -13,8 +13,9 @@ use super::stage::{FrameFiles, Report, Stage, Stepped, Stepping, To};
 use super::stored::Stored;
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
-use crate::io::manifest::{Keeps, Manifest};
-use crate::io::{atomic, sealed};
+use crate::io::files::atomic;
+use crate::io::records::checksummed;
+use crate::io::records::manifest::{Keeps, Manifest};
 
 /// So many frames on end that cannot be written are no accident of one name, but a disk that is full or gone.
 const FAILURES: usize = 3;
@@ -280,11 +281,11 @@ impl<S: Stepping> Files<'_, S> {
     fn write_report(&self, frame: i32, report: &Report) -> Result<()> {
         let time = |time: &PhaseTime| json!({ "name": time.name, "seconds": time.time.as_secs_f64() });
         let mut text = report.results.clone();
-        text.insert("check".into(), sealed::UNSTAMPED.into());
+        text.insert("check".into(), checksummed::UNSTAMPED.into());
         text.insert("frame".into(), frame.into());
         text.insert("phases".into(), report.phases.iter().map(time).collect());
         let text = serde_json::Value::Object(text);
         let path = self.folder.join("report").join(format!("{}.{frame:04}.json", self.stage.name()));
-        atomic::write_bytes(&path, sealed::stamp(&format!("{text:#}\n")).as_bytes())
+        atomic::write_bytes(&path, checksummed::stamp(&format!("{text:#}\n")).as_bytes())
     }
 }

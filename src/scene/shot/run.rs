@@ -16,8 +16,8 @@ use super::stored::Stored;
 use super::usd;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::io::manifest::Manifest;
-use crate::io::seen::Seen;
+use crate::io::records::input_hashes::Seen;
+use crate::io::records::manifest::Manifest;
 use crate::scene::{FrameChoice, Scene};
 
 /// A scene with its stages, those that others read first.

@@ -9,8 +9,8 @@ use super::stored::Stored;
 use super::usd::{Clip, Volume};
 use crate::context::{Context, PhaseTime};
 use crate::error::Result;
-use crate::io::atomic;
-use crate::io::manifest::{Keeps, Written};
+use crate::io::files::atomic;
+use crate::io::records::manifest::{Keeps, Written};
 
 /// A folder of a stage's files: `base/base.0012.vdb`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

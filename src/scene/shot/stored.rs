@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::error::{Error, Result};
-use crate::io::manifest::{Keeps, Manifest, Written};
-use crate::io::sealed;
+use crate::io::records::checksummed;
+use crate::io::records::manifest::{Keeps, Manifest, Written};
 
 /// The frames of a stage that a folder holds.
 pub struct Stored {
@@ -155,7 +155,7 @@ impl Stored {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             other => other.map_err(|error| Error::io(&path, "read", error))?,
         };
-        let report = serde_json::from_slice(&bytes).ok().filter(|_| sealed::is_stamped(&bytes));
+        let report = serde_json::from_slice(&bytes).ok().filter(|_| checksummed::is_stamped(&bytes));
         report.map(Some).ok_or_else(|| Error::file(path, "is not the report that was written"))
     }
 

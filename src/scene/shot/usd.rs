@@ -6,9 +6,9 @@ use super::stage::Stage;
 use super::stored::Stored;
 use crate::error::Result;
 use crate::geometry::{Points, Uvs};
+use crate::io::usd::materials::Look;
+use crate::io::usd::primvars::Primvar;
 use crate::io::usd::{self, Field};
-use crate::io::usd_looks::Look;
-use crate::io::usd_primvars::Primvar;
 
 /// The shot for programs that read USD.
 pub(super) const SHOT: &str = "shot.usda";

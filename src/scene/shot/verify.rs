@@ -11,8 +11,8 @@ use super::stored::record_of;
 use super::usd;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::io::manifest::{Manifest, Written};
-use crate::io::sealed;
+use crate::io::records::checksummed;
+use crate::io::records::manifest::{Manifest, Written};
 
 /// What a folder's runs wrote besides the records of frames.
 const FILES: &str = "state/files.json";
@@ -64,7 +64,7 @@ pub fn verify(ctx: &Context, folder: &Path) -> Result<Verified> {
         let record = format!("state/{stage}.json");
         if !folder.join(&record).exists() {
             damaged.push(Damage { file: record.clone(), what: "is missing".into() });
-        } else if let Err(error) = sealed::read::<serde_json::Value>(&folder.join(&record)) {
+        } else if let Err(error) = checksummed::read::<serde_json::Value>(&folder.join(&record)) {
             damaged.push(told(&record, error));
         }
         known.insert(record);
@@ -130,7 +130,7 @@ fn state_of<'a>(folder: &Path, manifest: &'a Manifest) -> Option<&'a Written> {
 
 fn report_fault(folder: &Path, name: &str) -> Option<Damage> {
     let what = match std::fs::read(folder.join(name)) {
-        Ok(bytes) if sealed::is_stamped(&bytes) => return None,
+        Ok(bytes) if checksummed::is_stamped(&bytes) => return None,
         Ok(_) => "is not the report that was written".to_string(),
         Err(error) => Error::io(folder.join(name), "read", error).to_string(),
     };

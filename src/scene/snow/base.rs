@@ -6,7 +6,7 @@ use super::inputs::Inputs;
 use super::settings;
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
-use crate::io::manifest::Keeps;
+use crate::io::records::manifest::Keeps;
 use crate::io::usd::{Field, Holds};
 use crate::scene::shot::{
     FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,

@@ -13,8 +13,8 @@ use crate::geometry::points::Values;
 use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh};
 use crate::io::mesh::extension;
-use crate::io::points_ply;
-use crate::io::seen::Seen;
+use crate::io::particles::ply;
+use crate::io::records::input_hashes::Seen;
 use crate::scene::Scene;
 use crate::scene::text::rounded;
 use crate::snow::grains::{FASTEST, Grains, Params};
@@ -49,7 +49,7 @@ impl Drift {
         let Some(path) = file(scene) else { return Ok(None) };
         seen.hash(path)?;
         let (places, attributes) = if extension(path) == "ply" {
-            let cloud = points_ply::read(path)?;
+            let cloud = ply::read(path)?;
             (cloud.places, cloud.attributes)
         } else {
             if let Some(since) = changes_since(path)? {

@@ -11,7 +11,7 @@ use super::base;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::points::{Column, Points, Values};
-use crate::io::hash::Hasher;
+use crate::io::files::hash::Hasher;
 use crate::io::mesh::extension;
 use crate::scene::Scene;
 use crate::scene::shot::{FrameFiles, Stored};

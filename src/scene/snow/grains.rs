@@ -13,8 +13,9 @@ use super::{base, drift};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::{DVec3, Points, TriMesh};
-use crate::io::manifest::Keeps;
-use crate::io::{points_ply, usd_points};
+use crate::io::particles::ply;
+use crate::io::records::manifest::Keeps;
+use crate::io::usd::points;
 use crate::scene::shot::{
     Clip, FrameFiles, Kind, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
 };
@@ -346,11 +347,11 @@ impl Stepping for Grains<'_> {
                 grain_files::write(&writer.ctx, self.scene, files, &points, before)?;
             }
             if output.grains_ply {
-                files.save("grains", "ply", &points_ply::to_bytes(&points)?)?;
+                files.save("grains", "ply", &ply::to_bytes(&points)?)?;
             }
             if output.grains_usd {
                 let points = told_apart(points.clone());
-                let text = usd_points::frame("grains", files.frame, self.scene.shot.fps, &points);
+                let text = points::frame("grains", files.frame, self.scene.shot.fps, &points);
                 files.save("grains", "usda", text.as_bytes())?;
             }
             files.save_state(&grains.save())?;

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::flow::{Solids, Tiles};
 use crate::geometry::points::Values;
 use crate::geometry::{DVec3, Points, TriMesh};
-use crate::io::manifest::Keeps;
+use crate::io::records::manifest::Keeps;
 use crate::io::usd::{Field, Holds};
 use crate::motion::{Keys, Rigid};
 use crate::scene::shot::{

@@ -1,7 +1,7 @@
 //! What the base layer depends on.
 
 use crate::error::Result;
-use crate::io::seen::Seen;
+use crate::io::records::input_hashes::Seen;
 use crate::scene::shot::Settings;
 use crate::scene::text::key::{Key, Scope};
 use crate::scene::text::keys::{self, settings_of};

@@ -10,8 +10,8 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::points::Values;
 use crate::geometry::{DVec3, Points, TriMesh};
-use crate::io::manifest::Keeps;
 use crate::io::mesh;
+use crate::io::records::manifest::Keeps;
 use crate::io::usd::{self, Field, Holds};
 use crate::scene::shot::{
     Clip, FrameFiles, Kind, Prims, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,

@@ -11,10 +11,10 @@ use crate::geometry::check::faults::Faults;
 use crate::geometry::check::orientation::{Closing, Orientation};
 use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{DetailedMesh, MeshArray, TriMesh, mesh as base_mesh};
+use crate::io::files::sequence::Pattern;
+use crate::io::files::source;
 use crate::io::mesh::{extension, parse_polygons_from};
-use crate::io::seen::Seen;
-use crate::io::sequence::Pattern;
-use crate::io::source;
+use crate::io::records::input_hashes::Seen;
 use crate::scene::Scene;
 use crate::surface::{
     Implicit, Isosurface, Particles, Prepared, Repaired, carry_attributes, estimate_spacing, repair,

@@ -39,7 +39,7 @@ pub use {
 
 use super::Frames;
 use super::text::{Value, Values};
-use crate::io::sequence::Pattern;
+use crate::io::files::sequence::Pattern;
 use crate::motion::{Space, Up};
 use crate::surface::Weighting;
 

@@ -8,7 +8,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{DetailedMesh, MeshArray, Uvs};
-use crate::io::sequence::Pattern;
+use crate::io::files::sequence::Pattern;
 use crate::scene::Frames;
 
 /// Arrays of shares: a byte is a 255th of what a float is.

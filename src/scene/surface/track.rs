@@ -8,9 +8,10 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{DetailedMesh, MeshArray, TriMesh, Vec3};
-use crate::io::manifest::Keeps;
-use crate::io::usd_looks::Look;
-use crate::io::{mesh, usd, usd_primvars};
+use crate::io::records::manifest::Keeps;
+use crate::io::usd::materials::Look;
+use crate::io::usd::primvars;
+use crate::io::{mesh, usd};
 use crate::scene::shot::{
     CONTENT, Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Settings, Stage, Stepped, Stepping, Stored, To,
 };
@@ -148,7 +149,7 @@ impl Stage for Track<'_> {
     fn clip(&self) -> Option<Clip<'_>> {
         let (mesh, of_frame) = (&self.inputs.mesh, self.arrays(&[], &[], Some(0)));
         let arrays: Vec<&MeshArray> = self.carried(mesh).chain(&of_frame).collect();
-        let primvars = usd_primvars::primvars(&arrays);
+        let primvars = primvars::primvars(&arrays);
         let uvs = mesh.uvs.as_ref();
         let meshes = vec![MovingMesh { name: NAME.into(), look: Look::Object, uvs, primvars }];
         Some(Clip { kind: NAME, manifest: MANIFEST, prims: Prims::Meshes(meshes) })

@@ -5,9 +5,9 @@ use std::sync::LazyLock;
 use super::key::Scope::{First, Object, Step};
 use super::key::{Key, Kind, OBJECT, Scope};
 use crate::error::Result;
+use crate::io::files::sequence::Pattern;
 use crate::io::mesh::EXTENSIONS;
-use crate::io::seen::Seen;
-use crate::io::sequence::Pattern;
+use crate::io::records::input_hashes::Seen;
 use crate::scene::shot::{CONTENT, Settings};
 use crate::scene::{Role, Scene, System, shallow, snow, surface};
 

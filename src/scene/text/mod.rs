@@ -29,7 +29,7 @@ mod tests {
     use super::keys::{self, settings_of};
     use super::values::path;
     use super::*;
-    use crate::io::seen::Seen;
+    use crate::io::records::input_hashes::Seen;
     use crate::scene::{Scene, System};
     use std::path::Path;
 

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use crate::common::shapes;
 use frazil::geometry::spatial::bvh::Bvh;
 use frazil::geometry::{DVec3, TriMesh, Vec3};
+use frazil::io::files::sequence::Pattern;
 use frazil::io::mesh;
-use frazil::io::sequence::Pattern;
 use frazil::motion::{Key, Keys, MeshSequence, Motion, Placed, Rigid, Space, Up};
 use proptest::prelude::*;
 

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use frazil::io::manifest::{Keeps, Manifest, Written};
+use frazil::io::records::manifest::{Keeps, Manifest, Written};
 use frazil::numeric::blocks::{Block, BlockEdit};
 use frazil::vdb::file::{WriteOptions, to_bytes};
 use frazil::vdb::{FloatGrid, GridClass};

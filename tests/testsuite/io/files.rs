@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use crate::common::shapes::{blob, cuboid};
 use frazil::geometry::{TriMesh, Vec3};
-use frazil::io::{atomic, mesh};
+use frazil::io::files::atomic;
+use frazil::io::mesh;
 use proptest::prelude::*;
 
 /// Writes `content` to `name` in a fresh folder.

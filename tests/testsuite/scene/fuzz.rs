@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use crate::common::character;
 use crate::program::{CUBE, fails, works};
-use frazil::io::{sealed, sequence::Pattern};
+use frazil::io::files::sequence::Pattern;
+use frazil::io::records::checksummed;
 use frazil::scene::shot::Run;
 use frazil::scene::shot::verify::verify;
 use frazil::scene::snow::{self, check};
@@ -245,7 +246,7 @@ fn ten_thousand_changed_records_are_used_or_refused() {
         } else {
             let mut content = serde_json::from_str::<Value>(&whole).unwrap()["content"].take();
             changed(&mut random, &mut content);
-            sealed::sealed(&content).unwrap()
+            checksummed::sealed(&content).unwrap()
         };
         fs::write(&record, &text).unwrap();
         survives(&text, || {

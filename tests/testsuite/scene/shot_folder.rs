@@ -210,7 +210,7 @@ fn a_record_names_no_files_outside_its_frame() {
         let record = folder.path().join("out/state/base.0003.json");
         let before = fs::read_to_string(&record).unwrap();
         let crafted: serde_json::Value = serde_json::from_str(&before.replace(name, foreign)).unwrap();
-        frazil::io::sealed::write(&record, &crafted["content"]).unwrap();
+        frazil::io::records::checksummed::write(&record, &crafted["content"]).unwrap();
         fails(folder.path(), "snow shot.toml -o out --from 2", 2, &["base.0003.json", foreign]);
         assert!(
             folder.path().join("precious").exists() && folder.path().join("out/base/base.0002.vdb").exists()

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use frazil::geometry::DVec3;
 use frazil::geometry::points::{Column, Points, Values};
-use frazil::io::manifest::{Manifest, Written};
+use frazil::io::records::manifest::{Manifest, Written};
 use frazil::scene::RebuildGrains;
 use frazil::vdb::file::{self, WriteOptions};
 use frazil::vdb::{MetaValue, points};

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::shot_grains::{folder, grains};
 use crate::program::{CUBE, fails, frazil, works};
 use frazil::geometry::DVec3;
-use frazil::io::points_ply;
+use frazil::io::particles::ply;
 
 /// Points as a .ply file: x, y, z, vx, vy, vz of each.
 fn points(all: &[[&str; 6]]) -> String {
@@ -21,7 +21,7 @@ fn points(all: &[[&str; 6]]) -> String {
 
 /// Places of the grains after a frame.
 fn places(at: &Path, frame: i32) -> Vec<DVec3> {
-    points_ply::read(&at.join(format!("out/grains/grains.{frame:04}.ply"))).unwrap().places
+    ply::read(&at.join(format!("out/grains/grains.{frame:04}.ply"))).unwrap().places
 }
 
 fn report(at: &Path, frame: i32) -> serde_json::Value {

@@ -80,7 +80,7 @@ fn a_file_that_changes_while_it_is_in_use_is_named() {
     let folder = folder(1, 0.05, "");
     let path = |frame: i32| folder.path().join(format!("body.{frame}.obj"));
     (1..=4).for_each(|frame| fs::write(path(frame), cube_at(f64::from(frame))).unwrap());
-    let pattern = frazil::io::sequence::Pattern::parse(&folder.path().join("body.%d.obj")).unwrap();
+    let pattern = frazil::io::files::sequence::Pattern::parse(&folder.path().join("body.%d.obj")).unwrap();
     let sequence = MeshSequence::open(pattern, 1, 4, 1.0, 0.0).unwrap();
     let mut pose = Vec::new();
     (1..=4).for_each(|frame| sequence.pose(f64::from(frame), &mut pose).unwrap());

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use frazil::geometry::TriMesh;
-use frazil::io::sequence::Pattern;
+use frazil::io::files::sequence::Pattern;
 use frazil::surface::HALF_WIDTH;
 use frazil::sweep::{Settings, voxelise_within};
 use frazil::vdb::level_set::{difference, to_mesh};

@@ -10,13 +10,13 @@ use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 
-use super::numbers::{Kind, Numbers, Order, most_inflated};
-use super::particles::Found;
-use super::source;
+use super::Found;
 use crate::geometry::points::{Points, Values};
+use crate::io::files::numbers::{Kind, Numbers, Order, most_inflated};
+use crate::io::files::source;
 
 /// What Houdini's own files are, and the way out.
-pub(super) const HOUDINIS: &str = "is Houdini's own format since version 12 (JSON), not classic .bgeo: save it from Houdini as \
+pub(in crate::io) const HOUDINIS: &str = "is Houdini's own format since version 12 (JSON), not classic .bgeo: save it from Houdini as \
                                    .bhclassic (which is classic .bgeo), as .ply, or as .vdb with VDB Points";
 
 /// Attributes and numbers of one that a file may have; more is damage.
@@ -39,7 +39,7 @@ struct Field {
 }
 
 /// Reads the points of a file.
-pub(super) fn parse(bytes: &[u8]) -> Result<Found, String> {
+pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
     let is_packed = bytes.starts_with(&[0x1f, 0x8b]);
     let mut reader: Box<dyn Read + '_> =
         if is_packed { Box::new(GzDecoder::new(bytes)) } else { Box::new(bytes) };
@@ -200,7 +200,7 @@ fn text(reader: &mut dyn Read) -> Result<String, String> {
 ///
 /// # Errors
 /// 64-bit integers that are too large; too many points or attributes.
-pub(super) fn check(points: &Points) -> Result<(), String> {
+pub(in crate::io) fn check(points: &Points) -> Result<(), String> {
     if points.count() > i32::MAX as usize || points.attributes.len() > MOST as usize {
         return Err("there are more points or attributes than .bgeo can hold".into());
     }
@@ -219,7 +219,7 @@ pub(super) fn check(points: &Points) -> Result<(), String> {
 }
 
 /// Writes points that [`check`] accepts, in gzip.
-pub(super) fn write(out: &mut dyn Write, points: &Points) -> std::io::Result<()> {
+pub(in crate::io) fn write(out: &mut dyn Write, points: &Points) -> std::io::Result<()> {
     // No time and no name in its head: the same points give the same bytes.
     let mut out = GzEncoder::new(out, Compression::fast());
     let mut head = b"BgeoV".to_vec();

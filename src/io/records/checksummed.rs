@@ -6,8 +6,8 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
-use super::{atomic, hash};
 use crate::error::{Error, Result};
+use crate::io::files::{atomic, hash};
 
 /// The format that this version writes, and the newest that it reads.
 const FORMAT: u64 = 1;

@@ -14,11 +14,18 @@
 //! points share is one. Attributes of other than one or three components, texts, and those named `P` or nothing, are named in a
 //! warning and left out.
 
+mod bgeo;
+pub mod ply;
+mod vtk;
+mod vtu;
+mod vtu_data;
+mod xyz;
+
 use std::path::Path;
 
-use super::caught::caught;
-use super::numbers::{Kind, Numbers};
-use super::{atomic, bgeo, points_ply, source, vtk, vtu, xyz};
+use super::files::caught::caught;
+use super::files::numbers::{Kind, Numbers};
+use super::files::{atomic, source};
 use crate::error::{Error, Result, one_line};
 use crate::geometry::DVec3;
 use crate::geometry::mesh::spacing;
@@ -139,7 +146,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Cloud> {
     let parse = || match format(path) {
         Some(Format::Bgeo) => found(bgeo::parse),
         Some(Format::BgeoSc) => Err(bgeo::HOUDINIS.into()),
-        Some(Format::Ply) => points_ply::parse(bytes).map(|cloud| (cloud, Vec::new())),
+        Some(Format::Ply) => ply::parse(bytes).map(|cloud| (cloud, Vec::new())),
         Some(Format::Vtk) => found(vtk::parse),
         Some(Format::Vtu) => found(vtu::parse),
         Some(Format::Xyz) => found(xyz::parse),
@@ -164,8 +171,8 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Cloud> {
 /// Another extension; integers that the format does not hold; what the operating system reports.
 pub fn write(path: &Path, points: &Points, keeps_voxels: bool) -> Result<()> {
     match format(path) {
-        Some(Format::Ply) if keeps_voxels => points_ply::write(path, points),
-        Some(Format::Ply) => points_ply::write_without_voxels(path, points),
+        Some(Format::Ply) if keeps_voxels => ply::write(path, points),
+        Some(Format::Ply) => ply::write_without_voxels(path, points),
         Some(Format::Bgeo) => {
             bgeo::check(points).map_err(|what| Error::file(path, what))?;
             warn_of_rounding(path, points);

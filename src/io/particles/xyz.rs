@@ -8,10 +8,10 @@
 
 use std::io::Write;
 
-use super::numbers::{Kind, Numbers, Order};
-use super::particles::Found;
-use super::{source, text};
+use super::Found;
 use crate::geometry::points::Points;
+use crate::io::files::numbers::{Kind, Numbers, Order};
+use crate::io::files::{source, text};
 
 /// Bytes of a particle in binary.
 const ROW: usize = 12;
@@ -19,7 +19,7 @@ const ROW: usize = 12;
 const PIECE: usize = 1 << 14;
 
 /// Reads the particles of a file.
-pub(super) fn parse(bytes: &[u8]) -> Result<Found, String> {
+pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
     let marked = text::without_mark(bytes);
     let marked = if is_wide(bytes) { marked? } else { marked.unwrap_or(bytes) };
     if is_text(marked) {
@@ -159,7 +159,7 @@ fn unclear(word: &[u8]) -> String {
 }
 
 /// Writes the places of points in binary.
-pub(super) fn write(out: &mut dyn Write, points: &Points) -> std::io::Result<()> {
+pub(in crate::io) fn write(out: &mut dyn Write, points: &Points) -> std::io::Result<()> {
     if points.count() == 0 {
         // A file without a byte is one that was cut.
         return out.write_all(b"# 0 particles\n");

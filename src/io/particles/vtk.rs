@@ -5,9 +5,9 @@
 
 use std::borrow::Cow;
 
-use super::numbers::{Kind, Numbers, Order};
-use super::particles::Found;
-use super::{source, text};
+use super::Found;
+use crate::io::files::numbers::{Kind, Numbers, Order};
+use crate::io::files::{source, text};
 
 /// Bytes that a line of keywords may have: one that is longer is no such line.
 const LONGEST: usize = 1 << 12;
@@ -32,7 +32,7 @@ enum Owner {
 }
 
 /// Reads the points of a file.
-pub(super) fn parse(bytes: &[u8]) -> Result<Found, String> {
+pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
     let bytes = with_line_feeds(text::without_mark(bytes)?)?;
     let mut reader = Reader::open(&bytes)?;
     let mut found: Option<Found> = None;

@@ -3,18 +3,19 @@
 use std::collections::HashMap;
 use std::io::Write;
 
-use super::{source, stl_text, text};
+use super::stl_text;
 use crate::geometry::{PolygonMesh, TriMesh, Vec3};
+use crate::io::files::{source, text};
 
 /// Triangles between two looks at whether to stop.
 const PIECE: usize = 1 << 14;
 /// Bytes of a binary file before its triangles, of each of them, and of the normal that each begins with.
-pub(super) const HEADER: usize = 84;
+pub(in crate::io) const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 const NORMAL: usize = 12;
 
 /// Reads the triangles of an STL file, less an origin that is subtracted in 64 bits; with what about the file should be said.
-pub(super) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMesh, Option<String>), String> {
+pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMesh, Option<String>), String> {
     let count = bytes.get(80..HEADER).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
     let length = HEADER + count * TRIANGLE;
     if bytes.len() != length || bytes.len() < HEADER {
@@ -60,7 +61,7 @@ fn less(value: f32, origin: f64) -> f32 {
 
 /// A mesh whose corners are joined where they have the same position.
 #[derive(Default)]
-pub(super) struct Joined {
+pub(in crate::io) struct Joined {
     pub mesh: PolygonMesh,
     known: HashMap<[u32; 3], u32>,
 }
@@ -79,7 +80,7 @@ impl Joined {
 }
 
 /// Writes binary STL.
-pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh) -> std::io::Result<()> {
+pub(in crate::io) fn write(out: &mut dyn Write, mesh: &TriMesh) -> std::io::Result<()> {
     let mut header = [0u8; 80];
     header[..6].copy_from_slice(b"frazil");
     out.write_all(&header)?;

@@ -18,7 +18,7 @@ pub struct Carried<'a> {
 }
 
 /// Writes binary little-endian PLY.
-pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carried<'_>) -> Result<()> {
+pub(in crate::io) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carried<'_>) -> Result<()> {
     let Carried { velocities, uvs, .. } = *carried;
     let moving = !velocities.is_empty() && velocities.len() == mesh.positions.len();
     let of_vertices = uvs.filter(|uvs| uvs.corners.is_none());

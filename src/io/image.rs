@@ -5,7 +5,7 @@ use std::path::Path;
 
 use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 
-use super::caught::caught;
+use super::files::caught::caught;
 use crate::error::{Error, Result};
 
 /// Most bytes of an image as it is unpacked: 16,384 x 16,384 pixels with four channels of 16 bits.

@@ -5,12 +5,12 @@ use std::str::FromStr;
 
 use roxmltree::{Document, Node};
 
-use super::numbers::{Kind, Numbers, Order};
-use super::particles::Found;
+use super::Found;
 use super::vtu_data::{Codec, File, Inflate, Stream, lz4, zlib};
+use crate::io::files::numbers::{Kind, Numbers, Order};
 
 /// Reads the points of a file.
-pub(super) fn parse(bytes: &[u8]) -> Result<Found, String> {
+pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
     let (text, appended) = split(bytes)?;
     let text = std::str::from_utf8(&text).map_err(|_| "is not a .vtu file: it is not text")?;
     let document =

@@ -1,9 +1,18 @@
 //! Meshes in files, by extension: Wavefront .obj, Stanford .ply, .stl.
 
+#[doc(hidden)]
+pub mod extras;
+mod obj;
+pub(in crate::io) mod ply;
+mod ply_header;
+mod ply_write;
+mod stl;
+mod stl_text;
+
 use std::path::Path;
 
-use super::caught::caught;
-use super::{atomic, obj, ply, ply_write, source, stl};
+use super::files::caught::caught;
+use super::files::{atomic, source};
 use crate::error::{Error, Result};
 use crate::geometry::{DVec3, DetailedMesh, PolygonMesh, TriMesh};
 

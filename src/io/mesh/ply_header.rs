@@ -1,17 +1,17 @@
 //! Headers of PLY files.
 
-use super::text;
 use crate::geometry::mesh::attributes::Number;
+use crate::io::files::text;
 
 /// How the numbers behind a header are written.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Format {
+pub(in crate::io) enum Format {
     Ascii,
     Little,
     Big,
 }
 
-pub(super) struct Property {
+pub(in crate::io) struct Property {
     pub name: String,
     pub number: Number,
     /// Type of the count, for a list.
@@ -25,14 +25,14 @@ impl Property {
     }
 }
 
-pub(super) struct Element {
+pub(in crate::io) struct Element {
     pub name: String,
     pub count: usize,
     pub properties: Vec<Property>,
 }
 
 /// A header that is read.
-pub(super) struct Header<'a> {
+pub(in crate::io) struct Header<'a> {
     pub format: Format,
     pub elements: Vec<Element>,
     /// The texts of comments.
@@ -42,7 +42,7 @@ pub(super) struct Header<'a> {
 }
 
 /// Reads the header of a file that has vertices.
-pub(super) fn read(bytes: &[u8]) -> Result<Header<'_>, String> {
+pub(in crate::io) fn read(bytes: &[u8]) -> Result<Header<'_>, String> {
     let (lines, body) = head(text::without_mark(bytes)?)?;
     let (format, elements) = parse_header(&lines)?;
     check_coordinates(&elements)?;
@@ -126,7 +126,7 @@ fn number_of(name: &str) -> Option<Number> {
 }
 
 /// Types by the names that a header gives them; the first is what we write.
-pub(super) const NAMES: [([&str; 2], Number); 8] = [
+pub(in crate::io) const NAMES: [([&str; 2], Number); 8] = [
     (["char", "int8"], Number::I8),
     (["uchar", "uint8"], Number::U8),
     (["short", "int16"], Number::I16),

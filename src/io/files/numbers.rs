@@ -8,20 +8,20 @@ const MOST_INFLATED: u64 = 1032;
 const PIECE: usize = 1 << 20;
 
 /// Bytes that so many deflated ones can become, at most.
-pub(super) fn most_inflated(bytes: usize) -> u64 {
+pub(in crate::io) fn most_inflated(bytes: usize) -> u64 {
     (bytes as u64).saturating_mul(MOST_INFLATED)
 }
 
 /// The order of a number's bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Order {
+pub(in crate::io) enum Order {
     Little,
     Big,
 }
 
 /// The type of numbers in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(in crate::io) enum Kind {
     I8,
     U8,
     I16,
@@ -36,7 +36,7 @@ pub(super) enum Kind {
 
 /// Numbers of one type; integers keep all of their 64 bits.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Numbers {
+pub(in crate::io) enum Numbers {
     Whole(Vec<i64>),
     Real(Vec<f64>),
 }

@@ -5,15 +5,15 @@
 use std::collections::HashMap;
 
 use super::ply_header::{self, Format, Header};
-use super::{source, text};
 use crate::geometry::mesh::attributes::{MeshArray, Number, On};
 use crate::geometry::mesh::uvs;
 use crate::geometry::{PolygonMesh, Uvs, Vec3};
+use crate::io::files::{source, text};
 
-pub(super) use super::ply_header::{Element, NAMES};
+pub(in crate::io) use super::ply_header::{Element, NAMES};
 
 /// Names of a vertex' texture coordinates.
-pub(super) const PLACES: [[&str; 2]; 3] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]];
+pub(in crate::io) const PLACES: [[&str; 2]; 3] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]];
 
 /// What is no array of its own: places, and normals.
 const NO_ARRAYS: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
@@ -22,7 +22,7 @@ const NO_ARRAYS: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 const PIECE: usize = 1 << 14;
 
 /// A file whose header is read.
-pub(super) struct Body<'a> {
+pub(in crate::io) struct Body<'a> {
     pub elements: Vec<Element>,
     /// The texts of comments.
     pub comments: Vec<String>,
@@ -52,13 +52,13 @@ impl Body<'_> {
 }
 
 /// Reads the header of a file that has vertices.
-pub(super) fn open(bytes: &[u8]) -> Result<Body<'_>, String> {
+pub(in crate::io) fn open(bytes: &[u8]) -> Result<Body<'_>, String> {
     let Header { format, elements, comments, body } = ply_header::read(bytes)?;
     Ok(Body { elements, comments, reader: Reader { format, bytes: body, at: 0 } })
 }
 
 /// Reads the vertices, less an origin that is subtracted in 64 bits, and faces of a PLY file.
-pub(super) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh, String> {
+pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh, String> {
     let Body { elements, mut reader, .. } = open(bytes)?;
     let mut parsed = Parsed::new(&elements, origin);
     // An element without properties has no rows in the file, whatever its count.

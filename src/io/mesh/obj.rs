@@ -4,10 +4,10 @@
 use std::io::Write;
 
 use super::ply_write::Carried;
-use super::{source, text};
 use crate::geometry::mesh::attributes::{MeshArray, Number, On};
 use crate::geometry::mesh::uvs;
 use crate::geometry::{PolygonMesh, TriMesh, Uvs, Vec3};
+use crate::io::files::{source, text};
 
 /// What is written of a mesh without vertices.
 const EMPTY: &[u8] = b"# an empty mesh\n";
@@ -18,7 +18,7 @@ const COLOURS: [&str; 3] = ["red", "green", "blue"];
 
 /// Reads positions, less an origin that is subtracted in 64 bits, faces and texture coordinates. Lines of other kinds may be of
 /// any encoding.
-pub(super) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh, String> {
+pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh, String> {
     let mut reader = Reader { origin, ..Reader::default() };
     let mut lines = text::lines(text::without_mark(bytes)?);
     let mut joined = Vec::new();
@@ -63,7 +63,7 @@ fn continued(line: &[u8]) -> Option<&[u8]> {
 }
 
 /// Whether the file was written of a mesh without vertices: a file of any other text has none either.
-pub(super) fn is_empty_of_ours(bytes: &[u8]) -> bool {
+pub(in crate::io) fn is_empty_of_ours(bytes: &[u8]) -> bool {
     bytes == EMPTY
 }
 
@@ -174,7 +174,11 @@ fn names(word: &[u8], what: &str, count: usize) -> String {
 }
 
 /// Writes positions, colours and texture coordinates where there are any, and triangles.
-pub(super) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carried<'_>) -> std::io::Result<()> {
+pub(in crate::io) fn write(
+    out: &mut dyn Write,
+    mesh: &TriMesh,
+    carried: &Carried<'_>,
+) -> std::io::Result<()> {
     let Carried { uvs, arrays, .. } = carried;
     let colour = |name: &str| arrays.iter().find(|array| array.on == On::Vertices && array.name == name);
     let colours = COLOURS.map(colour);

@@ -4,10 +4,11 @@
 //! a line is a comment. Normals are passed over, whatever they are. A facet may have more than three corners. The last solid may
 //! lack its `endsolid`, of which the caller warns: the file may be cut.
 
-use super::source;
 use super::stl::Joined;
-use super::text::{self, Words};
 use crate::geometry::PolygonMesh;
+use crate::io::files::source;
+use crate::io::files::text;
+use crate::io::files::text::Words;
 
 /// Facets between two looks at whether to stop.
 const PIECE: usize = 1 << 14;
@@ -15,7 +16,7 @@ const PIECE: usize = 1 << 14;
 const NORMAL: usize = 4;
 
 /// Whether a file, without its byte order mark, begins as text STL does.
-pub(super) fn is_one(bytes: &[u8]) -> bool {
+pub(in crate::io) fn is_one(bytes: &[u8]) -> bool {
     // A binary file may begin with any word, but its count of triangles is followed by a zero byte, which no text has.
     let head = &bytes[..bytes.len().min(super::stl::HEADER)];
     let first = Words::new(bytes).next();
@@ -27,7 +28,7 @@ fn is(word: &[u8], keyword: &str) -> bool {
 }
 
 /// Reads the facets of all solids, less an origin; with what about the file should be said.
-pub(super) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMesh, Option<String>), String> {
+pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMesh, Option<String>), String> {
     let mut reader = Reader { words: Words::new(bytes), origin, joined: Joined::default(), facets: 0 };
     let mut is_open = false;
     while let Some(word) = reader.words.next() {

@@ -6,17 +6,17 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::read::ZlibDecoder;
 
-use super::numbers::{Kind, Numbers, Order, most_inflated};
-use super::source;
+use crate::io::files::numbers::{Kind, Numbers, Order, most_inflated};
+use crate::io::files::source;
 
 /// Words between two looks at whether to stop.
 const PIECE: usize = 1 << 16;
 
 /// Inflates bytes that become exactly so many.
-pub(super) type Inflate = fn(&[u8], usize) -> Option<Vec<u8>>;
+pub(in crate::io) type Inflate = fn(&[u8], usize) -> Option<Vec<u8>>;
 
 /// How all arrays of a file are packed.
-pub(super) struct Codec {
+pub(in crate::io) struct Codec {
     pub order: Order,
     /// Type of lengths.
     pub head: Kind,
@@ -24,7 +24,7 @@ pub(super) struct Codec {
 }
 
 /// A file whose XML is read.
-pub(super) struct File<'a> {
+pub(in crate::io) struct File<'a> {
     pub codec: Codec,
     /// Whether the appended data are base64, and these.
     pub appended: Option<(bool, &'a [u8])>,
@@ -33,7 +33,7 @@ pub(super) struct File<'a> {
 }
 
 /// Inflates zlib data.
-pub(super) fn zlib(bytes: &[u8], size: usize) -> Option<Vec<u8>> {
+pub(in crate::io) fn zlib(bytes: &[u8], size: usize) -> Option<Vec<u8>> {
     let mut out = Vec::new();
     // One byte more than wanted shows that there are too many.
     ZlibDecoder::new(bytes).take(size as u64 + 1).read_to_end(&mut out).ok()?;
@@ -41,7 +41,7 @@ pub(super) fn zlib(bytes: &[u8], size: usize) -> Option<Vec<u8>> {
 }
 
 /// Inflates an LZ4 block.
-pub(super) fn lz4(bytes: &[u8], size: usize) -> Option<Vec<u8>> {
+pub(in crate::io) fn lz4(bytes: &[u8], size: usize) -> Option<Vec<u8>> {
     lz4_flex::block::decompress(bytes, size).ok().filter(|out| out.len() == size)
 }
 
@@ -142,7 +142,7 @@ fn other_size(said: usize, what: &str, size: usize) -> String {
 }
 
 /// Bytes that are taken one after another.
-pub(super) struct Stream<'a> {
+pub(in crate::io) struct Stream<'a> {
     rest: &'a [u8],
     /// Decoded and not yet taken; none of raw bytes.
     ready: Option<Vec<u8>>,

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::{source, text};
 use crate::error::Result;
+use crate::io::files::{source, text};
 
 /// Names of what a mesh file contains besides positions and faces, in the plural: "UVs", "normals" ... Empty for a kind of file
 /// that has no such thing.

@@ -14,7 +14,7 @@ const LONGEST_WORD: usize = 40;
 ///
 /// # Errors
 /// The mark of UTF-16, in which no reader looks for words.
-pub(super) fn without_mark(bytes: &[u8]) -> Result<&[u8], String> {
+pub(in crate::io) fn without_mark(bytes: &[u8]) -> Result<&[u8], String> {
     if UTF_16.iter().any(|mark| bytes.starts_with(mark)) {
         return Err("the file is text in UTF-16: save it as plain text (ASCII or UTF-8)".into());
     }
@@ -22,13 +22,13 @@ pub(super) fn without_mark(bytes: &[u8]) -> Result<&[u8], String> {
 }
 
 /// The lines of a text. They end with a line feed, a carriage return, or both, also mixed within one file.
-pub(super) struct Lines<'a> {
+pub(in crate::io) struct Lines<'a> {
     rest: Option<&'a [u8]>,
     number: usize,
 }
 
 /// The lines of a text, each with its number from 1.
-pub(super) fn lines(bytes: &[u8]) -> Lines<'_> {
+pub(in crate::io) fn lines(bytes: &[u8]) -> Lines<'_> {
     Lines { rest: Some(bytes), number: 0 }
 }
 
@@ -49,7 +49,7 @@ impl<'a> Iterator for Lines<'a> {
 }
 
 /// The words of a text, between blanks and line ends; from a word that begins with `#` on, a line is a comment.
-pub(super) struct Words<'a> {
+pub(in crate::io) struct Words<'a> {
     bytes: &'a [u8],
     at: usize,
     /// Number of the line of the last word, from 1.
@@ -112,19 +112,19 @@ impl<'a> Words<'a> {
 }
 
 /// A number: as Rust reads it, or with Fortran's `D` before the exponent.
-pub(super) fn number<T: FromStr>(word: &[u8]) -> Option<T> {
+pub(in crate::io) fn number<T: FromStr>(word: &[u8]) -> Option<T> {
     let text = std::str::from_utf8(word).ok()?;
     let of_fortran = || text.contains(['d', 'D']).then(|| text.replace(['d', 'D'], "e"))?.parse().ok();
     text.parse().ok().or_else(of_fortran)
 }
 
 /// A coordinate less that of an origin. Without one it is read in 32 bits: by way of 64, some numbers would be rounded twice.
-pub(super) fn coordinate(word: &[u8], origin: f64) -> Option<f32> {
+pub(in crate::io) fn coordinate(word: &[u8], origin: f64) -> Option<f32> {
     if origin == 0.0 { number(word) } else { number::<f64>(word).map(|value| (value - origin) as f32) }
 }
 
 /// What is wrong with a word where a number must stand.
-pub(super) fn no_number(word: &[u8]) -> String {
+pub(in crate::io) fn no_number(word: &[u8]) -> String {
     let shown = shown(word);
     if has_decimal_comma(word) {
         return format!("\"{shown}\" has a decimal comma: numbers need decimal points");
@@ -133,14 +133,14 @@ pub(super) fn no_number(word: &[u8]) -> String {
 }
 
 /// Whether a word is a number with a comma where its point should stand.
-pub(super) fn has_decimal_comma(word: &[u8]) -> bool {
+pub(in crate::io) fn has_decimal_comma(word: &[u8]) -> bool {
     let commas = word.iter().filter(|&&byte| byte == b',').count();
     let with_point: Vec<u8> = word.iter().map(|&byte| if byte == b',' { b'.' } else { byte }).collect();
     commas == 1 && !word.contains(&b'.') && number::<f64>(&with_point).is_some()
 }
 
 /// A word as a message repeats it.
-pub(super) fn shown(word: &[u8]) -> String {
+pub(in crate::io) fn shown(word: &[u8]) -> String {
     let text: String = String::from_utf8_lossy(word).chars().take(LONGEST_WORD).collect();
     one_line(&text)
 }

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use super::hash;
 use crate::error::{Error, Result};
+use crate::io::files::hash;
 
 /// Hashes of files by path, each of the bytes that were used first.
 #[derive(Default)]
@@ -17,7 +17,7 @@ impl Seen {
     /// # Errors
     /// What the operating system reports; other bytes than when this file was read before.
     pub fn read(&self, path: &Path) -> Result<Vec<u8>> {
-        let bytes = super::source::read(path)?;
+        let bytes = crate::io::files::source::read(path)?;
         self.note(path, hash::of_bytes(&bytes))?;
         Ok(bytes)
     }

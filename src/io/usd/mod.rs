@@ -1,12 +1,16 @@
 //! USD as text (.usda): the output of a shot, for any program that reads USD; no library is needed.
 
+pub mod materials;
+pub mod points;
+pub mod primvars;
+
 use std::fmt::Write;
 
-use super::usd_looks::{self, Look};
-use super::usd_points;
-use super::usd_primvars::{self, Primvar};
+use materials::Look;
+
 use crate::geometry::mesh::attributes::Number;
 use crate::geometry::{DVec3, MeshArray, Points, Uvs, Vec3};
+use primvars::Primvar;
 
 /// A moving mesh at one frame.
 pub struct MeshFrame<'a> {
@@ -152,7 +156,7 @@ pub fn stage(comment: &str, time: StageTime, volumes: &[VolumeFiles], clips: &[C
     );
     let volumes: Vec<&VolumeFiles> = volumes.iter().filter(|volume| !volume.files.is_empty()).collect();
     let of_volumes = volumes.iter().filter_map(|volume| volume.look());
-    usd_looks::define(&mut out, of_volumes.chain(clips.iter().flat_map(Clips::looks)).collect());
+    materials::define(&mut out, of_volumes.chain(clips.iter().flat_map(Clips::looks)).collect());
     volumes.iter().for_each(|volume| write_volume(&mut out, volume));
     clips.iter().for_each(|clips| write_clips(&mut out, clips));
     out.push_str("}\n");
@@ -220,7 +224,7 @@ pub struct Clips<'a> {
 pub enum ClipPrims<'a> {
     /// Moving meshes, under a prim of the kind's name.
     Meshes(Vec<MeshPrim<'a>>),
-    /// One prim of points with the kind's name, as [`usd_points::frame`] writes it; these have its attributes.
+    /// One prim of points with the kind's name, as [`points::frame`] writes it; these have its attributes.
     Points(&'a Points),
 }
 
@@ -263,7 +267,7 @@ fn write_clips(out: &mut String, clips: &Clips) {
             // Previews show grains when they are asked for renders.
             out.push_str("        uniform token purpose = \"render\"\n");
             Look::Snow.bind(out, "        ");
-            out.push_str(&usd_points::declared(points, "        "));
+            out.push_str(&points::declared(points, "        "));
         }
     }
     out.push_str("    }\n");
@@ -279,7 +283,7 @@ fn define_meshes(out: &mut String, meshes: &[MeshPrim]) {
         );
         look.bind(out, "            ");
         declare_uvs(out, "            ", *uvs);
-        usd_primvars::declare(out, "            ", primvars);
+        primvars::declare(out, "            ", primvars);
         out.push_str("        }\n");
     }
 }
@@ -315,7 +319,7 @@ pub fn clip_manifest(kind: &str, prims: &ClipPrims) -> String {
     let meshes = match prims {
         ClipPrims::Meshes(meshes) => &meshes[..],
         ClipPrims::Points(points) => {
-            out.push_str(&usd_points::declared(points, "    "));
+            out.push_str(&points::declared(points, "    "));
             &[]
         }
     };
@@ -327,7 +331,7 @@ pub fn clip_manifest(kind: &str, prims: &ClipPrims) -> String {
             let _ = writeln!(out, "        {class} {attribute}");
         }
         declare_uvs(&mut out, "        ", *uvs);
-        usd_primvars::declare(&mut out, "        ", primvars);
+        primvars::declare(&mut out, "        ", primvars);
         out.push_str("    }\n");
     }
     out.push_str("}\n");
@@ -379,7 +383,7 @@ pub fn clip(kind: &str, frame: i32, fps: f64, units: Units, meshes: &[MeshFrame]
                 let _ = writeln!(out, "        {PLACE_INDICES}.timeSamples = {{ {frame}: {indices} }}");
             }
         }
-        usd_primvars::write(&mut out, "        ", frame, mesh.arrays);
+        primvars::write(&mut out, "        ", frame, mesh.arrays);
         out.push_str("    }\n");
     }
     out.push_str("}\n");
@@ -394,7 +398,7 @@ fn row(out: &mut String, p: &Vec3) {
 pub(super) fn vector(out: &mut String, parts: [f32; 3]) {
     for (part, before) in parts.into_iter().zip(["(", ", ", ", "]) {
         out.push_str(before);
-        usd_primvars::number(out, Number::F32, part.into());
+        primvars::number(out, Number::F32, part.into());
     }
     out.push(')');
 }

@@ -6,7 +6,7 @@
 
 use std::fmt::Write;
 
-use super::usd::{list, prim_name};
+use super::{list, prim_name};
 use crate::geometry::mesh::attributes::{MeshArray, Number, On};
 
 /// A primvar without its values: what it is called, and what has a value each.
@@ -23,7 +23,7 @@ pub fn primvars(arrays: &[&MeshArray]) -> Vec<Primvar> {
 }
 
 /// Says what the values of primvars, elsewhere, belong to.
-pub(super) fn declare(out: &mut String, indent: &str, primvars: &[Primvar]) {
+pub(in crate::io) fn declare(out: &mut String, indent: &str, primvars: &[Primvar]) {
     for Primvar { declared, interpolation } in primvars {
         let _ =
             write!(out, "{indent}{declared} (\n{indent}    interpolation = \"{interpolation}\"\n{indent})\n");
@@ -31,7 +31,7 @@ pub(super) fn declare(out: &mut String, indent: &str, primvars: &[Primvar]) {
 }
 
 /// Writes the primvars of one frame: of corners there are three values for each triangle.
-pub(super) fn write(out: &mut String, indent: &str, frame: i32, arrays: &[&MeshArray]) {
+pub(in crate::io) fn write(out: &mut String, indent: &str, frame: i32, arrays: &[&MeshArray]) {
     for Group { primvar, parts, is_share } in grouped(arrays) {
         declare(out, indent, std::slice::from_ref(&primvar));
         let number = |out: &mut String, array: &MeshArray, at: usize| {
@@ -153,7 +153,7 @@ fn vector_of(name: &str) -> Option<Vector> {
 
 /// A name that no other primvar of the mesh has.
 /// The name, or with a number if it is taken already; it is taken then.
-pub(super) fn unique(name: String, taken: &mut Vec<String>) -> String {
+pub(in crate::io) fn unique(name: String, taken: &mut Vec<String>) -> String {
     let mut own = name.clone();
     let mut number = 2;
     while taken.contains(&own) {
@@ -201,7 +201,7 @@ fn triple(number: Number) -> Option<&'static str> {
 const LONG: f64 = 1e16;
 
 /// Writes a number as USD reads it.
-pub(super) fn number(out: &mut String, number: Number, value: f64) {
+pub(in crate::io) fn number(out: &mut String, number: Number, value: f64) {
     let _ = match number {
         // USD knows it in small letters only, and takes long numbers without an exponent for integers.
         _ if value.is_nan() => write!(out, "nan"),

@@ -2,8 +2,9 @@
 
 use std::fmt::Write;
 
-use super::usd::{Units, list, prim_name, quoted, vector};
-use super::usd_primvars::{self, unique};
+use super::primvars;
+use super::primvars::unique;
+use super::{Units, list, prim_name, quoted, vector};
 use crate::geometry::mesh::attributes::Number;
 use crate::geometry::points::{Attribute, Column, Points, Values};
 use crate::geometry::{DVec3, Vec3};
@@ -54,7 +55,7 @@ pub fn frame(name: &str, frame: i32, fps: f64, points: &Points) -> String {
 }
 
 /// What [`frame`] writes of points with these attributes, without values: for what is over them in a stage.
-pub(super) fn declared(points: &Points, indent: &str) -> String {
+pub(in crate::io) fn declared(points: &Points, indent: &str) -> String {
     let mut out = format!("{indent}{EXTENT}\n{indent}{PLACES}\n");
     for (declared, interpolation) in declarations(points) {
         let of = interpolation
@@ -136,7 +137,7 @@ fn whole(out: &mut String, number: impl std::fmt::Display) {
 }
 
 fn number(out: &mut String, value: f32) {
-    usd_primvars::number(out, Number::F32, value.into());
+    primvars::number(out, Number::F32, value.into());
 }
 
 #[cfg(test)]

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{hash, sealed};
+use super::checksummed;
 use crate::error::{Error, Result};
+use crate::io::files::hash;
 
 /// A file of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -123,7 +124,7 @@ impl Manifest {
     /// names is removed when its frame is made again.
     pub fn read(folder: &Path, stage: &str, frame: i32) -> Result<Option<Self>> {
         let path = Self::path(folder, stage, frame);
-        let Some(manifest): Option<Self> = sealed::read(&path)? else { return Ok(None) };
+        let Some(manifest): Option<Self> = checksummed::read(&path)? else { return Ok(None) };
         if manifest.frame != frame {
             return Err(Error::file(path, format!("is the record of frame {}", manifest.frame)));
         }
@@ -145,7 +146,7 @@ impl Manifest {
     /// # Errors
     /// What the operating system reports.
     pub fn write(&self, folder: &Path, stage: &str) -> Result<()> {
-        sealed::write(&Self::path(folder, stage, self.frame), self)
+        checksummed::write(&Self::path(folder, stage, self.frame), self)
     }
 
     /// Its files of a kind: those in the folder of that name.

@@ -7,13 +7,14 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::particles::{Cloud, shared, whole};
-use super::ply::{self, Element};
-use super::{atomic, source};
+use super::{Cloud, shared, whole};
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::geometry::mesh::spacing;
 use crate::geometry::points::{Attribute, Points, Values};
+use crate::io::files::{atomic, source};
+use crate::io::mesh::ply;
+use crate::io::mesh::ply::Element;
 
 /// The comment before the voxel size (m).
 const VOXEL: &str = "frazil voxel_size";
@@ -46,7 +47,7 @@ pub fn read(path: &Path) -> Result<Cloud> {
 }
 
 /// As [`read`], from the bytes of the file.
-pub(super) fn parse(bytes: &[u8]) -> std::result::Result<Cloud, String> {
+pub(in crate::io) fn parse(bytes: &[u8]) -> std::result::Result<Cloud, String> {
     let mut body = ply::open(bytes)?;
     let at = body.elements.iter().position(|element| element.name == "vertex").expect("open looks for it");
     let vertices = body.elements.swap_remove(at);

@@ -41,10 +41,10 @@ impl Look {
     }
 
     /// The schema of a prim that has a material, for what stands in brackets behind the prim's name.
-    pub(super) const SCHEMA: &'static str = "prepend apiSchemas = [\"MaterialBindingAPI\"]";
+    pub(in crate::io) const SCHEMA: &'static str = "prepend apiSchemas = [\"MaterialBindingAPI\"]";
 
     /// Gives a prim its material.
-    pub(super) fn bind(self, out: &mut String, indent: &str) {
+    pub(in crate::io) fn bind(self, out: &mut String, indent: &str) {
         let _ = writeln!(out, "{indent}rel material:binding = </shot/{SCOPE}/{}>", self.name());
     }
 
@@ -98,7 +98,7 @@ impl Look {
 }
 
 /// Defines the materials of some prims, each once.
-pub(super) fn define(out: &mut String, mut looks: Vec<Look>) {
+pub(in crate::io) fn define(out: &mut String, mut looks: Vec<Look>) {
     looks.sort_unstable();
     looks.dedup();
     if looks.is_empty() {

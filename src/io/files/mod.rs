@@ -1,0 +1,11 @@
+//! Files as such: read as a whole or not at all, written whole or not at all, hashed, numbered.
+
+pub mod atomic;
+#[doc(hidden)]
+pub mod caught;
+pub mod hash;
+pub(in crate::io) mod numbers;
+pub mod sequence;
+#[doc(hidden)]
+pub mod source;
+pub(in crate::io) mod text;
