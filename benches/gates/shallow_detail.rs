@@ -1,9 +1,9 @@
 //! Gates of shallow's level of detail: nothing is lost while the near cells move about, and what a domain costs of which a quarter is near.
 
 use frazil::numeric::cpu::cpu_level;
-use frazil::shallow::detail::Cells;
-use frazil::shallow::flows::{FlowPoint, Kind, Pulse};
 use frazil::shallow::pipes::Border;
+use frazil::shallow::sources::{FlowPoint, Kind, Pulse};
+use frazil::shallow::two_level::Cells;
 use frazil::shallow::{Detail, Params};
 
 use crate::common::bodies::Dice;

@@ -2,8 +2,8 @@
 
 use frazil::Context;
 use frazil::geometry::DVec3;
-use frazil::shallow::falls::Falls;
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::free_fall::Falls;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Params, Shallow};

@@ -2,7 +2,7 @@
 
 use frazil::Context;
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};

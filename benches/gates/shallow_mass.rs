@@ -1,7 +1,7 @@
 //! Gate of shallow's mass: what comes and goes adds up to the last unit.
 
 use frazil::shallow::Shallow;
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 
 use crate::common::bodies::Dice;
 use crate::common::shallow::{Turn, busy, context};

@@ -1,6 +1,6 @@
 //! Gate of a hole in the ground, against Torricelli's law.
 
-use frazil::shallow::flows::{FlowPoint, Kind};
+use frazil::shallow::sources::{FlowPoint, Kind};
 
 use crate::common::liquids::context;
 use crate::harness::Harness;

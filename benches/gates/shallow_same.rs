@@ -4,8 +4,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::Shallow;
-use frazil::shallow::falls::mesh::{Balls, Target as DropTarget, bound as drops_bound};
-use frazil::shallow::falls::{Droplet, Falls};
+use frazil::shallow::free_fall::mesh::{Balls, Target as DropTarget, bound as drops_bound};
+use frazil::shallow::free_fall::{Droplet, Falls};
 use frazil::shallow::surface::{Depths, Indices, Layout, Surface, Target, bound};
 use frazil::{Context, Pool};
 

@@ -2,9 +2,9 @@
 
 use frazil::geometry::{DVec3, Vec3};
 use frazil::numeric::cpu::cpu_level;
-use frazil::shallow::falls::Falls;
-use frazil::shallow::flows::Kind;
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::free_fall::Falls;
+use frazil::shallow::material::Liquid;
+use frazil::shallow::sources::Kind;
 use frazil::shallow::stains::Absorbing;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Law, Scalar, Shallow, Staining, Stains};

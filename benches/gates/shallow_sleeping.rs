@@ -2,7 +2,7 @@
 //! whether it sleeps.
 
 use frazil::numeric::cpu::cpu_level;
-use frazil::shallow::flows::{FlowPoint, Kind};
+use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::{Params, Shallow};
 
 use crate::common::shallow::{context, covered, ground, waves};

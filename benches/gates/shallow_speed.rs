@@ -1,7 +1,7 @@
 //! Gates of shallow's time and memory: thread CPU time on one core.
 
 use frazil::numeric::cpu::cpu_level;
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};

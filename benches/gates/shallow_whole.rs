@@ -2,9 +2,9 @@
 
 use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::columns::Columns;
-use frazil::shallow::falls::mesh::{self as drops, Balls};
-use frazil::shallow::falls::{Droplet, Falls};
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::free_fall::mesh::{self as drops, Balls};
+use frazil::shallow::free_fall::{Droplet, Falls};
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::surface::{Depths, Indices, Layout, Surface, Target, bound};
 use frazil::shallow::terrain::Solids;

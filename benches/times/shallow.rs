@@ -2,11 +2,11 @@
 
 use frazil::Context;
 use frazil::numeric::cpu::cpu_level;
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::{Pace, Section};
 use frazil::shallow::pipes::Border;
 use frazil::shallow::surface::ledges::Ledges;
-use frazil::shallow::surface::lifts::{Distance, Lifts};
+use frazil::shallow::surface::minimum_heights::{Distance, Lifts};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 

@@ -13,13 +13,13 @@ use super::shallow_params::{domain, frz_shallow_domain, frz_shallow_params, para
 use super::shallow_terrain::Terrain;
 use super::views::{Sized32, fill, frz_span, frz_view, within};
 use crate::context::Context;
-use crate::shallow::falls::Droplet;
-use crate::shallow::falls::mesh::Balls;
-use crate::shallow::pace::MOST_STEPS;
+use crate::shallow::free_fall::Droplet;
+use crate::shallow::free_fall::mesh::Balls;
 use crate::shallow::scalars::MOST;
 use crate::shallow::surface::Surface;
 use crate::shallow::terrain::Solids;
 use crate::shallow::terrain::shapes::Shape;
+use crate::shallow::time_step::MOST_STEPS;
 use crate::shallow::{Load, Params, Report, Shallow};
 
 /// A small amount of liquid on a ground: blood, coffee or paint in a fraction of a frame.

@@ -10,12 +10,12 @@ use super::shallow_params::{domain, frz_shallow_domain, frz_shallow_params, para
 use super::shallow_terrain::Terrain;
 use super::views::{Sized32, fill, finite, frz_view};
 use crate::context::Context;
-use crate::shallow::detail::cells_around;
-use crate::shallow::detail::surface::Surface;
-use crate::shallow::flows::FlowPoint;
 use crate::shallow::scalars::MOST;
+use crate::shallow::sources::FlowPoint;
 use crate::shallow::terrain::Solids;
 use crate::shallow::terrain::shapes::Shape;
+use crate::shallow::two_level::cells_around;
+use crate::shallow::two_level::surface::Surface;
 use crate::shallow::{Balance, Detail, Params, Report};
 
 /// Shallow liquid in cells of two sizes: those of its domain in a box that may move, around an instrument or a player, and of twice the length everywhere

@@ -12,9 +12,9 @@ use super::shallow_surface::{Wanted, frz_shallow_layout, frz_shallow_size, frz_s
 use super::shallow_terrain::{Terrain, frz_shallow_body, frz_shallow_moved, read_bodies, read_heights};
 use super::views::{fill, frz_view};
 use crate::shallow::Moved;
-use crate::shallow::detail::surface;
 use crate::shallow::surface::{Counts, Depths};
 use crate::shallow::terrain::Solids;
+use crate::shallow::two_level::surface;
 
 /// A call that changes the ground and reports what that did.
 ///

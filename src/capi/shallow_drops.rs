@@ -9,8 +9,8 @@ use super::shallow_surface::{
     Buffer, NO_SPAN, check_buffers, check_room, frz_shallow_layout, frz_shallow_size, layout,
 };
 use super::views::{Plain, Sized32, fill, frz_span, sized};
-use crate::shallow::falls::Droplet;
-use crate::shallow::falls::mesh::{Balls, Target, bound};
+use crate::shallow::free_fall::Droplet;
+use crate::shallow::free_fall::mesh::{Balls, Target, bound};
 use crate::shallow::surface::{Counts, Indices, Layout};
 
 /// Liquid in the air.

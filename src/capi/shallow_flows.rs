@@ -8,7 +8,7 @@ use super::shallow_lists::each_sized;
 use super::shallow_terrain::Terrain;
 use super::views::{Sized32, fill, finite, frz_view, meaning};
 use crate::shallow::Balance;
-use crate::shallow::flows::{FlowPoint, Kind, Pulse};
+use crate::shallow::sources::{FlowPoint, Kind, Pulse};
 
 /// Flag of a flow point: it lies on a triangle of the mesh that the liquid was made with, and moves with it.
 pub const FRZ_SHALLOW_ON_TRIANGLE: u32 = 1;

@@ -7,7 +7,7 @@ use super::mesh::no_flags;
 use super::shallow::{Spill, frz_shallow};
 use super::shallow_terrain::{Terrain, cells_in};
 use super::views::{Sized32, fill, sized};
-use crate::shallow::surface::lifts::{Distance, Fitted, Lifts};
+use crate::shallow::surface::minimum_heights::{Distance, Fitted, Lifts};
 
 /// What a thin film keeps from the ground's mesh, in edges of a cell, each finite and 0 or more.
 #[repr(C)]

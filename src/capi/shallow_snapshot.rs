@@ -10,7 +10,7 @@ use super::shallow_read::probe;
 use super::shallow_surface::{Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target};
 use super::views::{frz_span, frz_view};
 use crate::shallow::Snapshot;
-use crate::shallow::falls::mesh::Balls;
+use crate::shallow::free_fall::mesh::Balls;
 use crate::shallow::surface::{Depths, Surface};
 
 /// A liquid as it was after a frame, copied: another thread may draw it while the next frame is computed. A host has two of them: one

@@ -6,11 +6,12 @@
 use std::sync::atomic::AtomicBool;
 
 use super::clock::Clock;
-use super::flow::bands::attended;
-use super::flow::stop::Stop;
-use super::pace::{self, LENGTHS, MOST_STEPS, Measures, Next};
 use super::params::Pace;
+use super::solver::bands::attended;
+use super::solver::stop::Stop;
 use super::system::{Report, Shallow};
+use super::time_step;
+use super::time_step::{LENGTHS, MOST_STEPS, Measures, Next};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::numeric::cpu::FlushDenormals;
@@ -64,7 +65,7 @@ impl Shallow {
     /// # Errors
     /// `Argument`: dt out of range, or it needs over a million steps. `Cancelled`. In either case the liquid is as it was.
     pub fn step(&mut self, ctx: &Context, dt: f64) -> Result<Report> {
-        self.frame(ctx, dt, None, |pace| Some(pace::next(pace)))
+        self.frame(ctx, dt, None, |pace| Some(time_step::next(pace)))
     }
 
     /// As [`Shallow::step`], but when the calling thread has worked for `budget` (s), or, where several do, so long has passed, the frame ends
@@ -78,7 +79,7 @@ impl Shallow {
             return Err(Error::argument(format!("a budget of {budget} s is not positive")));
         }
         let clock = Clock::start(self.flow.divide(&self.columns, ctx.pool().threads()));
-        let next = |pace: &Next| (pace.steps == 0 || clock.seconds() < budget).then(|| pace::next(pace));
+        let next = |pace: &Next| (pace.steps == 0 || clock.seconds() < budget).then(|| time_step::next(pace));
         self.frame(ctx, dt, None, next)
     }
 

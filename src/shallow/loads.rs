@@ -6,9 +6,9 @@
 //! the liquid runs into acts the pressure of a stagnant jet, rho w^2 / 2, and along each face the shear of a film, of a flooded gap, or of a wall half a cell away.
 
 use super::columns::Columns;
-use super::flow::SLACK;
 use super::grid::Grid;
 use super::pipes::joints::Side;
+use super::solver::SLACK;
 use super::system::Shallow;
 use super::terrain::shapes::Shape;
 use crate::error::{Error, Result};

@@ -1,9 +1,9 @@
 //! What a user chooses.
 
-use super::falls::Falls;
-use super::liquid::Liquid;
+use super::free_fall::Falls;
+use super::material::Liquid;
 use super::pipes::Border;
-use super::thicken::Thickening;
+use super::thickening::Thickening;
 use crate::error::{Error, Result};
 
 /// Parameters of the flow.

@@ -1,6 +1,6 @@
 //! Liquid that a host pours or takes at once, and what its flow points have moved.
 
-use super::flows::{FlowPoint, Kind};
+use super::sources::{FlowPoint, Kind};
 use super::system::Shallow;
 use crate::error::{Error, Result};
 
@@ -54,7 +54,7 @@ impl Shallow {
     /// Gives a flow point another rate (m3/s): a valve. What it has moved, and how much an absorber holds, stays.
     ///
     /// # Errors
-    /// As [`Flows::set_rate`](super::flows::Flows::set_rate).
+    /// As [`Flows::set_rate`](super::sources::Flows::set_rate).
     pub fn set_rate(&mut self, point: usize, rate: f64) -> Result<()> {
         self.flows.set_rate(point, rate)
     }

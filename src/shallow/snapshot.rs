@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use super::columns::{Columns, NONE, STRIP};
-use super::falls::Droplet;
-use super::flow::Flow;
-use super::flow::active::runs;
+use super::free_fall::Droplet;
 use super::scalars::{MOST, find_concentrations};
+use super::solver::Flow;
+use super::solver::active::runs;
 use super::system::Shallow;
 use crate::error::{Error, Result};
 use crate::numeric::cpu::dispatch;

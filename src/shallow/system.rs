@@ -1,22 +1,23 @@
 //! The liquid of a domain, frame by frame.
 
 use super::columns::Columns;
-use super::falls::Falling;
-use super::flow::Flow;
-use super::flow::lips::Lips;
-use super::flow::stop::Stop;
-use super::flows::{FlowPoint, Flows};
 use super::frame::Kept;
+use super::free_fall::Falling;
 use super::grid::BOTTOMLESS;
 use super::identity::Identity;
-use super::pace::{self, Measures, Next};
 use super::params::{Friction, Params, Section};
 use super::pipes::rules::{Apart, Rules};
 use super::pipes::{Border, Pipes};
 use super::remap::Remap;
 use super::scalars::amounts::Account;
+use super::solver::Flow;
+use super::solver::overflow_edges::Lips;
+use super::solver::stop::Stop;
+use super::sources::{FlowPoint, Flows};
 use super::terrain::Solids;
-use super::thicken::Thick;
+use super::thickening::Thick;
+use super::time_step;
+use super::time_step::{Measures, Next};
 use crate::context::Context;
 use crate::error::{Error, Result};
 
@@ -252,14 +253,14 @@ impl Shallow {
     /// Begins a frame; returns how often its steps are halved, for fast films.
     pub(super) fn begin(&mut self, dt: f64, measures: &Measures, next: impl Fn(&Next) -> Option<f64>) -> u32 {
         self.steps.clear();
-        self.flow.begin_frame(&self.columns, &self.pipes, pace::bounds(&self.params, measures));
+        self.flow.begin_frame(&self.columns, &self.pipes, time_step::bounds(&self.params, measures));
         self.release();
         self.find_fast(dt, measures, next)
     }
 
     /// One step of a length (s), counted in a report.
     pub(super) fn advance(&mut self, measures: &Measures, length: f64, report: &mut Report, stop: &Stop) {
-        let step = pace::step(&self.params, measures, length, self.flow.last);
+        let step = time_step::step(&self.params, measures, length, self.flow.last);
         self.find_lips();
         let [emptied, filled, slowed] = self.flow.step(&self.columns, &self.pipes, &step, length, stop);
         self.fall(length);
@@ -292,13 +293,13 @@ impl Shallow {
             return 0;
         }
         let last = self.flow.last;
-        let drive = pace::drive(&self.params, measures, last);
-        let longest = pace::next(&self.next(measures, dt, 0, 0));
-        let farthest = 1 << pace::most_halvings(&self.params);
+        let drive = time_step::drive(&self.params, measures, last);
+        let longest = time_step::next(&self.next(measures, dt, 0, 0));
+        let farthest = 1 << time_step::most_halvings(&self.params);
         let cells = self.flow.find_fast(&self.columns, drive, longest / last, farthest);
         let halvings = cells.trailing_zeros();
         if let Some(length) = next(&self.next(measures, dt, 0, halvings)) {
-            let step = pace::step(&self.params, measures, length, last);
+            let step = time_step::step(&self.params, measures, length, last);
             self.flow.lighten(drive, &step);
         }
         halvings

@@ -4,11 +4,11 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use frazil::shallow::columns::Columns;
-use frazil::shallow::flows::{FlowPoint, Kind, Pulse};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::{Friction, Pace, Section};
 use frazil::shallow::pipes::{Border, Pipes};
+use frazil::shallow::sources::{FlowPoint, Kind, Pulse};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::terrain::solids::{Solid, unite};
 use frazil::shallow::{Params, Report, Shallow};

@@ -11,9 +11,9 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::scene::{Scene, Value};
 use crate::shallow::Law;
-use crate::shallow::flows::Kind;
 use crate::shallow::grid::TOP;
 use crate::shallow::pipes::Border;
+use crate::shallow::sources::Kind;
 
 /// Fewer cells than this look like a mistake.
 const FEW: usize = 100;

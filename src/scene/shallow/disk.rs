@@ -1,7 +1,7 @@
 //! How much space the files of a liquid on a terrain need at most: when all of it is wet.
 
 use super::Shallow;
-use crate::shallow::falls::mesh::bound;
+use crate::shallow::free_fall::mesh::bound;
 
 /// Bytes of a 32-bit float in a text, with what stands around it, and of an index.
 const TEXT: u64 = 12;

@@ -5,7 +5,7 @@ use crate::geometry::DVec3;
 use crate::numeric::bytes::{Reader, Writer};
 use crate::numeric::packed;
 use crate::numeric::packed::Magic;
-use crate::shallow::flows::{FlowPoint, Kind, Pulse};
+use crate::shallow::sources::{FlowPoint, Kind, Pulse};
 use crate::shallow::terrain::shapes::Shape;
 use crate::shallow::{Shallow, Stains};
 

@@ -5,11 +5,11 @@ use crate::error::Result;
 use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{MeshArray, TriMesh, Vec3};
 use crate::shallow::Shallow;
-use crate::shallow::falls::Droplet;
-use crate::shallow::falls::mesh::{Balls, Target as BallTarget};
+use crate::shallow::free_fall::Droplet;
+use crate::shallow::free_fall::mesh::{Balls, Target as BallTarget};
 use crate::shallow::scalars::MOST;
 use crate::shallow::surface::ledges::Ledges;
-use crate::shallow::surface::lifts::{Distance, Lifts};
+use crate::shallow::surface::minimum_heights::{Distance, Lifts};
 use crate::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target};
 
 /// Least height of a wet vertex above its ground, in cells: the ground does not show through a film (thesis 4.2.4).

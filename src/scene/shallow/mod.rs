@@ -38,12 +38,12 @@ use super::text::{Value, Values};
 use super::{KeyPose, Role};
 use crate::io::files::sequence::Pattern;
 use crate::motion::{Space, Up};
-use crate::shallow::falls::Falls;
-use crate::shallow::flows::FlowPoint;
-use crate::shallow::liquid::Liquid;
+use crate::shallow::free_fall::Falls;
+use crate::shallow::material::Liquid;
 use crate::shallow::params::{Friction, Pace, Section};
 use crate::shallow::pipes::Border;
-use crate::shallow::{Params, Staining, flows};
+use crate::shallow::sources::FlowPoint;
+use crate::shallow::{Params, Staining, sources};
 
 /// Cubic metres in a millilitre.
 pub const ML: f64 = 1.0e-6;
@@ -270,12 +270,12 @@ impl Point {
         let number = |name: &str| value(name).and_then(Value::number).unwrap_or(0.0);
         let frame = |name: &str| value(name).and_then(Value::whole).map(|frame| frame as i32);
         let kind = match table {
-            "source" => flows::Kind::Source,
+            "source" => sources::Kind::Source,
             "drain" => match value("orifice_mm2").and_then(Value::number) {
-                Some(area) => flows::Kind::Orifice(area * 1e-6 * number("discharge")),
-                None => flows::Kind::Drain,
+                Some(area) => sources::Kind::Orifice(area * 1e-6 * number("discharge")),
+                None => sources::Kind::Drain,
             },
-            _ => flows::Kind::Absorber(number("capacity_ml") * ML),
+            _ => sources::Kind::Absorber(number("capacity_ml") * ML),
         };
         let (frequency, share) = (number("frequency"), number("swing"));
         let point = FlowPoint {
@@ -283,7 +283,7 @@ impl Point {
             at: value("at").and_then(Value::numbers).unwrap_or_default(),
             radius: number("radius"),
             rate: number("rate_ml") * ML,
-            pulse: (frequency > 0.0 && share > 0.0).then_some(flows::Pulse { frequency, share }),
+            pulse: (frequency > 0.0 && share > 0.0).then_some(sources::Pulse { frequency, share }),
         };
         let follows = values.settled(table, Some(index), "follows");
         let carries = scalars::brought(values, table, index);

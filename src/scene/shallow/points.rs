@@ -4,7 +4,8 @@ use super::{Inputs, Point, Shallow};
 use crate::error::{Error, Result};
 use crate::geometry::TriMesh;
 use crate::scene::Scene;
-use crate::shallow::{self, flows::FlowPoint};
+use crate::shallow;
+use crate::shallow::sources::FlowPoint;
 
 impl Point {
     /// Its rate on the way to a frame (m3/s).

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::Border;
 use super::cliffs::Cliffs;
 use crate::shallow::columns::Columns;
-use crate::shallow::falls::Falls;
+use crate::shallow::free_fall::Falls;
 use crate::shallow::params::{Friction, Params};
 
 /// What pipes follow from besides the columns.

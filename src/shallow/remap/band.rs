@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use crate::shallow::columns::{Columns, STRIP, Strip};
-use crate::shallow::flow::Flow;
 use crate::shallow::scalars::MOST;
+use crate::shallow::solver::Flow;
 
 /// The columns of some rows and their liquid. Strips and indices are counted from the first of these rows.
 #[derive(Debug, Clone, Default)]

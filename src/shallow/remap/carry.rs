@@ -5,9 +5,9 @@ use std::ops::Range;
 use super::band::Band;
 use super::origins::Origins;
 use crate::shallow::columns::{Columns, NONE, STRIP, Strip, strip_mut, strip_of};
-use crate::shallow::flow::Flow;
 use crate::shallow::pipes::joints::Side;
 use crate::shallow::pipes::{Links, Pipes};
+use crate::shallow::solver::Flow;
 
 /// Flux and what truncation left.
 type Carried = [f32; 2];

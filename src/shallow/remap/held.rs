@@ -3,11 +3,11 @@
 //! Shares are whole units that depend on no order, so that a mirrored scene gets the mirrored shares.
 
 use crate::shallow::columns::Columns;
-use crate::shallow::flow::Flow;
 use crate::shallow::grid::BOTTOMLESS;
 use crate::shallow::scalars::MOST;
 use crate::shallow::scalars::amounts::Account;
 use crate::shallow::scalars::shares::{part, take};
+use crate::shallow::solver::Flow;
 
 /// Liquid that waits for room.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

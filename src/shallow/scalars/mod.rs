@@ -8,7 +8,7 @@ pub(super) mod amounts;
 pub(super) mod shares;
 
 use super::columns::STRIP;
-use super::flow::active::runs;
+use super::solver::active::runs;
 use super::system::Shallow;
 use crate::error::{Error, Result};
 use crate::numeric::cpu::dispatch;

@@ -2,8 +2,8 @@
 
 use crate::geometry::Vec3;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
-use crate::shallow::flow::Flow;
-use crate::shallow::flow::active::runs;
+use crate::shallow::solver::Flow;
+use crate::shallow::solver::active::runs;
 
 /// A strip with columns that have a film.
 #[derive(Debug, Clone, Copy)]

@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use super::boundary::Wall;
-use super::groups::{Search, each_odd_triangle};
 use super::links::Scene;
+use super::odd_quartets::{Search, each_odd_triangle};
 use super::strips::{Found, some};
 use super::{Indices, STRIP};
 use crate::numeric::cpu::dispatch;

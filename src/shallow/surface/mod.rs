@@ -24,32 +24,32 @@
 
 mod boundary;
 pub(in crate::shallow) mod cells;
-mod check;
-mod full;
-pub(in crate::shallow) mod groups;
+mod full_quartets;
 mod indices;
 pub mod ledges;
-pub mod lifts;
 mod links;
+pub mod minimum_heights;
 pub(in crate::shallow) mod normals;
+pub(in crate::shallow) mod odd_quartets;
 mod room;
+mod self_check;
 pub(in crate::shallow) mod shown;
 mod silhouette;
 mod skirts;
 mod strips;
 pub(in crate::shallow) mod vertices;
-mod walled;
+mod wall_quartets;
 
 use super::columns::{Columns, NONE, STRIP};
 use super::scalars::MOST;
 use crate::error::{Error, Result};
 use boundary::{Around, Walls};
-pub use check::{Check, check};
-use groups::Search;
 use ledges::Ledges;
 use links::Scene;
 use normals::Normals;
+use odd_quartets::Search;
 pub use room::bound;
+pub use self_check::{Check, check};
 use skirts::Skirts;
 use strips::Found;
 use vertices::Vertices;
@@ -64,7 +64,7 @@ pub struct Depths<'a> {
     /// Whether each strip may have a wet column; without it all are searched.
     pub active: Option<&'a [bool]>,
     /// Least depth at which each index is shown where it is wet (units), at most from base to ceiling; in place of [`Layout::least_depth`].
-    /// May be empty. See [`lifts::Lifts`].
+    /// May be empty. See [`minimum_heights::Lifts`].
     pub least: &'a [i32],
     /// How far below its base each index is shown where it is dry (units), at most to the underside of its solid; in place of
     /// [`Layout::least_depth`]. May be empty.
@@ -239,10 +239,10 @@ impl Surface {
         let scene = Scene { columns, depth: depths.depth, above: &self.above };
         self.found.reset(columns);
         self.walls.clear();
-        full::find_wet(scene, depths.active, &mut self.found);
-        full::find_full(scene, &mut self.found);
+        full_quartets::find_wet(scene, depths.active, &mut self.found);
+        full_quartets::find_full(scene, &mut self.found);
         let mut triangles = self.found.full_triangles;
-        triangles += groups::find_groups(scene, &mut self.found, &mut self.walls, &mut self.search);
+        triangles += odd_quartets::find_groups(scene, &mut self.found, &mut self.walls, &mut self.search);
         let columns_used = self.found.number(columns);
         let extras = self.walls.number(columns_used);
         self.found.has_means |= extras > 0;

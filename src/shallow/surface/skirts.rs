@@ -3,9 +3,9 @@
 //! An edge between two wet columns that has a triangle on one side only lies between a full quartet and an odd one, or in odd ones. Of all other edges both
 //! sides are known to be closed, so that few are looked at.
 
-use super::groups::Search;
 use super::ledges::{Hem, Ledges};
 use super::links::{RING, Scene, cell_at};
+use super::odd_quartets::Search;
 use super::strips::{Found, places, some};
 use super::vertices::Vertices;
 use super::{Columns, Indices, NONE, STRIP, Target};

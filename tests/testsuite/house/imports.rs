@@ -27,7 +27,7 @@ const UNSAFE: [&str; 9] = [
     "src/numeric/cpu.rs",
     "src/numeric/lanes.rs",
     "src/context/pool.rs",
-    "src/shallow/flow/transfer.rs",
+    "src/shallow/solver/transfer.rs",
     "src/snow/grains/collide.rs",
     "src/snow/grains/layout.rs",
     "src/snow/grains/rows.rs",

@@ -1,7 +1,7 @@
 //! Liquid is neither lost nor made, whatever dries up and gets wet.
 
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::terrain::Solids;

@@ -1,13 +1,14 @@
 //! Fine cells near, and coarse ones far away: nothing is lost, lakes stay at rest, and films and waves cross the edge.
 
+use frazil::Context;
 use frazil::Pool;
-use frazil::shallow::flows::{FlowPoint, Kind};
+use frazil::shallow::free_fall::Falls;
 use frazil::shallow::grid::BOTTOMLESS;
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;
+use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::{Detail, Params, Shallow};
-use frazil::{Context, shallow::falls::Falls};
 
 use crate::common::bodies::Dice;
 use crate::common::shallow::{Turn, context, floors, ground, waves};

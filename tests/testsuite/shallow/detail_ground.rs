@@ -1,9 +1,9 @@
 //! Level of detail where all cells are near, where ground moves, and where bodies cross the edge.
 
 use frazil::geometry::DVec3;
-use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::params::{Friction, Pace};
 use frazil::shallow::pipes::Border;
+use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Detail, Params, Shallow};

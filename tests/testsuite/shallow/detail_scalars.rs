@@ -1,10 +1,10 @@
 //! What liquid in cells of two sizes carries: none of it is lost, what is uniform stays so, and states have it.
 
 use frazil::geometry::DVec3;
-use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;
+use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Detail, Law, Params, Scalar, Shallow};

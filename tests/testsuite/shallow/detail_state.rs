@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use frazil::geometry::DVec3;
-use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;
+use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Detail, Params};

@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use frazil::geometry::DVec3;
 use frazil::shallow::columns::NONE;
-use frazil::shallow::detail::surface::{Surface, bound};
 use frazil::shallow::surface::{Counts, Depths, Indices, Layout, Target, Up};
 use frazil::shallow::terrain::shapes::Shape;
+use frazil::shallow::two_level::surface::{Surface, bound};
 use frazil::shallow::{Detail, Params};
 use frazil::{Context, Pool};
 

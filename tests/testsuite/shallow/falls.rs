@@ -1,13 +1,13 @@
 //! Liquid that falls freely: where it goes, where it lands, and that none of it is lost on the way.
 
 use frazil::geometry::DVec3;
-use frazil::shallow::falls::mesh::{Balls, Target, bound};
-use frazil::shallow::falls::{Droplet, Falls};
-use frazil::shallow::flows::{FlowPoint, Kind};
+use frazil::shallow::free_fall::mesh::{Balls, Target, bound};
+use frazil::shallow::free_fall::{Droplet, Falls};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;
+use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::surface::{Indices, Layout, Up};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::terrain::shapes::Shape;

@@ -1,9 +1,9 @@
 //! How liquid leaves an edge and lands: in threads, not all at the same time, and not in one column.
 
-use frazil::shallow::falls::mesh::{Balls, bound};
-use frazil::shallow::falls::{Droplet, Falls};
-use frazil::shallow::flows::{FlowPoint, Kind};
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::free_fall::mesh::{Balls, bound};
+use frazil::shallow::free_fall::{Droplet, Falls};
+use frazil::shallow::material::Liquid;
+use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::{Params, Shallow};
 
 use crate::common::shallow::{context, ground};

@@ -1,7 +1,7 @@
 //! Passages that are full up to their ceiling.
 
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};

@@ -2,10 +2,10 @@
 
 use std::process::Command;
 
-use frazil::shallow::flows::{FlowPoint, Kind};
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;
+use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::{Params, Shallow};
 use frazil::{Context, Pool};
 

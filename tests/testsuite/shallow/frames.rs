@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use frazil::Context;
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Detail, Params, Shallow};

@@ -2,7 +2,7 @@
 
 use frazil::Context;
 use frazil::geometry::DVec3;
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Load, Params, Shallow};

@@ -1,10 +1,10 @@
 //! Terrain that moves takes its liquid along, and none is lost.
 
 use frazil::geometry::DVec3;
-use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights, TOP};
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
+use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::terrain::solids::Solid;

@@ -1,10 +1,10 @@
 //! Read-back and snapshots: volumes against sums by hand, points on layers, and velocities from all sides.
 
-use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;
+use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Reading, Shallow, Snapshot};
 use frazil::{Context, Error, Pool};

@@ -1,10 +1,10 @@
 //! What the liquid carries: amounts add up to the last one, and concentrations stay between those that came in.
 
 use frazil::geometry::DVec3;
-use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;
+use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Law, Params, Scalar, Shallow, Snapshot};

@@ -3,7 +3,7 @@
 use frazil::Context;
 use frazil::geometry::{TriMesh, Vec3};
 use frazil::shallow::grid::{Grid, Heights};
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::stains::Absorbing;
 use frazil::shallow::terrain::triangles;
 use frazil::shallow::{Params, Scalar, Shallow, Staining, Stains};

@@ -1,9 +1,9 @@
 //! Saved states: what is restored flows on to the same bytes, and what is damaged changes nothing.
 
-use frazil::shallow::flows::{FlowPoint, Kind, Pulse};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;
+use frazil::shallow::sources::{FlowPoint, Kind, Pulse};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 use frazil::{Context, Error, Pool};

@@ -6,7 +6,7 @@ use crate::common::rough_ground::{Kind, rough};
 use frazil::geometry::Vec3;
 use frazil::shallow::columns::{Columns, NONE};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, TOP};
-use frazil::shallow::surface::lifts::{Distance, Fitted, Lifts};
+use frazil::shallow::surface::minimum_heights::{Distance, Fitted, Lifts};
 use frazil::shallow::surface::{Depths, Layout, Surface};
 use frazil::shallow::terrain::Solids;
 

@@ -2,7 +2,7 @@
 
 use frazil::Context;
 use frazil::Pool;
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::{Law, Params, Scalar, Shallow, Thickening};
 

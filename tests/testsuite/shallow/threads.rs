@@ -1,8 +1,8 @@
 //! The same bytes from any number of threads.
 
-use frazil::shallow::flows::{FlowPoint, Kind};
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::pipes::Border;
+use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 use frazil::{Context, Pool};

@@ -3,7 +3,7 @@
 use std::process::Command;
 
 use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
-use frazil::shallow::liquid::Liquid;
+use frazil::shallow::material::Liquid;
 use frazil::shallow::params::{Friction, Pace, Section};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};

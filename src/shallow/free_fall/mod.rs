@@ -1,0 +1,160 @@
+//! Liquid that falls freely: over cliffs, through holes and into the void it flies, in packets, until it lands.
+//!
+//! | word | meaning |
+//! |---|---|
+//! | lip | a link that liquid falls freely from in a step: the void is beyond, or the surface there lies deeper than a given height (`solver/overflow_edges.rs`) |
+//! | thread | a lip that takes what goes over those near it (`free_fall/rivulets.rs`) |
+//! | packet | what went over a lip in some steps; whole units of volume, which fly together (`flight.rs`) and land together (`falling.rs`, `splash.rs`) |
+//! | drop | a packet, as a host sees it |
+//! | strand | a tube between packets that follow each other from the same lip, and from it to the last (`mesh.rs`) |
+//!
+//! A packet begins at the lip's base, with the velocity of what went over it, at most that at the brink of a free overfall, 1.4 times the critical
+//! one of its flow (Rouse, Civil Engineering 6, 1936), or of the liquid that arrives there, if that is faster. It flies without drag, and lands on the first
+//! surface that it meets and around: without room there, as liquid does where the terrain moves (`remap/held.rs`). At a wall it stops, and falls down along it. Where there
+//! is nothing it leaves the domain below its lowest height, or over an open border, and is lost.
+
+mod falling;
+mod flight;
+pub mod mesh;
+mod packet;
+mod rivulets;
+mod splash;
+
+use super::columns::Columns;
+use super::pipes::cliffs::Cliffs;
+use super::scalars::MOST;
+use super::scalars::shares::LEVELS;
+use super::system::Shallow;
+use crate::error::{Error, Result};
+pub(super) use falling::{Falling, LIP, Waiting};
+pub(super) use packet::{PACKET, Packet};
+
+/// How liquid falls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Falls {
+    /// Height (m) from which on liquid falls freely, from the base of the column that gives to the surface below; 0 and up; 0.01. Steps of less than a cell
+    /// are no falls.
+    pub height: f64,
+    /// Time between packets of a lip (s), 0.0001 to 1, at least a step; 1/120.
+    pub interval: f64,
+    /// Volume of a drop (m3), 0 and up: where it takes longer than 8 intervals liquid waits at its lip until it is one, at most 60. 6.5e-11, a ball of half a
+    /// millimetre.
+    pub drop: f64,
+    /// Most packets in the air, 1 to 1,048,576, for which there is room from the beginning; 8192. While there are so many, liquid that goes over a lip is
+    /// below at once.
+    pub most: usize,
+}
+
+impl Default for Falls {
+    fn default() -> Self {
+        Self { height: 0.01, interval: 1.0 / 120.0, drop: 6.5e-11, most: 8192 }
+    }
+}
+
+impl Falls {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// `Argument`, naming the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        for (name, value) in [("height", self.height), ("drop", self.drop)] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(Error::argument(format!("falls.{name} = {value} is not finite and 0 or more")));
+            }
+        }
+        if !(1e-4..=1.0).contains(&self.interval) {
+            let value = self.interval;
+            return Err(Error::argument(format!("falls.interval = {value} s is not within 0.0001 to 1")));
+        }
+        if !(1..=1 << 20).contains(&self.most) {
+            return Err(Error::argument(format!("falls.most = {} is not within 1 to 1048576", self.most)));
+        }
+        Ok(())
+    }
+
+    /// Pipes that liquid may fall freely through.
+    pub(super) fn cliffs(falls: Option<&Self>, columns: &Columns) -> Cliffs {
+        let Some(falls) = falls else { return Cliffs::NONE };
+        let height = falls.height.max(columns.grid.cell) / columns.heights.unit;
+        Cliffs(height.min(f64::from(i32::MAX - 1)) as i32)
+    }
+}
+
+/// Liquid in the air, as a host sees it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Droplet {
+    /// Its place (m).
+    pub position: [f64; 3],
+    /// Its velocity (m/s).
+    pub velocity: [f64; 3],
+    /// How much it is (m3).
+    pub volume: f64,
+    /// Radius of a ball of its volume (m).
+    pub radius: f64,
+    /// Seconds since it left its lip.
+    pub age: f64,
+    /// Its lip: the same number for all that come from one side of one column.
+    pub source: u64,
+    /// Concentration of each scalar that it carries, in the scalar's own measure.
+    pub concentrations: [f32; MOST],
+    /// Where the liquid leaves the ground, if this drop is the last that has left it.
+    pub lip: Option<Lip>,
+    /// One more than that of the drop that left the same lip before it, if nothing interrupted the flow there.
+    pub number: u64,
+}
+
+/// Where liquid leaves the ground.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Lip {
+    /// The middle of the column that it comes from, half way up (m).
+    pub place: [f64; 3],
+    /// How deep it is there (m).
+    pub depth: f64,
+    /// A unit vector along the edge.
+    pub edge: [f64; 3],
+}
+
+impl Shallow {
+    /// The liquid in the air, in the order in which it left its lips; at most [`Falls::most`].
+    pub fn drops(&self) -> impl ExactSizeIterator<Item = Droplet> + '_ {
+        let (grid, heights) = (self.columns.grid, self.columns.heights);
+        let unit = grid.cell * grid.cell * heights.unit;
+        let scalars = self.scalars();
+        self.falls.packets().iter().map(move |packet| {
+            let mut concentrations = [0.0; MOST];
+            for ((out, scalar), amount) in concentrations.iter_mut().zip(scalars).zip(packet.amounts) {
+                *out = (amount as f64 / packet.units as f64 * (scalar.range / LEVELS)) as f32;
+            }
+            let place = |axis: usize| {
+                grid.origin[axis] + (f64::from(packet.cell[axis]) + 0.5 + packet.offset[axis]) * grid.cell
+            };
+            let [east, south] = packet.along.map(|speed| speed * grid.cell);
+            let volume = packet.units as f64 * unit;
+            let lip = (packet.tick == self.falls.tick).then(|| self.lip_of(packet)).flatten();
+            Droplet {
+                position: [place(0), heights.low + packet.height * heights.unit, place(1)],
+                velocity: [east, -packet.down * heights.unit, south],
+                volume,
+                radius: libm::cbrt(0.75 / std::f64::consts::PI * volume),
+                age: packet.age,
+                source: packet.source,
+                concentrations,
+                lip,
+                number: packet.tick,
+            }
+        })
+    }
+
+    /// Where a packet's liquid comes from; none if the ground has moved since.
+    fn lip_of(&self, packet: &Packet) -> Option<Lip> {
+        let (columns, unit) = (&self.columns, self.columns.heights.unit);
+        let (cell, layer) = ((packet.source >> 18) as usize, (packet.source & 0xffff) as usize);
+        let cell = [cell % columns.grid.size[0], cell / columns.grid.size[0]];
+        let column = columns.column(cell, layer)?;
+        let ([x, z], base) = (columns.grid.centre(cell), f64::from(columns.bases()[column]) * unit);
+        let depth = f64::from(self.flow.depth[column]) * unit;
+        // Sides to the east and to the west are even.
+        let edge = if packet.source >> 16 & 1 == 0 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
+        Some(Lip { place: [x, columns.heights.low + base + 0.5 * depth, z], depth, edge })
+    }
+}

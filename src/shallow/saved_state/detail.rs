@@ -1,0 +1,239 @@
+//! The state of a liquid in cells of two sizes: those of both, what flows across the edge between them, and what makes no coarse unit.
+//!
+//! | part | bytes |
+//! |---|---|
+//! | header: magic, version, count of scalars, length of all, the near cells, counts of pipes and of cells with a rest, lengths of both states, length of the last step | [`HEADER`] |
+//! | cells with a rest: the cell, nothing, fine units, then an amount of each scalar | 16 each, and 8 |
+//! | pipes along the edge: flux, what truncation left | 8 each |
+//! | states of the fine and of the coarse liquid, as [`super`] has them | |
+//! | hash of all this | [`SEAL`] |
+
+use xxhash_rust::xxh3::xxh3_128;
+
+use super::{LAST, MOST_FLUX, Put, SEAL, SUMS, Saved, is_over, part, parts, refused};
+use crate::error::{Error, Result};
+use crate::numeric::bytes::Reader;
+use crate::shallow::Shallow;
+use crate::shallow::scalars::MOST;
+use crate::shallow::two_level::rests::Load;
+use crate::shallow::two_level::{Cells, Detail, check_near};
+
+const MAGIC: [u8; 8] = *b"frz shld";
+const VERSION: u32 = 1;
+/// Bytes of the header.
+const HEADER: usize = 72;
+
+impl Detail {
+    /// The state between two frames: all but the terrain, the parameters, the flow points and the bodies, which the host has. The near cells are part of it. The same
+    /// bytes on any number of threads.
+    pub fn save(&self) -> Vec<u8> {
+        let mut out = vec![0; self.save_size()];
+        self.write(&mut out);
+        out
+    }
+
+    /// As [`Detail::save`], to the beginning of a slice; returns how many bytes. Nothing is allocated.
+    ///
+    /// # Errors
+    /// `Argument`: it is shorter than [`Detail::save_size`]; nothing is written.
+    pub fn save_to(&self, out: &mut [u8]) -> Result<usize> {
+        let (size, room) = (self.save_size(), out.len());
+        let Some(out) = out.get_mut(..size) else {
+            return Err(Error::argument(format!("a state of {size} bytes does not fit into {room}")));
+        };
+        self.write(out);
+        Ok(size)
+    }
+
+    /// Count of bytes that [`Detail::save`] would return now.
+    pub fn save_size(&self) -> usize {
+        let own = HEADER
+            + rest_bytes(self.scalars().len()) * self.rest.iter().count()
+            + 8 * self.seam.numbers().len();
+        own + self.fine.save_size() + self.coarse.save_size() + SEAL
+    }
+
+    /// Puts a saved state in place of the liquid's, and its near cells: from here it flows as the saved one did, to the same bytes, with the same
+    /// parameters, flow points and bodies, which are set first ([`crate::shallow::Shallow::restore`]). Nothing is allocated where the near cells are those of the
+    /// state.
+    ///
+    /// # Errors
+    /// `Bytes`, and the liquid is as it was: a state that is not of a liquid in cells of two sizes, of another version, cut short or damaged; else
+    /// as [`crate::shallow::Shallow::restore`].
+    pub fn restore(&mut self, bytes: &[u8]) -> Result<()> {
+        let saved = Both::read(bytes)?;
+        if check_near(&saved.near, self.fine.columns.grid.size).is_err() {
+            return Err(refused("belongs to another terrain"));
+        }
+        if saved.near == self.near {
+            saved.check(self)?;
+            saved.apply(self);
+            return Ok(());
+        }
+        // Only with these cells its states are of the same columns.
+        let own = self.save();
+        self.set_near(saved.near.clone())?;
+        let result = saved.check(self);
+        if result.is_ok() {
+            saved.apply(self);
+        } else {
+            let own = Both::read(&own)?;
+            self.set_near(own.near.clone())?;
+            own.apply(self);
+        }
+        result
+    }
+
+    /// Saves the state into a vector, which is given room for the largest that this liquid can have.
+    pub(in crate::shallow) fn keep(&self, out: &mut Vec<u8>) {
+        let most = [&self.fine, &self.coarse].map(Shallow::most_save_size);
+        let rests = rest_bytes(self.scalars().len()) * self.rest.len();
+        out.clear();
+        out.reserve(HEADER + rests + 8 * self.seam.numbers().len() + most[0] + most[1] + SEAL);
+        out.resize(self.save_size(), 0);
+        self.write(out);
+    }
+
+    /// Puts a state in place that was saved of this liquid, with the same near cells.
+    pub(in crate::shallow) fn put_back(&mut self, bytes: &[u8]) {
+        let saved = Both::read(bytes);
+        debug_assert!(saved.is_ok());
+        saved.into_iter().for_each(|saved| saved.apply(self));
+    }
+
+    fn write(&self, out: &mut [u8]) {
+        let size = out.len();
+        let (body, seal) = out.split_at_mut(size - SEAL);
+        let mut to = Put(&mut *body);
+        let sizes = [self.fine.save_size(), self.coarse.save_size()];
+        let [x, z] = &self.near;
+        to.bytes(&MAGIC);
+        to.numbers(&[VERSION, self.scalars().len() as u32], u32::to_le_bytes);
+        to.bytes(&(size as u64).to_le_bytes());
+        to.numbers(&[x.start, x.end, z.start, z.end].map(|at| at as u32), u32::to_le_bytes);
+        let counts = [self.seam.numbers().len(), self.rest.iter().count()];
+        to.numbers(&counts.map(|count| count as u32), u32::to_le_bytes);
+        to.numbers(&sizes.map(|size| size as u64), u64::to_le_bytes);
+        to.numbers(&[self.seam.last()], f64::to_le_bytes);
+        for (cell, load) in self.rest.iter() {
+            to.numbers(&[cell as u32, 0], u32::to_le_bytes);
+            to.bytes(&load.units.to_le_bytes());
+            to.numbers(&load.amounts[..self.scalars().len()], i64::to_le_bytes);
+        }
+        self.seam.numbers().for_each(|numbers| to.numbers(&numbers, f32::to_le_bytes));
+        for (liquid, size) in [&self.fine, &self.coarse].into_iter().zip(sizes) {
+            liquid.write(&super::Counts::of(liquid), to.next(size));
+        }
+        debug_assert!(to.0.is_empty());
+        seal.copy_from_slice(&xxh3_128(body).to_le_bytes());
+    }
+}
+
+/// Bytes of a cell's rest with so many scalars.
+fn rest_bytes(scalars: usize) -> usize {
+    16 + 8 * scalars
+}
+
+/// A state that is whole, in its parts.
+struct Both<'a> {
+    near: Cells,
+    last: f64,
+    /// Of as many bytes as a cell's rest has.
+    rests: &'a [u8],
+    scalars: usize,
+    /// Flux, and what truncation left.
+    pipes: &'a [[u8; 4]],
+    liquids: [Saved<'a>; 2],
+}
+
+impl<'a> Both<'a> {
+    fn read(bytes: &'a [u8]) -> Result<Self> {
+        let Some(header) = bytes.first_chunk::<HEADER>().filter(|header| header.starts_with(&MAGIC)) else {
+            let is_begun = bytes.len() < HEADER && bytes.starts_with(&MAGIC);
+            return Err(refused(if is_begun {
+                "is cut short"
+            } else {
+                "is not of a shallow liquid in cells of two sizes"
+            }));
+        };
+        let mut from = Reader::new(&header[8..]);
+        let version = from.u32()?;
+        if version != VERSION {
+            return Err(refused(&format!("has format {version}, and this library reads {VERSION}")));
+        }
+        let scalars = from.u32()? as usize;
+        let length = u64::from_le_bytes(from.take()?);
+        if length > bytes.len() as u64 {
+            return Err(refused("is cut short"));
+        }
+        let (body, seal) = bytes.split_at(bytes.len() - SEAL);
+        if length < bytes.len() as u64 || xxh3_128(body).to_le_bytes() != *seal {
+            return Err(refused("is damaged"));
+        }
+        let mut count = || from.u32().map(|count| count as usize);
+        let near = [count()?..count()?, count()?..count()?];
+        let [pipes, rests] = [count()?, count()?];
+        let sizes = [u64::from_le_bytes(from.take()?), u64::from_le_bytes(from.take()?)];
+        let last = from.f64()?;
+        if scalars > MOST {
+            return Err(refused("is damaged"));
+        }
+        let fixed = (HEADER + rest_bytes(scalars) * rests + 8 * pipes + SEAL) as u64;
+        let all = sizes[0].checked_add(sizes[1]).and_then(|sum| sum.checked_add(fixed));
+        if all != Some(length) {
+            return Err(refused("is damaged"));
+        }
+        let mut from = Reader::new(&body[HEADER..]);
+        let rests = from.bytes(rest_bytes(scalars) * rests)?;
+        let pipes = parts(&mut from, 2 * pipes)?;
+        let [fine, coarse] = sizes.map(|size| size as usize);
+        let liquids = [Saved::read(from.bytes(fine)?)?, Saved::read(from.bytes(coarse)?)?];
+        Ok(Self { near, last, rests, scalars, pipes, liquids })
+    }
+
+    /// Whether it is of this liquid, whose near cells are its own.
+    fn check(&self, detail: &Detail) -> Result<()> {
+        let [fine, coarse] = &self.liquids;
+        fine.check(&detail.fine)?;
+        coarse.check(&detail.coarse)?;
+        let (flux, left) = (self.pipes.iter().step_by(2), self.pipes.iter().skip(1).step_by(2));
+        let cells = self.rests().map(|(cell, _)| cell);
+        let is_good = self.scalars == detail.scalars().len()
+            && self.pipes.len() == 2 * detail.seam.numbers().len()
+            && LAST.contains(&self.last)
+            && !flux.copied().any(|flux| is_over(&[flux], MOST_FLUX))
+            && !left.copied().any(|left| is_over(&[left], 1.0))
+            && cells.clone().is_sorted_by(|a, b| a < b)
+            && cells.last().is_none_or(|cell| cell < detail.rest.len())
+            && self.rests().all(|(_, load)| {
+                load.units >= 0
+                    && load != Load::default()
+                    && SUMS.contains(&load.units)
+                    && load.amounts.iter().all(|amount| SUMS.contains(amount))
+            });
+        if is_good { Ok(()) } else { Err(refused("is damaged")) }
+    }
+
+    fn rests(&self) -> impl Iterator<Item = (usize, Load)> + Clone {
+        let (bytes, scalars) = (rest_bytes(self.scalars), self.scalars);
+        self.rests.chunks_exact(bytes).map(move |rest| {
+            let mut amounts = [0; MOST];
+            for (at, amount) in amounts[..scalars].iter_mut().enumerate() {
+                *amount = i64::from_le_bytes(part(rest, 16 + 8 * at));
+            }
+            let units = i64::from_le_bytes(part(rest, 8));
+            (u32::from_le_bytes(part(rest, 0)) as usize, Load { units, amounts })
+        })
+    }
+
+    /// Puts the state in place.
+    fn apply(&self, detail: &mut Detail) {
+        let [fine, coarse] = &self.liquids;
+        fine.apply(&mut detail.fine);
+        coarse.apply(&mut detail.coarse);
+        detail.rest.clear();
+        self.rests().for_each(|(cell, load)| detail.rest.set(cell, load));
+        let numbers = self.pipes.as_chunks::<2>().0.iter().map(|pipe| pipe.map(f32::from_le_bytes));
+        detail.seam.set_numbers(self.last, numbers);
+    }
+}

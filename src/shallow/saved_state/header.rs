@@ -1,0 +1,146 @@
+//! What a state begins with, and how much of each part there is.
+
+use std::ops::Range;
+
+use super::{Put, heads};
+use crate::error::Result;
+use crate::numeric::bytes::Reader;
+use crate::shallow::columns::STRIP;
+use crate::shallow::free_fall::{LIP, PACKET};
+use crate::shallow::scalars::amounts::ACCOUNTS;
+use crate::shallow::solver::active::runs;
+use crate::shallow::system::Shallow;
+
+pub(super) const MAGIC: [u8; 8] = *b"frz shal";
+pub(super) const VERSION: u32 = 2;
+/// Bytes of the header.
+pub(super) const HEADER: usize = 168;
+/// Bytes of the hash.
+pub(super) const SEAL: usize = 16;
+/// Bytes of a strip's share of an array.
+pub(super) const SHARE: usize = 4 * STRIP;
+/// Arrays by column index: depths, two of fluxes, two of what truncation left.
+pub(super) const ARRAYS: usize = 5;
+
+/// How many of each a state holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Counts {
+    pub(super) runs: usize,
+    /// Strips in all runs.
+    pub(super) strips: usize,
+    pub(super) rows: usize,
+    pub(super) points: usize,
+    pub(super) links: usize,
+    /// Strips with heads.
+    pub(super) heads: usize,
+    /// Parcels of liquid that waits for room.
+    pub(super) parcels: usize,
+    /// Packets in the air, and links that liquid may fall from.
+    pub(super) packets: usize,
+    pub(super) lips: usize,
+    /// What the liquid carries.
+    pub(super) scalars: usize,
+}
+
+impl Counts {
+    pub(super) fn of(shallow: &Shallow) -> Self {
+        let flow = &shallow.flow;
+        let add = |(count, strips): (usize, usize), run: Range<usize>| (count + 1, strips + run.len());
+        let (count, strips) = runs(flow.active()).fold((0, 0), add);
+        Self {
+            runs: count,
+            strips,
+            rows: flow.bands().row_depths().len(),
+            points: shallow.flows.progress().len(),
+            links: flow.links.flux.len(),
+            heads: heads(shallow).count(),
+            parcels: shallow.remap.held.parcels().len(),
+            packets: shallow.falls.packets().len(),
+            lips: shallow.falls.waiting().len(),
+            scalars: shallow.scalars().len(),
+        }
+    }
+
+    /// As [`Counts::of`], if all columns were wet and full.
+    pub(super) fn most_of(shallow: &Shallow) -> Self {
+        let strips = shallow.columns.strips().len();
+        Self { runs: strips.div_ceil(2), strips, heads: strips, ..Self::of(shallow) }
+    }
+
+    /// Bytes of a state.
+    pub(super) fn size(&self) -> usize {
+        HEADER
+            + 8 * self.runs
+            + 4 * self.rows
+            + 16 * self.parcels
+            + PACKET * self.packets
+            + LIP * self.lips
+            + 24 * self.points
+            + 8 * self.links
+            + (4 + SHARE) * self.heads
+            + ARRAYS * SHARE * self.strips
+            + self.scalars
+                * (SCALAR + 8 * (self.parcels + self.packets + self.lips) + 2 * SHARE * self.strips)
+            + SEAL
+    }
+}
+
+/// What comes first: magic, version, border, hash of the terrain, length of all, counts, times, level outside, sums, when
+/// packets were made last.
+pub(super) struct Header {
+    pub(super) border: u32,
+    pub(super) terrain: [u8; 16],
+    pub(super) counts: Counts,
+    /// Simulated time, length of the last step (s).
+    pub(super) times: [f64; 2],
+    /// Surface of the liquid at rest beyond an absorbing border (units).
+    pub(super) still: i32,
+    /// Units poured, sourced, drained, absorbed, lost and gained.
+    pub(super) sums: [i64; 6],
+    /// Seconds since packets were made, and how often they were.
+    pub(super) since: f64,
+    pub(super) tick: u64,
+}
+
+/// Bytes of a scalar's part without those of columns and parcels.
+pub(super) const SCALAR: usize = 32 + 16 * ACCOUNTS;
+
+impl Header {
+    pub(super) fn put(&self, to: &mut Put<'_>) {
+        let Counts { runs, strips, rows, points, links, heads, parcels, packets, lips, scalars } =
+            self.counts;
+        let counts = [runs, strips, rows, points, links, heads, parcels, packets, lips, scalars]
+            .map(|count| count as u32);
+        to.bytes(&MAGIC);
+        to.numbers(&[VERSION, self.border], u32::to_le_bytes);
+        to.bytes(&self.terrain);
+        to.bytes(&(self.counts.size() as u64).to_le_bytes());
+        to.numbers(&counts, u32::to_le_bytes);
+        to.numbers(&self.times, f64::to_le_bytes);
+        to.numbers(&[self.still, 0], i32::to_le_bytes);
+        to.numbers(&self.sums, i64::to_le_bytes);
+        to.numbers(&[self.since], f64::to_le_bytes);
+        to.numbers(&[self.tick], u64::to_le_bytes);
+    }
+
+    /// Reads a header whose magic, version and length are right.
+    pub(super) fn read(bytes: &[u8; HEADER]) -> Result<Self> {
+        let mut from = Reader::new(&bytes[12..]);
+        let (border, terrain) = (from.u32()?, from.take()?);
+        from.take::<8>()?;
+        let mut count = || from.u32().map(|count| count as usize);
+        let (runs, strips, rows) = (count()?, count()?, count()?);
+        let (points, links, heads, parcels) = (count()?, count()?, count()?, count()?);
+        let (packets, lips, scalars) = (count()?, count()?, count()?);
+        let times = [from.f64()?, from.f64()?];
+        let still = from.u32()? as i32;
+        from.take::<4>()?;
+        let mut sums = [0; 6];
+        for sum in &mut sums {
+            *sum = i64::from_le_bytes(from.take()?);
+        }
+        let (since, tick) = (from.f64()?, u64::from_le_bytes(from.take()?));
+        let counts = Counts { runs, strips, rows, points, links, heads, parcels, packets, lips, scalars };
+        Ok(Self { border, terrain, counts, times, still, sums, since, tick })
+    }
+}

@@ -1,0 +1,474 @@
+//! The state of the liquid as bytes, and back; from there it flows on to the same bytes.
+//!
+//! Numbers are little-endian and are not packed: a game that saves every second has a fraction of a millisecond for it. Of the columns only
+//! those of active strips are there, so that a puddle in a large domain is small.
+//!
+//! | part | bytes |
+//! |---|---|
+//! | header: [`Header`] | [`HEADER`] |
+//! | runs of active strips: the first, and how many | 8 each |
+//! | at least the greatest depth of each row | 4 each |
+//! | liquid that waits for room: its cell, its height, units | 16 each |
+//! | packets in the air | [`PACKET`] each |
+//! | what waits at links to fall, if the liquid has falls | [`LIP`] each |
+//! | flow points: what it does, nothing, units it waits for, units it has moved | 24 each |
+//! | fluxes of links, then what truncation left of them | 4 each |
+//! | strips of full columns with heads, then their heads | 4 each, then 64 each |
+//! | of each run: depths; fluxes to the east and to the south; what truncation left of both | 5 x 64 a strip |
+//! | of each scalar: its part ([`scalars`]) | |
+//! | hash of all this | [`SEAL`] |
+
+mod detail;
+mod header;
+mod scalars;
+
+use std::ops::{Range, RangeInclusive};
+
+use xxhash_rust::xxh3::xxh3_128;
+
+use super::columns::{Columns, STRIP};
+use super::free_fall::{LIP, PACKET, Packet, Waiting};
+use super::grid::{BOTTOMLESS, TOP};
+use super::pipes::Border;
+use super::remap::Parcel;
+use super::solver::active::runs;
+use super::sources::Kind;
+use super::system::Shallow;
+use crate::error::{Error, Result};
+use crate::numeric::bytes::Reader;
+use crate::numeric::cpu::dispatch;
+use header::{ARRAYS, Counts, HEADER, Header, MAGIC, SEAL, SHARE, VERSION};
+use scalars::Scalars;
+
+/// Beyond what a flux can be (units a step): K keeps transfers within the depth of what gives.
+const MOST_FLUX: f32 = 2.0 * TOP as f32;
+/// Length of the last step (s), such that the next one's share of a flux is finite.
+const LAST: RangeInclusive<f64> = 1e-20..=1e6;
+/// Sums of units, such that three of them fit 64 bits; and units that a flow point waits for.
+const SUMS: RangeInclusive<i64> = -(1 << 61)..=1 << 61;
+const WAITING: RangeInclusive<f64> = -1e18..=1e18;
+
+impl Shallow {
+    /// The state between two frames: all but the terrain, the parameters and the flow points, which the host has, and
+    /// [`Shallow::last_steps`]. The same bytes on any number of threads.
+    pub fn save(&self) -> Vec<u8> {
+        let counts = Counts::of(self);
+        let mut out = vec![0; counts.size()];
+        self.write(&counts, &mut out);
+        out
+    }
+
+    /// As [`Shallow::save`], in place of what a vector holds; nothing is allocated where it has the capacity.
+    pub fn save_into(&self, out: &mut Vec<u8>) {
+        let counts = Counts::of(self);
+        out.resize(counts.size(), 0);
+        self.write(&counts, out);
+    }
+
+    /// As [`Shallow::save`], to the beginning of a slice; returns how many bytes.
+    ///
+    /// # Errors
+    /// `Argument`: it is shorter than [`Shallow::save_size`]; nothing is written.
+    pub fn save_to(&self, out: &mut [u8]) -> Result<usize> {
+        let counts = Counts::of(self);
+        let (size, room) = (counts.size(), out.len());
+        let Some(out) = out.get_mut(..size) else {
+            return Err(Error::argument(format!("a state of {size} bytes does not fit into {room}")));
+        };
+        self.write(&counts, out);
+        Ok(size)
+    }
+
+    /// Count of bytes that [`Shallow::save`] would return now.
+    pub fn save_size(&self) -> usize {
+        Counts::of(self).size()
+    }
+
+    /// Puts a saved state in place of the liquid's: from here it flows as the saved one did, to the same bytes, with the same parameters.
+    ///
+    /// Where the saved liquid had flow points, the same ones are set first ([`Shallow::set_flows`]): what each of them waits for and has
+    /// moved is restored in their order. Their places and rates are not compared; the terrain is, by a hash, and the border.
+    /// The same scalars are set first, too; what sources and pours carry is not restored. [`Shallow::last_steps`] is empty behind it. Nothing is
+    /// allocated.
+    ///
+    /// # Errors
+    /// `Bytes`, and the liquid is as it was: a state that is not of a shallow liquid, of another version, cut short or damaged; of another
+    /// terrain or border, or with other falls; with another count of flow points, or with other kinds; with other scalars, but for their names.
+    pub fn restore(&mut self, bytes: &[u8]) -> Result<()> {
+        let saved = Saved::read(bytes)?;
+        saved.check(self)?;
+        saved.apply(self);
+        Ok(())
+    }
+
+    /// Count of bytes that [`Shallow::save`] could return at most, however the liquid flowed from here in a frame.
+    pub(super) fn most_save_size(&self) -> usize {
+        Counts::most_of(self).size()
+    }
+
+    /// Puts a state in place that was saved of this liquid, on the same columns.
+    pub(super) fn put_back(&mut self, bytes: &[u8]) {
+        let saved = Saved::read(bytes);
+        debug_assert!(saved.is_ok());
+        saved.into_iter().for_each(|saved| saved.apply(self));
+    }
+
+    fn write(&self, counts: &Counts, out: &mut [u8]) {
+        let (body, seal) = out.split_at_mut(counts.size() - SEAL);
+        let mut to = Put(&mut *body);
+        self.header(counts).put(&mut to);
+        let flow = &self.flow;
+        for run in runs(flow.active()) {
+            to.numbers(&[run.start as u32, run.len() as u32], u32::to_le_bytes);
+        }
+        to.numbers(flow.bands().row_depths(), i32::to_le_bytes);
+        self.remap.held.parcels().iter().for_each(|parcel| to.bytes(&parcel.to_bytes()));
+        self.falls.packets().iter().for_each(|packet| to.bytes(&packet.to_bytes()));
+        self.falls.waiting().iter().for_each(|waiting| to.bytes(&waiting.to_bytes()));
+        for (kind, waiting, moved) in self.flows.progress() {
+            to.numbers(&[code_of_kind(kind), 0], u32::to_le_bytes);
+            to.bytes(&waiting.to_le_bytes());
+            to.bytes(&moved.to_le_bytes());
+        }
+        to.numbers(&flow.links.flux, f32::to_le_bytes);
+        to.numbers(&flow.links.left, f32::to_le_bytes);
+        heads(self).for_each(|(strip, _)| to.bytes(&(strip as u32).to_le_bytes()));
+        heads(self).for_each(|(_, heads)| to.numbers(heads, f32::to_le_bytes));
+        for run in runs(flow.active()) {
+            let run = run.start * STRIP..run.end * STRIP;
+            to.numbers(&flow.depth[run.clone()], i32::to_le_bytes);
+            for numbers in flow.numbers() {
+                to.numbers(&numbers[run.clone()], f32::to_le_bytes);
+            }
+        }
+        scalars::put(self, &mut to);
+        debug_assert!(to.0.is_empty());
+        seal.copy_from_slice(&xxh3_128(body).to_le_bytes());
+    }
+
+    fn header(&self, counts: &Counts) -> Header {
+        let (flows, links) = (&self.flows, &self.flow.links);
+        Header {
+            border: code_of_border(self.params.border),
+            terrain: self.identity.hash(&self.columns),
+            counts: *counts,
+            times: [self.time, self.flow.last],
+            still: self.still,
+            sums: [self.poured, flows.sourced, flows.drained, flows.absorbed, links.lost, links.gained],
+            since: self.falls.since,
+            tick: self.falls.tick,
+        }
+    }
+}
+
+/// Active strips that have a head of a full column.
+fn heads(shallow: &Shallow) -> impl Iterator<Item = (usize, &[f32; STRIP])> {
+    let all = shallow.flow.heads().as_chunks::<STRIP>().0;
+    let strips = runs(shallow.flow.active()).flatten().map(move |strip| (strip, &all[strip]));
+    strips.filter(|(_, heads)| heads.iter().fold(0, |any, head| any | head.to_bits()) != 0)
+}
+
+/// A state that is whole, in its parts.
+struct Saved<'a> {
+    header: Header,
+    runs: &'a [[u8; 8]],
+    row_depths: &'a [[u8; 4]],
+    parcels: &'a [[u8; 16]],
+    packets: &'a [[u8; PACKET]],
+    lips: &'a [[u8; LIP]],
+    points: &'a [[u8; 24]],
+    /// Fluxes, then what truncation left.
+    links: &'a [[u8; 4]],
+    head_strips: &'a [[u8; 4]],
+    heads: &'a [[u8; SHARE]],
+    /// Shares of arrays, run by run.
+    shares: &'a [[u8; SHARE]],
+    /// The parts of scalars.
+    scalars: Scalars<'a>,
+}
+
+impl<'a> Saved<'a> {
+    fn read(bytes: &'a [u8]) -> Result<Self> {
+        let Some(header) = bytes.first_chunk::<HEADER>().filter(|header| header.starts_with(&MAGIC)) else {
+            let is_begun = bytes.len() < HEADER && bytes.starts_with(&MAGIC);
+            return Err(refused(if is_begun { "is cut short" } else { "is not of a shallow liquid" }));
+        };
+        let version = Reader::new(&header[8..]).u32()?;
+        if version != VERSION {
+            return Err(refused(&format!("has format {version}, and this library reads {VERSION}")));
+        }
+        let length = u64::from_le_bytes(Reader::new(&header[32..]).take()?);
+        if length > bytes.len() as u64 {
+            return Err(refused("is cut short"));
+        }
+        let (body, seal) = bytes.split_at(bytes.len() - SEAL);
+        if length < bytes.len() as u64 || xxh3_128(body).to_le_bytes() != *seal {
+            return Err(refused("is damaged"));
+        }
+        let header = Header::read(header)?;
+        let counts = header.counts;
+        if counts.size() != bytes.len() {
+            return Err(refused("is damaged"));
+        }
+        let mut from = Reader::new(&body[HEADER..]);
+        Ok(Self {
+            runs: parts(&mut from, counts.runs)?,
+            row_depths: parts(&mut from, counts.rows)?,
+            parcels: parts(&mut from, counts.parcels)?,
+            packets: parts(&mut from, counts.packets)?,
+            lips: parts(&mut from, counts.lips)?,
+            points: parts(&mut from, counts.points)?,
+            links: parts(&mut from, 2 * counts.links)?,
+            head_strips: parts(&mut from, counts.heads)?,
+            heads: parts(&mut from, counts.heads)?,
+            shares: parts(&mut from, ARRAYS * counts.strips)?,
+            scalars: Scalars::read(&mut from, &counts)?,
+            header,
+        })
+    }
+
+    /// Whether it is of this liquid, and all numbers are such as a liquid may have.
+    fn check(&self, shallow: &Shallow) -> Result<()> {
+        let (header, counts) = (&self.header, &self.header.counts);
+        if header.terrain != shallow.identity.hash(&shallow.columns) {
+            return Err(refused("belongs to another terrain"));
+        }
+        if header.border != code_of_border(shallow.params.border) {
+            return Err(refused("belongs to a liquid with another border"));
+        }
+        // On the same terrain only cliffs make other links.
+        let (links, most) =
+            (shallow.flow.links.flux.len(), shallow.params.falls.map_or(0, |falls| falls.most));
+        if (counts.links, counts.lips) != (links, shallow.falls.waiting().len()) || counts.packets > most {
+            return Err(refused("belongs to a liquid with other falls"));
+        }
+        let own = shallow.flows.progress();
+        if own.len() != self.points.len() {
+            let (saved, own) = (self.points.len(), own.len());
+            return Err(refused(&format!(
+                "has {saved} flow points, and the liquid {own}: set the same ones first"
+            )));
+        }
+        for (at, (saved, (kind, ..))) in self.points.iter().zip(own).enumerate() {
+            if u32::from_le_bytes(part(saved, 0)) != code_of_kind(kind) {
+                return Err(refused(&format!("has another kind of flow point {at} than the liquid")));
+            }
+        }
+        self.scalars.check_laws(shallow)?;
+        let strips = shallow.columns.strips().len();
+        let fits = counts.rows == shallow.flow.bands().row_depths().len()
+            && is_in_order(self.runs().map(|run| run.start..run.end), strips)
+            && self.runs().map(|run| run.len()).sum::<usize>() == counts.strips
+            && is_in_order(self.head_strips().map(|strip| strip..strip + 1), strips);
+        if fits && self.has_good_numbers(&shallow.columns) && self.has_good_falls(shallow) {
+            Ok(())
+        } else {
+            Err(refused("is damaged"))
+        }
+    }
+
+    fn has_good_numbers(&self, columns: &Columns) -> bool {
+        let [_, last] = self.header.times;
+        let (fluxes, left) = self.links.split_at(self.header.counts.links);
+        let heads = self.heads.as_flattened().as_chunks().0;
+        let within = |depths: &[u8; 4]| (0..=TOP).contains(&i32::from_le_bytes(*depths));
+        LAST.contains(&last)
+            && (self.header.still == BOTTOMLESS || self.header.still >= 0)
+            && self.header.sums.iter().all(|sum| SUMS.contains(sum))
+            && self.points.iter().all(|point| WAITING.contains(&f64::from_le_bytes(part(point, 8))))
+            && self.points.iter().all(|point| SUMS.contains(&i64::from_le_bytes(part(point, 16))))
+            && self.row_depths.iter().all(within)
+            && self.parcels().all(|parcel| parcel.is_of(columns) && SUMS.contains(&parcel.units))
+            && self.parcels().is_sorted_by(|a, b| a.cell < b.cell)
+            && !is_over(fluxes, MOST_FLUX)
+            && !is_over(left, 1.0)
+            && !is_over(heads, f32::MAX)
+            && !self.has_bad_columns(columns)
+            && self.scalars.has_good_numbers(self)
+    }
+
+    fn has_good_falls(&self, shallow: &Shallow) -> bool {
+        let (columns, links) = (&shallow.columns, &shallow.pipes.links);
+        (0.0..=1e6).contains(&self.header.since)
+            && self.packets().all(|packet| packet.is_of(columns) && SUMS.contains(&packet.units))
+            && self
+                .lips()
+                .enumerate()
+                .all(|(link, waiting)| waiting.is_of(columns, links, link) && SUMS.contains(&waiting.units))
+    }
+
+    fn has_bad_columns(&self, columns: &Columns) -> bool {
+        let saved = self;
+        dispatch!(has_bad_columns(saved: &Saved<'_>, columns: &Columns) -> bool)
+    }
+
+    fn runs(&self) -> impl Iterator<Item = Range<usize>> + Clone {
+        let numbers = |run: &[u8; 8]| [part(run, 0), part(run, 4)].map(|n| u32::from_le_bytes(n) as usize);
+        self.runs.iter().map(numbers).map(|[first, count]| first..first + count)
+    }
+
+    fn parcels(&self) -> impl Iterator<Item = Parcel> {
+        self.parcels.iter().map(Parcel::from_bytes)
+    }
+
+    fn packets(&self) -> impl Iterator<Item = Packet> {
+        self.packets.iter().map(Packet::from_bytes)
+    }
+
+    fn lips(&self) -> impl Iterator<Item = Waiting> {
+        self.lips.iter().map(Waiting::from_bytes)
+    }
+
+    fn head_strips(&self) -> impl Iterator<Item = usize> {
+        self.head_strips.iter().map(|strip| u32::from_le_bytes(*strip) as usize)
+    }
+
+    /// The five arrays of each run, in shares of a strip.
+    fn arrays(&self) -> impl Iterator<Item = (Range<usize>, [&'a [[u8; SHARE]]; ARRAYS])> {
+        let mut rest = self.shares;
+        self.runs().map(move |run| {
+            let arrays = std::array::from_fn(|_| {
+                let (own, others) = rest.split_at(run.len());
+                rest = others;
+                own
+            });
+            (run, arrays)
+        })
+    }
+
+    /// Puts the state in place.
+    fn apply(&self, shallow: &mut Shallow) {
+        let Shallow { flow, flows, columns, remap, falls, .. } = &mut *shallow;
+        remap.held.set(self.parcels().enumerate().map(|(at, parcel)| self.scalars.with_amounts(at, parcel)));
+        let packets = self.packets().enumerate().map(|(at, packet)| self.scalars.in_packet(at, packet));
+        falls.set(packets, self.lips().enumerate().map(|(at, waiting)| self.scalars.at_link(at, waiting)));
+        (falls.since, falls.tick) = (self.header.since, self.header.tick);
+        let [poured, sourced, drained, absorbed, lost, gained] = self.header.sums;
+        let mut stored = flow.stored();
+        let mut end = 0;
+        for (run, [depth, numbers @ ..]) in self.arrays() {
+            stored.clear(end..run.start);
+            end = run.end;
+            let run = run.start * STRIP..run.end * STRIP;
+            get(depth.as_flattened(), &mut stored.depth[run.clone()], i32::from_le_bytes);
+            for (from, to) in numbers.into_iter().zip(&mut stored.numbers) {
+                get(from.as_flattened(), &mut to[run.clone()], f32::from_le_bytes);
+            }
+            stored.heads[run].fill(0.0);
+        }
+        stored.clear(end..columns.strips().len());
+        self.scalars.apply(self.runs(), stored.amounts);
+        for (strip, heads) in self.head_strips().zip(self.heads) {
+            get(heads, &mut stored.heads[strip * STRIP..(strip + 1) * STRIP], f32::from_le_bytes);
+        }
+        get(self.row_depths.as_flattened(), stored.bands.row_depths_mut(), i32::from_le_bytes);
+        let (fluxes, left) = self.links.split_at(self.header.counts.links);
+        get(fluxes.as_flattened(), &mut stored.links.flux, f32::from_le_bytes);
+        get(left.as_flattened(), &mut stored.links.left, f32::from_le_bytes);
+        (stored.links.lost, stored.links.gained) = (lost, gained);
+        *stored.last = self.header.times[1];
+        flow.wake(columns, self.runs());
+        for (at, point) in self.points.iter().enumerate() {
+            flows.set_progress(at, f64::from_le_bytes(part(point, 8)), i64::from_le_bytes(part(point, 16)));
+        }
+        (flows.sourced, flows.drained, flows.absorbed) = (sourced, drained, absorbed);
+        (shallow.poured, shallow.time, shallow.still) = (poured, self.header.times[0], self.header.still);
+        shallow.steps.clear();
+    }
+}
+
+/// Whether a number of an array by column index is none that a liquid may have. All are looked at, without branches.
+#[inline(always)]
+fn has_bad_columns(saved: &Saved<'_>, columns: &Columns) -> bool {
+    let [bases, ceilings] =
+        [columns.bases(), columns.ceilings()].map(|numbers| numbers.as_chunks::<STRIP>().0);
+    let (mut bad, mut is_over_any) = (0, false);
+    for (run, [depth, east, south, left_east, left_south]) in saved.arrays() {
+        for (strip, depths) in run.zip(depth) {
+            let row_depth = i32::from_le_bytes(saved.row_depths[columns.strips()[strip].row as usize]);
+            let (base, ceiling) = (&bases[strip], &ceilings[strip]);
+            for (place, depth) in depths.as_chunks().0.iter().enumerate() {
+                let depth = i32::from_le_bytes(*depth);
+                let room = ceiling[place] - base[place];
+                bad |= depth | room.wrapping_sub(depth) | row_depth.wrapping_sub(depth);
+            }
+        }
+        for (numbers, most) in [(east, MOST_FLUX), (south, MOST_FLUX), (left_east, 1.0), (left_south, 1.0)] {
+            is_over_any |= is_over(numbers.as_flattened().as_chunks().0, most);
+        }
+    }
+    bad < 0 || is_over_any
+}
+
+/// Whether a float is beyond a bound, or none at all.
+#[inline(always)]
+fn is_over(numbers: &[[u8; 4]], most: f32) -> bool {
+    let most = most.to_bits() as i32;
+    let size = |number: &[u8; 4]| (u32::from_le_bytes(*number) & !(1 << 31)) as i32;
+    numbers.iter().fold(0, |bad, number| bad | (most - size(number))) < 0
+}
+
+/// Whether ranges are not empty, in order, apart, and end in time.
+fn is_in_order(mut ranges: impl Iterator<Item = Range<usize>>, count: usize) -> bool {
+    let mut end = 0;
+    ranges.all(|range| {
+        let fits = end <= range.start && range.start < range.end && range.end <= count;
+        end = range.end;
+        fits
+    })
+}
+
+/// What is left to write.
+struct Put<'a>(&'a mut [u8]);
+
+impl Put<'_> {
+    fn bytes(&mut self, bytes: &[u8]) {
+        self.next(bytes.len()).copy_from_slice(bytes);
+    }
+
+    fn numbers<T: Copy, const N: usize>(&mut self, numbers: &[T], bytes: impl Fn(T) -> [u8; N]) {
+        let to = self.next(N * numbers.len()).as_chunks_mut().0;
+        to.iter_mut().zip(numbers).for_each(|(to, number)| *to = bytes(*number));
+    }
+
+    fn next(&mut self, count: usize) -> &mut [u8] {
+        let (next, rest) = std::mem::take(&mut self.0).split_at_mut(count);
+        self.0 = rest;
+        next
+    }
+}
+
+fn get<T, const N: usize>(bytes: &[u8], to: &mut [T], number: impl Fn([u8; N]) -> T) {
+    to.iter_mut().zip(bytes.as_chunks().0).for_each(|(to, bytes)| *to = number(*bytes));
+}
+
+/// The next elements of N bytes.
+fn parts<'a, const N: usize>(from: &mut Reader<'a>, count: usize) -> Result<&'a [[u8; N]]> {
+    Ok(from.bytes(count * N)?.as_chunks().0)
+}
+
+/// Some bytes of an element.
+fn part<const N: usize>(element: &[u8], at: usize) -> [u8; N] {
+    std::array::from_fn(|byte| element[at + byte])
+}
+
+fn code_of_border(border: Border) -> u32 {
+    match border {
+        Border::Closed => 0,
+        Border::Open => 1,
+        Border::Absorbing => 2,
+    }
+}
+
+fn code_of_kind(kind: Kind) -> u32 {
+    match kind {
+        Kind::Source => 0,
+        Kind::Drain => 1,
+        Kind::Absorber(_) => 2,
+        Kind::Orifice(_) => 3,
+    }
+}
+
+fn refused(what: &str) -> Error {
+    Error::Bytes(format!("the saved state {what}"))
+}

@@ -1,0 +1,373 @@
+//! What is beside a column, across a line: liquid that its own is in contact with, and walls.
+//!
+//! Where the ground beyond a side is higher, it is a wall, up to the liquid's surface; as liquid moves slowly above the ground, the lower part of its
+//! depth counts little: by the profile's part of the mean of phi^2. Where both surfaces stand apart as the ground does, up to a cell's edge, there is no
+//! wall but a slope, with a film on it. A dry edge that is not higher holds nothing back.
+
+use crate::numeric::cpu::dispatch;
+use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_mut, strip_of};
+use crate::shallow::solver::flux::{Step, greater, lesser};
+
+/// Walls beside films of less than `THIN` of a cell's edge do not count, and such of over `THICK` do as a whole: one beside a film of `THIN` takes
+/// (2/5)^1/2 `THIN` of the flow in the pipe next to it, or 4 %.
+const THIN: f32 = 1.0 / 16.0;
+const THICK: f32 = 3.0 / 32.0;
+
+/// (k / (6/5))^1/2: over H it is 1 / delta, delta being how far a wall reaches, as exp(-y / delta).
+const REACH: f32 = 1.581_138_8;
+const REACH_FULL: f32 = 3.162_277_7;
+
+/// What columns are in.
+pub struct Around<'a> {
+    pub columns: &'a Columns,
+    /// H (units), and 16 more numbers.
+    pub depth: &'a [i32],
+    /// Whether a strip has ceilings, or places without a column.
+    pub roofed: &'a [bool],
+    /// Places of each strip from which links lead to the east, south, west and north.
+    pub linked: &'a [[u16; 4]],
+}
+
+/// A column of some depth, over 0, or another one beyond a side.
+#[derive(Clone, Copy)]
+pub struct Room {
+    pub base: i32,
+    pub ceiling: i32,
+    pub depth: i32,
+}
+
+/// Whether columns of a depth (units) have friction beside them.
+pub fn counts(step: &Step, depth: i32) -> bool {
+    depth as f32 > THIN * step.cell
+}
+
+/// How much of a wall beside liquid of a depth (units) counts.
+#[inline(always)]
+fn counted(step: &Step, height: f32) -> f32 {
+    let part = (height - THIN * step.cell) * (1.0 / ((THICK - THIN) * step.cell));
+    lesser(greater(part, 0.0), 1.0)
+}
+
+/// The part of the mean of phi^2 that the lowest part x of the depth has, phi = 3/2 (2 x - x^2) below a free surface, and 6 (x - x^2) below a ceiling.
+#[inline(always)]
+fn share<const FULL: bool>(x: f32) -> f32 {
+    let cube = x * x * x;
+    if FULL { cube * (10.0 - x * (15.0 - 6.0 * x)) } else { cube * (2.5 - x * (1.875 - 0.375 * x)) }
+}
+
+/// What walls beside liquid of a depth hold back (units): of the part of each side, in lengths of its depth, times friction over that of a difference of
+/// velocities between pipes.
+///
+/// u = 1 - exp(-y / delta) beside one wall, and pipes have its mean over a cell: dx u'(0) / u is s^2 / (s - 1 + exp(-s)) with s = dx / delta, 2 where cells are
+/// small. Between two walls in one cell it is s^2 t / (1 - t), t = tanh(s / 2) / (s / 2), 12 where cells are small. Both are here to 2 %.
+#[inline(always)]
+pub fn walls<const FULL: bool>(step: &Step, high: f32, inverse: f32, parts: [f32; 2]) -> f32 {
+    let s = if FULL { REACH_FULL } else { REACH } * step.cell * inverse;
+    let one = s + 1.0 + 1.0 / (1.0 + s * (1.0 / 3.0 + 0.057 * s));
+    let more = 2.0 + 6.0 / (1.0 + s * (0.25 + 0.03 * s));
+    ((parts[0] + parts[1]) * one + parts[0] * parts[1] * more) * high * counted(step, high)
+}
+
+/// The height of a contact (units), times friction over that of straight lines between pipes, for the same reason: (s / 2)^2 / sinh^2(s / 2), s being
+/// that of the contact's height.
+#[inline(always)]
+fn fitted<const FULL: bool>(step: &Step, contact: f32) -> f32 {
+    let reach = if FULL { REACH_FULL * REACH_FULL } else { REACH * REACH };
+    let x = contact * (1.0 / step.cell);
+    let square = x * x;
+    let cube = square * square * square;
+    let sinh = cube
+        + reach * (1.0 / 12.0) * square * square
+        + reach * reach * (1.0 / 360.0) * square
+        + reach * reach * reach * (1.0 / 20160.0);
+    if x > THIN { contact * (cube / sinh) } else { 0.0 }
+}
+
+/// Over one side: the height (units) in which liquids are in contact ([`fitted`]), and the part of a wall. `inverse` is 1 / H; a ceiling counts where `is_roofed`
+/// and nothing leads there.
+#[inline(always)]
+pub fn side<const FULL: bool, const ROOFED: bool>(
+    step: &Step,
+    own: Room,
+    inverse: f32,
+    beyond: Room,
+    is_linked: bool,
+) -> [f32; 2] {
+    let rise = (beyond.base - own.base) as f32;
+    let over = (beyond.base + beyond.depth - (own.base + own.depth)) as f32;
+    let (high, other) = (own.depth as f32, beyond.depth as f32);
+    // As far as surfaces stand apart as bases do, it is a slope.
+    let most = lesser(greater(rise, -step.cell), step.cell);
+    let lean = lesser(greater(over, lesser(most, 0.0)), greater(most, 0.0));
+    let foot = rise - lean;
+    let up = greater(foot, 0.0);
+    let contact = greater(lesser(high, foot + other) - up, 0.0);
+    let below = share::<FULL>(lesser(up * inverse, 1.0));
+    let wall = if ROOFED {
+        let top = lesser(greater((beyond.ceiling - own.base) as f32 * inverse, 0.0), 1.0);
+        let top = if is_linked { 1.0 } else { top };
+        // Without a ceiling to the last bit what it is where none is looked at.
+        lesser(below + (1.0 - share::<FULL>(top)), 1.0)
+    } else {
+        below
+    };
+    [fitted::<FULL>(step, contact), wall]
+}
+
+/// Of columns that are not there.
+const ABSENT: [i32; STRIP] = [0; STRIP];
+
+/// A strip beyond a side.
+struct Beyond<'a> {
+    base: &'a [i32; STRIP],
+    ceiling: &'a [i32; STRIP],
+    depth: &'a [i32; STRIP],
+}
+
+/// Finds what is beside the columns of strips, which start behind `first`: of pipes to the east the sum over both sides of contact and walls
+/// (units), the contact before them and behind; then of pipes to the south.
+pub fn find(step: &Step, around: &Around, strips: &[u32], first: usize, out: [&mut [f32]; 6]) {
+    let mut out = out;
+    let out = &mut out;
+    dispatch!(find_strips(step: &Step, around: &Around, strips: &[u32], first: usize, out: &mut [&mut [f32]; 6]))
+}
+
+#[inline(always)]
+fn find_strips(step: &Step, around: &Around, strips: &[u32], first: usize, out: &mut [&mut [f32]; 6]) {
+    let Around { columns, roofed, linked, .. } = around;
+    let [all_z, before_z, behind_z, all_x, before_x, behind_x] = out;
+    for &strip in strips {
+        let (strip, place) = (strip as usize, strip as usize - first);
+        let (own, links) = (around.strip(strip), linked[strip]);
+        let [north, south] = [columns.north(strip), columns.south(strip)];
+        let is_roofed =
+            (north == NONE || roofed[north as usize]) || (south == NONE || roofed[south as usize]);
+        let numbers = (strip_mut(all_z, place), strip_mut(before_z, place), strip_mut(behind_z, place));
+        both(
+            step,
+            &own,
+            [&around.beyond(north), &around.beyond(south)],
+            [links[3], links[1]],
+            is_roofed,
+            numbers,
+        );
+        let (has_west, has_east) = (columns.west(strip).is_some(), columns.east(strip).is_some());
+        let (mut west, mut east) = (around.shifted(strip, has_west, 1), around.shifted(strip, has_east, 0));
+        if !has_west {
+            west.shut(0);
+        }
+        if !has_east {
+            east.shut(STRIP - 1);
+        }
+        let is_roofed = roofed[strip]
+            || !has_west
+            || !has_east
+            || roofed[strip - usize::from(has_west)]
+            || roofed[strip + usize::from(has_east)];
+        let numbers = (strip_mut(all_x, place), strip_mut(before_x, place), strip_mut(behind_x, place));
+        both(step, &own, [&west.see(), &east.see()], [links[2], links[0]], is_roofed, numbers);
+    }
+}
+
+impl<'a> Around<'a> {
+    #[inline(always)]
+    fn strip(&self, strip: usize) -> Beyond<'a> {
+        Beyond {
+            base: strip_of(self.columns.bases(), strip),
+            ceiling: strip_of(self.columns.ceilings(), strip),
+            depth: strip_of(self.depth, strip),
+        }
+    }
+
+    #[inline(always)]
+    fn beyond(&self, strip: u32) -> Beyond<'a> {
+        match strip {
+            NONE => Beyond { base: &ABSENT, ceiling: &ABSENT, depth: &ABSENT },
+            strip => self.strip(strip as usize),
+        }
+    }
+
+    /// The columns before those of a strip (`before` 1), or behind them (0).
+    #[inline(always)]
+    fn shifted(&self, strip: usize, is_there: bool, before: usize) -> Shifted {
+        let at = (strip * STRIP + 1).wrapping_sub(2 * before);
+        if is_there || before == 0 {
+            Shifted {
+                base: *strip_from(self.columns.bases(), at),
+                ceiling: *strip_from(self.columns.ceilings(), at),
+                depth: *strip_from(self.depth, at),
+            }
+        } else {
+            let own = self.strip(strip);
+            let mut west = Shifted { base: ABSENT, ceiling: ABSENT, depth: ABSENT };
+            west.base[1..].copy_from_slice(&own.base[..STRIP - 1]);
+            west.ceiling[1..].copy_from_slice(&own.ceiling[..STRIP - 1]);
+            west.depth[1..].copy_from_slice(&own.depth[..STRIP - 1]);
+            west
+        }
+    }
+}
+
+/// Columns beside those of a strip.
+struct Shifted {
+    base: [i32; STRIP],
+    ceiling: [i32; STRIP],
+    depth: [i32; STRIP],
+}
+
+impl Shifted {
+    /// There is no column at a place.
+    #[inline(always)]
+    fn shut(&mut self, place: usize) {
+        (self.base[place], self.ceiling[place], self.depth[place]) = (0, 0, 0);
+    }
+
+    #[inline(always)]
+    fn see(&self) -> Beyond<'_> {
+        Beyond { base: &self.base, ceiling: &self.ceiling, depth: &self.depth }
+    }
+}
+
+/// What is beside the columns of a strip in all, and contact before and behind.
+type Found<'a> = (&'a mut [f32; STRIP], &'a mut [f32; STRIP], &'a mut [f32; STRIP]);
+
+/// Both sides of a strip across one axis.
+#[inline(always)]
+fn both(step: &Step, own: &Beyond, sides: [&Beyond; 2], links: [u16; 2], is_roofed: bool, found: Found) {
+    if is_roofed {
+        both_strips::<true>(step, own, sides, links, found);
+    } else {
+        both_strips::<false>(step, own, sides, links, found);
+    }
+}
+
+#[inline(always)]
+fn both_strips<const ROOFED: bool>(
+    step: &Step,
+    own: &Beyond,
+    [first, second]: [&Beyond; 2],
+    links: [u16; 2],
+    (all, before, behind): Found,
+) {
+    for x in 0..STRIP {
+        let high = own.depth[x] as f32;
+        let inverse = 1.0 / greater(high, 1.0);
+        let room = own.room(x);
+        let is_linked = [links[0] >> x & 1 == 1, links[1] >> x & 1 == 1];
+        let [one, part] = side::<false, ROOFED>(step, room, inverse, first.room(x), is_linked[0]);
+        let [two, other_part] = side::<false, ROOFED>(step, room, inverse, second.room(x), is_linked[1]);
+        all[x] = (one + two) + walls::<false>(step, high, inverse, [part, other_part]);
+        (before[x], behind[x]) = (one, two);
+    }
+}
+
+impl Beyond<'_> {
+    #[inline(always)]
+    fn room(&self, x: usize) -> Room {
+        Room { base: self.base[x], ceiling: self.ceiling[x], depth: self.depth[x] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shallow::grid::TOP;
+
+    /// Cells of 1,000 units.
+    fn step() -> Step {
+        Step { cell: 1000.0, ..Step::still() }
+    }
+
+    fn room(base: i32, depth: i32) -> Room {
+        Room { base, ceiling: TOP, depth }
+    }
+
+    fn between(own: Room, beyond: Room) -> [f32; 2] {
+        side::<false, true>(&step(), own, 1.0 / own.depth as f32, beyond, false)
+    }
+
+    #[test]
+    fn the_profiles_have_a_share_of_1_over_the_whole_depth_and_a_ceilings_is_even() {
+        assert_eq!((share::<false>(1.0), share::<true>(1.0)), (1.0, 1.0));
+        assert_eq!(share::<true>(0.5), 0.5);
+        for (x, free) in [(0.2f32, 2.5 * 0.008 - 1.875 * 0.0016 + 0.375 * 0.00032), (0.5, 0.20703125)] {
+            assert!((share::<false>(x) - free).abs() < 1e-6, "{x}");
+        }
+        let small = share::<false>(0.01);
+        assert!((small / 2.5e-6 - 1.0).abs() < 0.01, "by the cube above the ground: {small}");
+    }
+
+    #[test]
+    fn contact_and_walls_are_fitted_to_the_exponentials_that_solve_a_film_beside_a_wall() {
+        let exp = |x: f64| libm::exp(x);
+        for depth in [100.0f32, 300.0, 1000.0, 3000.0, 30_000.0] {
+            for (is_full, reach) in [(false, REACH), (true, REACH_FULL)] {
+                let s = f64::from(reach) * 1000.0 / f64::from(depth);
+                let sinh = (exp(0.5 * s) - exp(-0.5 * s)) / 2.0;
+                let [contact, one, both] = if is_full {
+                    [
+                        fitted::<true>(&step(), depth),
+                        walls::<true>(&step(), depth, 1.0 / depth, [1.0, 0.0]),
+                        walls::<true>(&step(), depth, 1.0 / depth, [1.0; 2]),
+                    ]
+                } else {
+                    [
+                        fitted::<false>(&step(), depth),
+                        walls::<false>(&step(), depth, 1.0 / depth, [1.0, 0.0]),
+                        walls::<false>(&step(), depth, 1.0 / depth, [1.0; 2]),
+                    ]
+                };
+                let [contact, one, both] = [contact, one, both].map(|height| f64::from(height / depth));
+                // Where little is in contact, that it is little.
+                let exact = (0.5 * s / sinh).powi(2);
+                assert!((contact - exact).abs() < 0.02 * exact + 0.01, "{depth}: {contact}, not {exact}");
+                let exact = s * s / (s - 1.0 + exp(-s));
+                assert!((one / exact - 1.0).abs() < 0.02, "{depth}: {one}, not {exact}");
+                let tanh = libm::tanh(0.5 * s) / (0.5 * s);
+                let exact = s * s * tanh / (1.0 - tanh);
+                assert!((both / exact - 1.0).abs() < 0.03, "{depth}: {both}, not {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_bank_is_a_wall_and_a_slope_with_a_film_is_none() {
+        assert_eq!(between(room(0, 2000), room(3000, 0)), [0.0, 1.0], "a dry bank");
+        let [contact, wall] = between(room(0, 2000), room(2500, 10));
+        assert!(contact == 0.0 && wall > 0.99, "a wet one: {contact}, {wall}");
+        let fitted = |contact: f32| fitted::<false>(&step(), contact);
+        assert_eq!(between(room(0, 2000), room(0, 2000)), [fitted(2000.0), 0.0], "level ground");
+        assert_eq!(between(room(0, 1000), room(900, 1000)), [fitted(1000.0), 0.0], "a film up the slope");
+        assert_eq!(between(room(900, 1000), room(0, 1000)), [fitted(1000.0), 0.0], "a film down the slope");
+        assert_eq!(between(room(0, 1000), room(5000, 1000)), [0.0, 1.0], "a terrace above");
+        assert_eq!(between(room(5000, 1000), room(0, 1000)), [0.0, 0.0], "a terrace below");
+        assert_eq!(between(room(0, 2000), room(0, 0)), [0.0, 0.0], "a dry edge");
+        let [contact, wall] = between(room(0, 2000), room(1000, 1000));
+        assert_eq!((contact, wall), (fitted(1000.0), share::<false>(0.5)), "a step under a level surface");
+        let [back, none] = between(room(1000, 1000), room(0, 2000));
+        assert_eq!((back, none), (fitted(1000.0), 0.0));
+    }
+
+    #[test]
+    fn columns_that_are_not_there_are_walls_unless_links_lead_there() {
+        let nothing = Room { base: 0, ceiling: 0, depth: 0 };
+        let own = room(700, 2000);
+        assert_eq!(between(own, nothing), [0.0, 1.0]);
+        assert_eq!(side::<false, true>(&step(), own, 5e-4, nothing, true), [0.0, 0.0]);
+        let low = Room { base: 700, ceiling: 1700, depth: 1000 };
+        let wall = 1.0 - share::<false>(0.5);
+        assert_eq!(
+            between(own, low),
+            [fitted::<false>(&step(), 1000.0), wall],
+            "a ceiling below the surface"
+        );
+    }
+
+    #[test]
+    fn thin_contact_does_not_count() {
+        assert!(!counts(&step(), 62) && counts(&step(), 63));
+        assert_eq!(between(room(0, 62), room(0, 2000))[0], 0.0);
+        assert!((0.0..1.0).contains(&between(room(0, 90), room(0, 2000))[0]));
+        assert_eq!(walls::<false>(&step(), 62.0, 1.0 / 62.0, [1.0; 2]), 0.0);
+    }
+}

@@ -1,0 +1,497 @@
+//! Pipes beside each other, a line of them at once.
+//!
+//! Each flux depends on those of the pipes before and behind it: w = r + a w(-1) + b w(+1). Where a and b are small, the last step's are as good. Else
+//! both are put in with what they depend on, which leaves w = r' + a' w(-2) + b' w(+2), and again, at twice the distance each time (cyclic reduction). As the ground
+//! holds liquid back, too, a' and b' soon are small: over a distance of twice the depth little is left. What is left takes the last step's fluxes. So a
+//! steady flow is exact in any case. Before and behind are treated alike, and a line the same from both of its ends.
+
+use std::ops::Range;
+
+use super::{Liquid, Numbers, spread, within};
+use crate::numeric::cpu::dispatch;
+use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_mut, strip_of};
+use crate::shallow::solver::fast_films::{NORMAL, unpacked};
+use crate::shallow::solver::flux::{Step, greater, lesser};
+use crate::shallow::solver::pressurised::network::Network;
+
+/// Most reductions: a pipe knows of all within 16 cells.
+const MOST: usize = 4;
+/// What a and b may add up to, that of the last step is taken for.
+const LAGS: f32 = 0.5;
+const ZEROS: [f32; STRIP] = [0.0; STRIP];
+
+/// Lines of pipes to the east, which lie along z, and of pipes to the south, along x.
+#[derive(Debug, Clone, Default)]
+pub struct Lines {
+    /// r, a, b of all pipes of both, and those of the next reduction.
+    now: [[Numbers; 3]; 2],
+    next: [[Numbers; 3]; 2],
+    /// Fluxes (units in this step).
+    solved: [Numbers; 2],
+    /// The strips so many rows before and behind, or [`NONE`]; and those of the next reduction.
+    far: [[Vec<u32>; 2]; 2],
+}
+
+/// What a pass over strips reads.
+struct Pass<'a> {
+    step: &'a Step,
+    liquid: &'a Liquid<'a>,
+    known: &'a [bool],
+    beside: &'a [[Numbers; 3]; 2],
+    now: &'a [[Numbers; 3]; 2],
+    /// Strips before and behind.
+    far: [&'a [u32]; 2],
+    /// Cells to them.
+    distance: usize,
+}
+
+impl Lines {
+    pub fn fit(&mut self, columns: &Columns) {
+        let (len, strips) = (columns.len(), columns.strips().len());
+        let lists = self.now.iter_mut().chain(&mut self.next).flatten().chain(&mut self.solved);
+        for (place, numbers) in lists.enumerate() {
+            numbers.fit(6 + place, len);
+        }
+        for far in self.far.iter_mut().flatten() {
+            far.clear();
+            far.resize(strips, NONE);
+        }
+    }
+
+    pub fn bytes(&self) -> usize {
+        let lists = self.now.iter().chain(&self.next).flatten().chain(&self.solved);
+        lists.map(|numbers| size_of_val(&numbers.list[..])).sum::<usize>() + 16 * self.far[0][0].len()
+    }
+
+    pub fn solved(&self) -> [&[f32]; 2] {
+        self.solved.each_ref().map(Numbers::all)
+    }
+
+    /// Solves the lines of some strips.
+    pub fn solve(
+        &mut self,
+        step: &Step,
+        liquid: &Liquid,
+        strips: &[u32],
+        known: &[bool],
+        beside: &[[Numbers; 3]; 2],
+    ) {
+        let (len, is_divided) = (liquid.columns.len(), liquid.is_divided);
+        let all = 0..len / STRIP;
+        let count = reductions(step, liquid.row_depths.iter().copied().max().unwrap_or(0));
+        let Self { now, next, solved, far: [far, farther] } = self;
+        {
+            let none: [&[u32]; 2] = [&[], &[]];
+            let empty = &*next;
+            let pass = Pass { step, liquid, known, beside, now: empty, far: none, distance: 1 };
+            let thins = step.thinning.is_some();
+            if count == 0 {
+                let [east, south] = solved.each_mut().map(|numbers| &mut numbers.all_mut()[..len]);
+                spread(is_divided, all, [east, south], &|range: Range<usize>, out: [&mut [f32]; 2]| {
+                    let mut out = out;
+                    first_and_last(&pass, within(strips, &range), range.start, &mut out, thins);
+                });
+                return;
+            }
+            let [[a, b, c], [d, e, f]] =
+                now.each_mut().map(|axis| axis.each_mut().map(|numbers| &mut numbers.all_mut()[..len]));
+            spread(
+                is_divided,
+                all.clone(),
+                [a, b, c, d, e, f],
+                &|range: Range<usize>, out: [&mut [f32]; 6]| {
+                    let mut out = out;
+                    first(&pass, within(strips, &range), range.start, &mut out, thins);
+                },
+            );
+        }
+        set_flooded(now, liquid.network);
+        for strip in 0..far[0].len() {
+            (far[0][strip], far[1][strip]) = (liquid.columns.north(strip), liquid.columns.south(strip));
+        }
+        for reduction in 0..count {
+            let pass = Pass {
+                step,
+                liquid,
+                known,
+                beside,
+                now,
+                far: far.each_ref().map(|far| &far[..]),
+                distance: 1 << reduction,
+            };
+            let [[a, b, c], [d, e, f]] =
+                next.each_mut().map(|axis| axis.each_mut().map(|numbers| &mut numbers.all_mut()[..len]));
+            spread(
+                is_divided,
+                all.clone(),
+                [a, b, c, d, e, f],
+                &|range: Range<usize>, out: [&mut [f32]; 6]| {
+                    let mut out = out;
+                    reduce(&pass, within(strips, &range), range.start, &mut out);
+                },
+            );
+            std::mem::swap(now, next);
+            for (far, farther) in far.iter().zip(&mut *farther) {
+                for (place, &other) in farther.iter_mut().zip(far) {
+                    *place = if other == NONE { NONE } else { far[other as usize] };
+                }
+            }
+            std::mem::swap(far, farther);
+        }
+        let far = far.each_ref().map(|far| &far[..]);
+        let pass = Pass { step, liquid, known, beside, now, far, distance: 1 << count };
+        let [east, south] = solved.each_mut().map(|numbers| &mut numbers.all_mut()[..len]);
+        spread(is_divided, all, [east, south], &|range: Range<usize>, out: [&mut [f32]; 2]| {
+            let mut out = out;
+            last(&pass, within(strips, &range), range.start, &mut out);
+        });
+    }
+}
+
+/// How many reductions a step needs, with liquid of a depth (units) somewhere.
+fn reductions(step: &Step, deepest: i32) -> usize {
+    let deepest = greater(deepest as f32, 1.0);
+    // a in a line of equal pipes without walls.
+    let mut a = step.lateral / (1.0 + 2.0 * step.lateral + step.drag / (deepest * deepest));
+    let mut count = 0;
+    while 2.0 * a > LAGS && count < MOST {
+        a = a * a / (1.0 - 2.0 * a * a);
+        count += 1;
+    }
+    count
+}
+
+/// The network's pipes have their fluxes.
+fn set_flooded(now: &mut [[Numbers; 3]; 2], network: &Network) {
+    for (axis, at, flux) in network.fluxes() {
+        let [rest, before, behind] = now[axis].each_mut().map(|numbers| &mut numbers.all_mut()[at]);
+        (*rest, *before, *behind) = (flux, 0.0, 0.0);
+    }
+}
+
+fn first_and_last(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2], thins: bool) {
+    if thins {
+        dispatch!(solve_thinning(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]));
+    } else {
+        dispatch!(solve_newtonian(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]));
+    }
+}
+
+fn first(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6], thins: bool) {
+    if thins {
+        dispatch!(begin_thinning(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]));
+    } else {
+        dispatch!(begin_newtonian(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]));
+    }
+}
+
+fn reduce(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]) {
+    dispatch!(reduce_strips(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]));
+}
+
+fn last(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]) {
+    dispatch!(end_strips(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]));
+}
+
+#[inline(always)]
+fn solve_thinning(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]) {
+    solve_strips::<true>(pass, strips, start, out);
+}
+
+#[inline(always)]
+fn solve_newtonian(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]) {
+    solve_strips::<false>(pass, strips, start, out);
+}
+
+#[inline(always)]
+fn begin_thinning(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]) {
+    begin_strips::<true>(pass, strips, start, out);
+}
+
+#[inline(always)]
+fn begin_newtonian(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]) {
+    begin_strips::<false>(pass, strips, start, out);
+}
+
+/// r, a and b of a strip's pipes, and the last fluxes of those before and behind them.
+type System = [[f32; STRIP]; 3];
+
+#[inline(always)]
+fn solve_strips<const THINS: bool>(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]) {
+    let ([east, south], again) = (out, pass.step.again);
+    for &strip in strips {
+        let (strip, place) = (strip as usize, strip as usize - start);
+        let ([rest, a, b], [before, behind]) = pass.begin::<THINS, 0>(strip);
+        end_strip(&rest, &a, &b, &before, &behind, again, strip_mut(east, place));
+        let ([rest, a, b], [before, behind]) = pass.begin::<THINS, 1>(strip);
+        end_strip(&rest, &a, &b, &before, &behind, again, strip_mut(south, place));
+    }
+}
+
+#[inline(always)]
+fn begin_strips<const THINS: bool>(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]) {
+    for &strip in strips {
+        let ([rest, a, b], _) = pass.begin::<THINS, 0>(strip as usize);
+        let at = (strip as usize - start) * STRIP;
+        for (out, numbers) in out.iter_mut().zip([&rest, &a, &b]) {
+            out[at..at + STRIP].copy_from_slice(numbers);
+        }
+        let ([rest, a, b], _) = pass.begin::<THINS, 1>(strip as usize);
+        for (out, numbers) in out[3..].iter_mut().zip([&rest, &a, &b]) {
+            out[at..at + STRIP].copy_from_slice(numbers);
+        }
+    }
+}
+
+#[inline(always)]
+fn reduce_strips(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]) {
+    let [east, east_a, east_b, south, south_a, south_b] = out;
+    for &strip in strips {
+        let (strip, place) = (strip as usize, strip as usize - start);
+        let out = (strip_mut(east, place), strip_mut(east_a, place), strip_mut(east_b, place));
+        reduce_strip(pass.own(0, strip), pass.far::<0>(strip, 0), pass.far::<0>(strip, 1), out);
+        let out = (strip_mut(south, place), strip_mut(south_a, place), strip_mut(south_b, place));
+        reduce_strip(pass.own(1, strip), pass.far::<1>(strip, 0), pass.far::<1>(strip, 1), out);
+    }
+}
+
+/// One reduction of a strip.
+#[inline(always)]
+fn reduce_strip(
+    [rest, a, b]: [&[f32; STRIP]; 3],
+    [rest_before, a_before, b_before]: [&[f32; STRIP]; 3],
+    [rest_behind, a_behind, b_behind]: [&[f32; STRIP]; 3],
+    (new_rest, new_a, new_b): (&mut [f32; STRIP], &mut [f32; STRIP], &mut [f32; STRIP]),
+) {
+    for x in 0..STRIP {
+        let (a, b) = (a[x], b[x]);
+        let own = 1.0 / (1.0 - (a * b_before[x] + b * a_behind[x]));
+        new_rest[x] = (rest[x] + (a * rest_before[x] + b * rest_behind[x])) * own;
+        new_a[x] = a * a_before[x] * own;
+        new_b[x] = b * b_behind[x] * own;
+    }
+}
+
+#[inline(always)]
+fn end_strips(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]) {
+    for &strip in strips {
+        let strip = strip as usize;
+        for (axis, out) in out.iter_mut().enumerate() {
+            let [rest, a, b] = pass.own(axis, strip);
+            let (before, behind) = (pass.last_far(axis, strip, 0), pass.last_far(axis, strip, 1));
+            end_strip(rest, a, b, &before, &behind, pass.step.again, strip_mut(out, strip - start));
+        }
+    }
+}
+
+/// Fluxes, of the last ones before and behind them.
+#[inline(always)]
+fn end_strip(
+    rest: &[f32; STRIP],
+    a: &[f32; STRIP],
+    b: &[f32; STRIP],
+    before: &[f32; STRIP],
+    behind: &[f32; STRIP],
+    again: f32,
+    out: &mut [f32; STRIP],
+) {
+    for x in 0..STRIP {
+        out[x] = rest[x] + (a[x] * before[x] + b[x] * behind[x]) * again;
+    }
+}
+
+/// The pipes of a strip: both of their ends.
+struct Pipe<'a> {
+    base: [&'a [i32; STRIP]; 2],
+    depth: [&'a [i32; STRIP]; 2],
+    open: &'a [f32; STRIP],
+    light: &'a [u32; STRIP],
+    flux: &'a [f32; STRIP],
+    /// What is beside the columns in all; contact before them and behind.
+    all: [&'a [f32; STRIP]; 2],
+    contact: [[&'a [f32; STRIP]; 2]; 2],
+    /// Depths at both ends of the pipes before and behind.
+    before: [&'a [i32; STRIP]; 2],
+    behind: [&'a [i32; STRIP]; 2],
+}
+
+impl Pass<'_> {
+    /// What the pipes of a strip depend on, and the last fluxes of those before and behind.
+    ///
+    /// Without arrays that are mapped: closures that do not become part of their caller lack its instructions.
+    #[inline(always)]
+    fn begin<const THINS: bool, const AXIS: usize>(&self, strip: usize) -> (System, [[f32; STRIP]; 2]) {
+        let Liquid { columns, pipes, fast, depth, flux, .. } = *self.liquid;
+        let (at, bases) = (strip * STRIP, columns.bases());
+        let row = columns.strips()[strip].row as usize;
+        let light = if fast.row(row) { strip_of(fast.light(), strip) } else { &[NORMAL; STRIP] };
+        let [all, contact_before, contact_behind] = &self.beside[AXIS];
+        let (all, all_numbers) = (all.before(strip, 0), all.all());
+        let (first, first_numbers) = (contact_before.before(strip, 0), contact_before.all());
+        let (second, second_numbers) = (contact_behind.before(strip, 0), contact_behind.all());
+        let mut system = [ZEROS; 3];
+        let [rest, a, b] = &mut system;
+        if AXIS == 0 {
+            // The columns to the east, and those of the rows before and behind. Behind the last one no pipe is open.
+            let is_known = columns.east(strip).is_none_or(|east| self.known[east]);
+            let (mut far_all, mut far_first, mut far_second) = (ZEROS, ZEROS, ZEROS);
+            let far = if is_known {
+                [
+                    strip_from(all_numbers, at + 1),
+                    strip_from(first_numbers, at + 1),
+                    strip_from(second_numbers, at + 1),
+                ]
+            } else {
+                far_all[..STRIP - 1].copy_from_slice(&all[1..]);
+                far_first[..STRIP - 1].copy_from_slice(&first[1..]);
+                far_second[..STRIP - 1].copy_from_slice(&second[1..]);
+                [&far_all, &far_first, &far_second]
+            };
+            let [north, south] = [columns.north(strip), columns.south(strip)];
+            let before = if north == NONE { strip } else { north as usize };
+            let behind = if south == NONE { strip } else { south as usize };
+            let pipe = Pipe {
+                base: [strip_of(bases, strip), strip_from(bases, at + 1)],
+                depth: [strip_of(depth, strip), strip_from(depth, at + 1)],
+                open: strip_of(&pipes.east, strip),
+                light,
+                flux: strip_of(flux[0], strip),
+                all: [all, far[0]],
+                contact: [
+                    if north == NONE { [&ZEROS; 2] } else { [first, far[1]] },
+                    if south == NONE { [&ZEROS; 2] } else { [second, far[2]] },
+                ],
+                before: [strip_of(depth, before), strip_from(depth, before * STRIP + 1)],
+                behind: [strip_of(depth, behind), strip_from(depth, behind * STRIP + 1)],
+            };
+            begin_strip::<THINS, 0>(self.step, &pipe, rest, a, b);
+            (system, [*strip_of(flux[0], before), *strip_of(flux[0], behind)])
+        } else {
+            // The columns to the south, and those to the west and east of both.
+            let south = columns.south(strip);
+            let far = if south == NONE { strip } else { south as usize };
+            let [far_all, far_first, far_second] = if south != NONE && self.known[far] {
+                [strip_of(all_numbers, far), strip_of(first_numbers, far), strip_of(second_numbers, far)]
+            } else {
+                [&ZEROS; 3]
+            };
+            let (has_west, has_east) = (columns.west(strip).is_some(), columns.east(strip).is_some());
+            let (own_west, far_west) = (shifted(depth, strip, -1), shifted(depth, far, -1));
+            let pipe = Pipe {
+                base: [strip_of(bases, strip), strip_of(bases, far)],
+                depth: [strip_of(depth, strip), strip_of(depth, far)],
+                open: strip_of(&pipes.south, strip),
+                light,
+                flux: strip_of(flux[1], strip),
+                all: [all, far_all],
+                contact: [[first, far_first], [second, far_second]],
+                before: [&own_west, &far_west],
+                behind: [strip_from(depth, at + 1), strip_from(depth, far * STRIP + 1)],
+            };
+            begin_strip::<THINS, 1>(self.step, &pipe, rest, a, b);
+            if !has_west {
+                a[0] = 0.0;
+            }
+            if !has_east {
+                b[STRIP - 1] = 0.0;
+            }
+            (system, [shifted(flux[1], strip, -1), shifted(flux[1], strip, 1)])
+        }
+    }
+
+    /// r, a and b of a strip.
+    #[inline(always)]
+    fn own(&self, axis: usize, strip: usize) -> [&[f32; STRIP]; 3] {
+        let [rest, a, b] = &self.now[axis];
+        [rest.before(strip, 0), a.before(strip, 0), b.before(strip, 0)]
+    }
+
+    /// Those of the pipes at the distance of this pass before a strip's, or behind them; what has none there takes nothing of it.
+    #[inline(always)]
+    fn far<const AXIS: usize>(&self, strip: usize, side: usize) -> [&[f32; STRIP]; 3] {
+        let [rest, a, b] = &self.now[AXIS];
+        if AXIS == 0 {
+            match self.far[side][strip] {
+                NONE => [&ZEROS; 3],
+                other => self.own(0, other as usize),
+            }
+        } else if side == 0 {
+            let places = self.distance;
+            [rest.before(strip, places), a.before(strip, places), b.before(strip, places)]
+        } else {
+            let at = strip * STRIP + self.distance;
+            [strip_from(rest.all(), at), strip_from(a.all(), at), strip_from(b.all(), at)]
+        }
+    }
+
+    /// As [`Pass::far`], of the last fluxes.
+    #[inline(always)]
+    fn last_far(&self, axis: usize, strip: usize, side: usize) -> [f32; STRIP] {
+        let flux = self.liquid.flux[axis];
+        match (axis, side) {
+            (0, _) => match self.far[side][strip] {
+                NONE => ZEROS,
+                other => *strip_of(flux, other as usize),
+            },
+            (_, 0) => shifted(flux, strip, -(self.distance as isize)),
+            _ => shifted(flux, strip, self.distance as isize),
+        }
+    }
+}
+
+/// The numbers so many places behind those of a strip; 0 where there is none.
+#[inline(always)]
+fn shifted<T: Copy + Default>(numbers: &[T], strip: usize, places: isize) -> [T; STRIP] {
+    let at = (strip * STRIP) as isize + places;
+    if at >= 0 && at as usize + STRIP <= numbers.len() {
+        *strip_from(numbers, at as usize)
+    } else {
+        std::array::from_fn(|x| {
+            usize::try_from(at + x as isize).ok().and_then(|at| numbers.get(at)).copied().unwrap_or_default()
+        })
+    }
+}
+
+/// What the pipes of a strip depend on. Without anything beside it a pipe has the flux of `flux_of`, to the last bit.
+#[inline(always)]
+fn begin_strip<const THINS: bool, const AXIS: usize>(
+    step: &Step,
+    pipe: &Pipe,
+    rest: &mut [f32; STRIP],
+    a: &mut [f32; STRIP],
+    b: &mut [f32; STRIP],
+) {
+    let Pipe { base, depth, open, light, flux, all, contact, before, behind } = pipe;
+    let per_cell = 1.0 / step.cell;
+    for x in 0..STRIP {
+        let rise = base[0][x] - base[1][x];
+        let fall = base[0][x] + depth[0][x] - (base[1][x] + depth[1][x]) + step.tilt[AXIS];
+        let depth = [depth[0][x] as f32, depth[1][x] as f32];
+        let light = unpacked(light[x])[AXIS];
+        let mean = 0.5 * (depth[0] + depth[1]);
+        let driven = step.kept * flux[x] + step.drive * light * fall as f32 * lesser(mean, step.section);
+        // What nothing drives is moved by its neighbours: from both ends the same.
+        let giver = if driven > 0.0 { depth[0] } else { depth[1] };
+        let giver = if driven == 0.0 { lesser(depth[0], depth[1]) } else { giver };
+        let square = giver * giver;
+        let thinned = if THINS { step.thinned(flux[x], square) } else { 1.0 };
+        let drag = light * if THINS { step.drag * thinned } else { step.drag };
+        // On a slope a film is thinner than its depth, which for friction at the ground `open` knows.
+        let slope = rise as f32 * per_cell;
+        let steep = 1.0 + lesser(slope * slope, 3.0);
+        let lateral = if THINS { step.lateral * light * thinned } else { step.lateral * light } * steep;
+        let open = square * open[x];
+        let beside = lateral * (0.5 * (all[0][x] + all[1][x])) / greater(mean, 1.0);
+        let part = open / (open + drag + beside * open);
+        rest[x] = driven * part;
+        let part = part * lateral;
+        a[x] = part * taken([contact[0][0][x], contact[0][1][x]], [before[0][x], before[1][x]]);
+        b[x] = part * taken([contact[1][0][x], contact[1][1][x]], [behind[0][x], behind[1][x]]);
+    }
+}
+
+/// The part of a pipe's section that is in contact, of the contact and the depths at both of its ends.
+#[inline(always)]
+fn taken(contact: [f32; 2], depth: [i32; 2]) -> f32 {
+    lesser((contact[0] + contact[1]) / greater(depth[0] as f32 + depth[1] as f32, 1.0), 1.0)
+}

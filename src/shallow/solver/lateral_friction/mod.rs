@@ -1,0 +1,275 @@
+//! Friction beside a pipe: at walls, and between liquids that flow side by side at different speeds.
+//!
+//! With a velocity of u phi(z / H), phi being the profile of a wide film, momentum along a pipe weighted by phi over the depth (Galerkin) is
+//!
+//! du/dt = g S - k nu u / H^2 + 6/5 nu d2u/dy2
+//!
+//! with k = 3 below a free surface, and 12 below a ceiling: 6/5 is the mean of phi^2, and u is 0 at a wall. In a closed square duct this carries
+//! 0.7 % less than the exact flow (White, *Viscous Fluid Flow*, 3-3.3), in a channel as deep as wide 2.8 % less, in flat ones both less off.
+//!
+//! Differences in y are between a pipe and those beside it; a wall lies half a cell beyond it. What is beside a pipe (`beside.rs`) follows from the
+//! columns at both of its ends. Of both the mean counts, so that it is the same seen from either. All pipes beside each other make a line along x or z, which is
+//! solved at once (`lines.rs`): neither viscosity nor depth bounds the step. Films that are thinner than a sixteenth of a cell have nothing of this. Where all columns
+//! of two rows are, nothing is computed.
+
+mod beside;
+mod flooded;
+mod lines;
+
+use std::ops::Range;
+
+use super::active::Active;
+use super::fast_films::Fast;
+use super::flux::Step;
+use super::pressurised::network::Network;
+use crate::shallow::columns::{Columns, STRIP, strip_of};
+use crate::shallow::grid::TOP;
+use crate::shallow::pipes::{Links, Pipes};
+use lines::Lines;
+
+/// What is beside columns is found again after so many steps of a frame.
+const STEPS: u32 = 8;
+/// Columns from which on strips are divided among threads.
+const LEAST: usize = 64 * STRIP;
+
+/// Friction beside pipes.
+#[derive(Debug, Clone, Default)]
+pub struct Walls {
+    /// Whether there is any.
+    is_on: bool,
+    /// Column indices that there are lists for.
+    len: usize,
+    /// Steps since the frame began.
+    age: u32,
+    /// Rows with pipes that may have it in these steps.
+    rows: Vec<bool>,
+    /// Their active strips, and whether each is known since what is beside columns was found.
+    strips: Vec<u32>,
+    known: Vec<bool>,
+    /// Whether a strip has ceilings, or places without a column.
+    roofed: Vec<bool>,
+    /// Places of each strip from which links lead to the east, south, west and north.
+    linked: Vec<[u16; 4]>,
+    has_links: bool,
+    /// Across x, then across z: what is beside each column in all ([`beside::Around`]), before it, and behind it.
+    beside: [[Numbers; 3]; 2],
+    lines: Lines,
+}
+
+/// What friction is found in.
+#[derive(Clone, Copy)]
+pub struct Liquid<'a> {
+    pub columns: &'a Columns,
+    pub pipes: &'a Pipes,
+    pub active: &'a Active,
+    pub fast: &'a Fast,
+    pub network: &'a Network,
+    /// H (units), and 16 more numbers.
+    pub depth: &'a [i32],
+    /// Fluxes to the east and to the south (units in the last step).
+    pub flux: [&'a [f32]; 2],
+    /// At least the greatest depth of each row (units).
+    pub row_depths: &'a [i32],
+    /// Whether other threads help.
+    pub is_divided: bool,
+}
+
+/// Numbers by column index, with some before the first and behind the last. Each list begins at another place of a page (`per_column.rs`).
+#[derive(Debug, Clone, Default)]
+struct Numbers {
+    before: usize,
+    list: Vec<f32>,
+}
+
+impl Numbers {
+    fn fit(&mut self, place: usize, len: usize) {
+        self.before = STRIP + 48 * place;
+        self.list.clear();
+        self.list.resize(self.before + len + 2 * STRIP, 0.0);
+    }
+
+    /// From the first column on.
+    fn all(&self) -> &[f32] {
+        &self.list[self.before..]
+    }
+
+    fn all_mut(&mut self) -> &mut [f32] {
+        &mut self.list[self.before..]
+    }
+
+    /// From some places before a strip on.
+    #[inline(always)]
+    fn before(&self, strip: usize, places: usize) -> &[f32; STRIP] {
+        let at = self.before + strip * STRIP - places;
+        self.list[at..].first_chunk().expect("a strip")
+    }
+}
+
+impl Walls {
+    /// Memory for the friction of these columns.
+    pub fn turn_on(&mut self, columns: &Columns) {
+        self.is_on = true;
+        self.fit(columns);
+    }
+
+    /// The columns have changed.
+    pub fn fit(&mut self, columns: &Columns) {
+        if !self.is_on {
+            return;
+        }
+        let (strips, len) = (columns.strips().len(), columns.len());
+        self.age = 0;
+        self.rows.clear();
+        self.rows.resize(columns.grid.size[1], false);
+        self.strips.clear();
+        self.strips.reserve(strips);
+        self.known.clear();
+        self.known.resize(strips, false);
+        self.linked.clear();
+        self.linked.resize(strips, [0; 4]);
+        let has_roof = |strip| strip_of(columns.ceilings(), strip).iter().any(|&ceiling| ceiling < TOP);
+        self.roofed.clear();
+        self.roofed.extend((0..strips).map(has_roof));
+        if self.len != len {
+            self.len = len;
+            for (place, numbers) in self.beside.iter_mut().flatten().enumerate() {
+                numbers.fit(place, len);
+            }
+            self.lines.fit(columns);
+        }
+    }
+
+    /// Memory (bytes).
+    pub fn bytes(&self) -> usize {
+        let numbers = self.beside.iter().flatten().map(|numbers| size_of_val(&numbers.list[..]));
+        numbers.sum::<usize>() + self.lines.bytes() + self.rows.len() + 14 * self.known.len()
+    }
+
+    /// Begins a frame.
+    pub fn begin_frame(&mut self) {
+        self.age = 0;
+    }
+
+    /// Whether the fluxes of a row's pipes are solved with what is beside them.
+    #[inline(always)]
+    pub fn row(&self, row: usize) -> bool {
+        self.is_on && self.rows[row]
+    }
+
+    /// Fluxes to the east and to the south (units in this step) of those rows.
+    pub fn solved(&self) -> [&[f32]; 2] {
+        self.lines.solved()
+    }
+
+    /// Begins a step: where in some steps friction beside pipes may be.
+    pub fn begin_step(&mut self, step: &Step, links: &Links, columns: &Columns, row_depths: &[i32]) {
+        if !self.is_on {
+            return;
+        }
+        if step.lateral == 0.0 {
+            self.rows.fill(false);
+            return;
+        }
+        if self.age.is_multiple_of(STEPS) {
+            let is_deep =
+                |row: usize| row_depths.get(row).is_some_and(|&deepest| beside::counts(step, deepest));
+            for (row, has) in self.rows.iter_mut().enumerate() {
+                *has = is_deep(row) || is_deep(row + 1);
+            }
+            self.mark_links(links, columns);
+        }
+    }
+
+    /// Finds the fluxes of all pipes with friction beside them; the network's are found already.
+    pub fn find(&mut self, step: &Step, liquid: &Liquid) {
+        if !self.is_on || step.lateral == 0.0 {
+            return;
+        }
+        let is_new = self.age.is_multiple_of(STEPS);
+        self.age += 1;
+        if is_new {
+            self.known.fill(false);
+        }
+        self.strips.clear();
+        let active = liquid.active.active();
+        for row in (0..self.rows.len()).filter(|&row| self.rows[row]) {
+            let strips = liquid.active.strips(row).filter(|&strip| active[strip]);
+            self.strips.extend(strips.map(|strip| strip as u32));
+        }
+        if self.strips.is_empty() {
+            return;
+        }
+        if is_new {
+            self.find_beside(step, liquid);
+        }
+        for &strip in &self.strips {
+            let strip = strip as usize;
+            if !std::mem::replace(&mut self.known[strip], true) && !is_new {
+                // It was dry when that was found.
+                for numbers in self.beside.iter_mut().flatten() {
+                    numbers.all_mut()[strip * STRIP..][..STRIP].fill(0.0);
+                }
+            }
+        }
+        let Self { strips, known, beside, lines, .. } = self;
+        lines.solve(step, liquid, strips, known, beside);
+    }
+
+    /// Marks the places of strips from which links lead over a side: there is no wall.
+    fn mark_links(&mut self, links: &Links, columns: &Columns) {
+        if self.has_links {
+            self.linked.fill([0; 4]);
+        }
+        self.has_links = !links.is_empty();
+        for link in 0..links.len() {
+            let (from, to, side) = (links.from[link] as usize, links.to[link] as usize, links.sides[link]);
+            self.linked[from / STRIP][side as usize] |= 1 << (from % STRIP);
+            if to < columns.len() {
+                self.linked[to / STRIP][side.opposite() as usize] |= 1 << (to % STRIP);
+            }
+        }
+    }
+
+    fn find_beside(&mut self, step: &Step, liquid: &Liquid) {
+        let Self { strips, roofed, linked, beside, .. } = self;
+        let around = beside::Around { columns: liquid.columns, depth: liquid.depth, roofed, linked };
+        let len = liquid.columns.len();
+        let [[a, b, c], [d, e, f]] =
+            beside.each_mut().map(|axis| axis.each_mut().map(|n| &mut n.all_mut()[..len]));
+        let work = |range: Range<usize>, out: [&mut [f32]; 6]| {
+            beside::find(step, &around, within(strips, &range), range.start, out);
+        };
+        spread(liquid.is_divided, 0..len / STRIP, [a, b, c, d, e, f], &work);
+    }
+}
+
+/// Those of some strips, in order, that are within a range.
+fn within<'a>(strips: &'a [u32], range: &Range<usize>) -> &'a [u32] {
+    let at = |end: usize| strips.partition_point(|&strip| (strip as usize) < end);
+    &strips[at(range.start)..at(range.end)]
+}
+
+/// Calls `work` with ranges of strips and their parts of lists, on several threads where that is asked for.
+fn spread<const N: usize>(
+    is_divided: bool,
+    strips: Range<usize>,
+    out: [&mut [f32]; N],
+    work: &(impl Fn(Range<usize>, [&mut [f32]; N]) + Sync),
+) {
+    if !is_divided || strips.len() * STRIP <= LEAST {
+        return work(strips, out);
+    }
+    let half = strips.len() / 2;
+    let middle = strips.start + half;
+    let mut behind = [(); N].map(|()| &mut [][..]);
+    let mut places = behind.iter_mut();
+    let before = out.map(|numbers| {
+        let (before, rest) = numbers.split_at_mut(half * STRIP);
+        *places.next().expect("as many") = rest;
+        before
+    });
+    rayon::join(
+        || spread(true, strips.start..middle, before, work),
+        || spread(true, middle..strips.end, behind, work),
+    );
+}

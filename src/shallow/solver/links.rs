@@ -1,0 +1,227 @@
+//! Flow through links: pipes between layers, and out of the domain. Few, and one at a time.
+
+use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
+use std::ops::Range;
+
+use super::fast_films;
+use super::flux::{Kind, Step, flux_of, lesser, split};
+use super::overflow_edges::{Fall, Lips, edge};
+use super::parts::LinkPart;
+use crate::shallow::pipes::Links;
+use crate::shallow::scalars::MOST as SCALARS;
+
+/// Beyond what any column has (units): sums of transfers stay within 64 bits.
+const MOST: f32 = 2.1e9;
+
+/// The flow through each link.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LinkFlow {
+    /// Flux (units a step).
+    pub flux: Vec<f32>,
+    /// What truncation left (units).
+    pub left: Vec<f32>,
+    /// Transfer in this step (units).
+    pub transfer: Vec<f32>,
+    /// What went over it freely in the last step: amounts of each scalar that the liquid carries.
+    pub fallen: [Vec<f64>; SCALARS],
+    /// Units that left the domain since the flow began.
+    pub lost: i64,
+    /// Units that came in over an absorbing border.
+    pub gained: i64,
+}
+
+impl LinkFlow {
+    /// No flow.
+    pub fn new(links: &Links) -> Self {
+        let none = vec![0.0; links.len()];
+        Self { flux: none.clone(), left: none.clone(), transfer: none, ..Self::default() }
+    }
+
+    /// What falls freely has so many scalars.
+    pub(super) fn carry(&mut self, scalars: usize) {
+        for (at, fallen) in self.fallen.iter_mut().enumerate() {
+            *fallen = vec![0.0; if at < scalars { self.flux.len() } else { 0 }];
+        }
+    }
+
+    /// Puts links with other flow in place of some.
+    pub(in crate::shallow) fn replace(
+        &mut self,
+        part: Range<usize>,
+        flux: &[f32],
+        left: &[f32],
+        scalars: usize,
+    ) {
+        let new = part.start..part.start + flux.len();
+        for numbers in [&mut self.flux, &mut self.left, &mut self.transfer] {
+            resize_part(numbers, part.clone(), new.len(), 0.0);
+        }
+        for fallen in self.fallen.iter_mut().take(scalars) {
+            resize_part(fallen, part.clone(), new.len(), 0.0);
+            fallen[new.clone()].fill(0.0);
+        }
+        self.flux[new.clone()].copy_from_slice(flux);
+        self.left[new.clone()].copy_from_slice(left);
+        self.transfer[new].fill(0.0);
+    }
+}
+
+/// Units that went out of the domain and came in from there.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Outside {
+    /// Went out.
+    pub lost: i64,
+    /// Came in.
+    pub gained: i64,
+}
+
+impl LinkPart<'_> {
+    /// Computes the flux and the transfer of the links that a row owns; `first` is the part's first link, `depth` H of columns of this row and
+    /// the next one.
+    pub fn drive<K: Kind>(
+        &mut self,
+        step: &Step,
+        columns: &Columns,
+        links: &Links,
+        lips: &Lips,
+        (row, first): (usize, usize),
+        depth: impl Fn(usize) -> i32,
+    ) {
+        let base = columns.bases();
+        for link in links.row(row) {
+            let (i, open) = (links.from[link] as usize, links.open[link]);
+            let own = depth(i);
+            let at = link - first;
+            let (eta, beyond, is_still) = match links.to[link] {
+                // As into the void, whatever lies below.
+                _ if lips.at(link) == Fall::Ahead => (base[i] - edge(columns), 0, false),
+                j if lips.at(link) == Fall::Back => {
+                    let (base, depth) = (base[j as usize], depth(j as usize));
+                    self.drive_back::<K>(step, at, base + depth - (base - edge(columns)), depth, open);
+                    continue;
+                }
+                NONE => beyond(links, columns, link, step.still),
+                j => (base[j as usize] + depth(j as usize), depth(j as usize), false),
+            };
+            let fall = (base[i] + own).saturating_sub(eta);
+            let f = if is_still {
+                radiated(step, fall, [own as f32, beyond as f32])
+            } else {
+                let depth = [own as f32, beyond as f32];
+                let light =
+                    if K::VISCOUS && !K::WHOLE { fast_films::light(step, depth, self.flux[at]) } else { 1.0 };
+                step.rested::<K>(fall, depth, flux_of::<K>(step, fall, depth, self.flux[at], open, light))
+            };
+            self.flux[at] = f;
+            let [transfer, left] = split(f, self.left[at]);
+            (self.transfer[at], self.left[at]) = (transfer.clamp(-MOST, MOST), left);
+        }
+    }
+
+    /// Computes the flux and the transfer of a link that liquid falls freely over from its second column, of its fall and depth (units).
+    fn drive_back<K: Kind>(&mut self, step: &Step, at: usize, fall: i32, depth: i32, open: f32) {
+        let (flux, depth) = (-self.flux[at], [depth as f32, 0.0]);
+        let light = if K::VISCOUS && !K::WHOLE { fast_films::light(step, depth, flux) } else { 1.0 };
+        let flux = flux_of::<K>(step, fall, depth, flux, open, light);
+        self.flux[at] = 0.0 - step.rested::<K>(fall, depth, flux);
+        let [transfer, left] = split(self.flux[at], self.left[at]);
+        (self.transfer[at], self.left[at]) = (transfer.clamp(-MOST, MOST), left);
+    }
+
+    /// Calls `add` with each column of some that gives through a link of a row, or takes, and how much (units, rounded up, so that sums do not
+    /// depend on their order).
+    pub fn each(
+        &self,
+        links: &Links,
+        lips: &Lips,
+        (row, first): (usize, usize),
+        within: &Range<u32>,
+        gives: bool,
+        mut add: impl FnMut(u32, i64),
+    ) {
+        for link in links.row(row) {
+            let transfer = self.transfer[link - first];
+            let column = if (transfer > 0.0) == gives { links.from[link] } else { links.to[link] };
+            let is_there = column != NONE && (gives || lips.at(link) == Fall::No);
+            if transfer != 0.0 && is_there && within.contains(&column) {
+                add(column, transfer.abs().ceil() as i64);
+            }
+        }
+    }
+
+    /// Multiplies the transfers and fluxes of the links that a row owns by a factor of the column that gives, or of the one that takes.
+    pub fn scale(
+        &mut self,
+        links: &Links,
+        lips: &Lips,
+        (row, first): (usize, usize),
+        giver: bool,
+        factor: impl Fn(u32) -> f32,
+    ) {
+        for link in links.row(row) {
+            let transfer = self.transfer[link - first];
+            let column = if (transfer > 0.0) == giver { links.from[link] } else { links.to[link] };
+            if transfer != 0.0 && column != NONE && (giver || lips.at(link) == Fall::No) {
+                let k = factor(column);
+                self.transfer[link - first] *= k;
+                self.flux[link - first] *= k;
+            }
+        }
+    }
+
+    /// Finds the units that the links of a row transfer; `change` is called with each column and what it gains. What falls freely leaves its
+    /// column only.
+    pub fn move_units(
+        &mut self,
+        links: &Links,
+        lips: &Lips,
+        (row, first): (usize, usize),
+        outside: &mut Outside,
+        mut change: impl FnMut(usize, i32),
+    ) {
+        for link in links.row(row) {
+            let transfer = self.transfer[link - first];
+            // K keeps it within 32 bits.
+            let units = transfer as i32;
+            if units == 0 {
+                continue;
+            }
+            match lips.at(link) {
+                Fall::No => {}
+                Fall::Ahead => {
+                    change(links.from[link] as usize, -units);
+                    continue;
+                }
+                Fall::Back => {
+                    change(links.to[link] as usize, units);
+                    continue;
+                }
+            }
+            change(links.from[link] as usize, -units);
+            match links.to[link] {
+                NONE if units > 0 => outside.lost += i64::from(units),
+                NONE => outside.gained -= i64::from(units),
+                to => change(to as usize, units),
+            }
+        }
+    }
+}
+
+/// What lies at the far end of a link that leaves the domain: its surface and its depth over the link's column (units), and whether it is liquid at rest.
+pub(super) fn beyond(links: &Links, columns: &Columns, link: usize, still: i32) -> (i32, i32, bool) {
+    let (eta, is_still) = links.outside(columns, link, still);
+    (eta, if is_still { eta - columns.bases()[links.from[link] as usize] } else { 0 }, is_still)
+}
+
+/// The flux of a wave that leaves over the border (units a step): a surface that stands `fall` over the one at rest goes out at the speed of
+/// waves (Sommerfeld's condition), and what came is not thrown back.
+fn radiated(step: &Step, fall: i32, depth: [f32; 2]) -> f32 {
+    let mean = if step.is_whole { step.section } else { lesser(0.5 * (depth[0] + depth[1]), step.section) };
+    if fall.saturating_abs() <= step.level { 0.0 } else { lesser(step.wave * mean.sqrt(), 1.0) * fall as f32 }
+}
+
+/// The indices of a row's columns.
+pub fn indices_of(columns: &Columns, row: usize) -> Range<u32> {
+    let strips = columns.row(row);
+    (strips.start * STRIP) as u32..(strips.end * STRIP) as u32
+}

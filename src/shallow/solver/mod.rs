@@ -1,0 +1,463 @@
+//! The state of the liquid, and one step of it (thesis 4.1.2, Alg. 4.1).
+//!
+//! A step goes over the rows once (`rows.rs`): fluxes (`flux.rs`, `solver/fast_films.rs`, `links.rs`), their scaling (`scale.rs`), and transfers (`transfer.rs`), on the
+//! strips that are wet or beside wet ones, unless all rests there (`active.rs`, `rest.rs`), by one band of rows for each thread (`bands.rs`,
+//! `parts.rs`). Columns that are full up to their ceiling are a network of their own, found first (`solver/pressurised/network.rs`, `solver/pressurised/heads.rs`, `solver/limiter.rs`); then friction
+//! beside pipes, if it is wanted (`walls`). What the liquid carries follows transfers (`carry.rs`).
+
+pub(super) mod active;
+pub(super) mod bands;
+mod buffers;
+mod carry;
+pub mod fast_films;
+pub mod flux;
+pub(super) mod lateral_friction;
+mod limiter;
+pub mod links;
+pub(super) mod overflow_edges;
+mod parts;
+mod pressurised;
+pub mod rest;
+mod room;
+mod row_positions;
+mod rows;
+mod scale;
+pub mod stop;
+mod transfer;
+
+use std::ops::Range;
+
+use super::columns::{Columns, NONE, STRIP, strip_mut};
+use super::per_column::{Array, PerColumn};
+use super::pipes::cliffs::Cliffs;
+use super::pipes::{Links, Pipes};
+use super::scalars::amounts::{Account, Amounts, Changes};
+use super::scalars::shares::{Levels, MOST};
+use active::{Active, runs};
+use bands::Bands;
+use fast_films::{Fast, Films};
+use flux::Step;
+use lateral_friction::{Liquid, Walls};
+use links::LinkFlow;
+use overflow_edges::Lips;
+use parts::Part;
+pub(super) use pressurised::network::SLACK;
+use pressurised::network::{Network, State};
+use rest::{Bounds, Still};
+use rows::Ground;
+use stop::Stop;
+
+/// Depths and fluxes, by column index.
+#[derive(Debug, Clone)]
+pub struct Flow {
+    /// H (units), and 16 more numbers.
+    pub(super) depth: PerColumn<i32>,
+    /// Flux to the east and to the south (units in a step of `last`).
+    pub(super) flux: [PerColumn<f32>; 2],
+    /// What truncation left of transfers to the east and to the south (units).
+    pub(super) left: [PerColumn<f32>; 2],
+    pub(super) links: LinkFlow,
+    pub(super) lips: Lips,
+    active: Active,
+    bands: Bands,
+    pub(super) network: Network,
+    /// Length of the step in whose measure fluxes are (s).
+    pub(super) last: f64,
+    fast: Fast,
+    /// Friction beside pipes.
+    pub(super) walls: Walls,
+    /// What it carries.
+    pub(super) amounts: Amounts,
+    /// Whether nothing sleeps, for comparison.
+    is_sleepless: bool,
+}
+
+/// What a restored state replaces.
+pub(super) struct Stored<'a> {
+    /// Whether each strip is worked on.
+    pub active: &'a [bool],
+    /// H (units).
+    pub depth: &'a mut [i32],
+    /// As [`Flow::numbers`].
+    pub numbers: [&'a mut [f32]; 4],
+    /// As [`Flow::heads`].
+    pub heads: &'a mut [f32],
+    /// Among others, the greatest depths of rows.
+    pub bands: &'a mut Bands,
+    /// Flow through links.
+    pub links: &'a mut LinkFlow,
+    /// Length of the last step (s).
+    pub last: &'a mut f64,
+    /// What it carries.
+    pub amounts: &'a mut Amounts,
+}
+
+impl Stored<'_> {
+    /// Empties the active strips of a range; in others there is nothing.
+    pub fn clear(&mut self, strips: std::ops::Range<usize>) {
+        let first = strips.start;
+        for run in runs(&self.active[strips]) {
+            let run = (first + run.start) * STRIP..(first + run.end) * STRIP;
+            self.depth[run.clone()].fill(0);
+            for numbers in &mut self.numbers {
+                numbers[run.clone()].fill(0.0);
+            }
+            self.heads[run.clone()].fill(0.0);
+            let amounts = self.amounts.amounts.iter_mut().filter(|amounts| !amounts.is_empty());
+            amounts.for_each(|amounts| amounts[run.clone()].fill(0.0));
+        }
+    }
+}
+
+impl Flow {
+    /// Dry columns.
+    pub fn new(columns: &Columns, pipes: &Pipes) -> Self {
+        let none = |array| PerColumn::new(array, columns.len(), 0.0);
+        Self {
+            depth: PerColumn::new(Array::Depth, columns.len() + STRIP, 0),
+            flux: [none(Array::FluxEast), none(Array::FluxSouth)],
+            left: [none(Array::LeftEast), none(Array::LeftSouth)],
+            links: LinkFlow::new(&pipes.links),
+            lips: Lips::default(),
+            active: Active::new(columns, &pipes.links),
+            bands: Bands::new(columns, pipes.links.most),
+            network: Network::new(columns.len(), columns.grid.size[1]),
+            last: 1.0,
+            fast: Fast::new(columns.len() + STRIP, columns.grid.size[1]),
+            walls: Walls::default(),
+            amounts: Amounts::none(),
+            is_sleepless: false,
+        }
+    }
+
+    /// Memory (bytes).
+    pub fn bytes(&self) -> usize {
+        let pipes: usize = self.flux.iter().chain(&self.left).map(PerColumn::bytes).sum();
+        let links = [&self.links.flux, &self.links.left, &self.links.transfer];
+        let links: usize = links.iter().map(|numbers| size_of_val(&numbers[..])).sum();
+        self.depth.bytes()
+            + pipes
+            + links
+            + self.active.bytes()
+            + self.bands.bytes()
+            + self.network.bytes()
+            + self.fast.bytes()
+            + self.walls.bytes()
+            + self.amounts.bytes()
+    }
+
+    /// H of every column index (units).
+    pub fn depths(&self) -> &[i32] {
+        &self.depth[..self.depth.len() - STRIP]
+    }
+
+    /// Whether each strip is wet or beside a wet one: in all others there is neither liquid nor flow.
+    pub(super) fn active(&self) -> &[bool] {
+        self.active.active()
+    }
+
+    /// Fluxes (units in a step of `last`) and what truncation left of transfers (units), both to the east and to the south, by column index.
+    pub(super) fn numbers(&self) -> [&[f32]; 4] {
+        let ([east, south], [left_east, left_south]) = (&self.flux, &self.left);
+        [east, south, left_east, left_south]
+    }
+
+    /// Heads over the surface (units) of full columns, by column index.
+    pub(super) fn heads(&self) -> &[f32] {
+        self.network.over()
+    }
+
+    /// Among others, the greatest depths of rows.
+    pub(super) fn bands(&self) -> &Bands {
+        &self.bands
+    }
+
+    /// All that a restored state replaces; then comes [`Flow::wake`].
+    pub(super) fn stored(&mut self) -> Stored<'_> {
+        let ([east, south], [left_east, left_south]) = (&mut self.flux, &mut self.left);
+        Stored {
+            active: self.active.active(),
+            depth: &mut self.depth,
+            numbers: [east, south, left_east, left_south],
+            heads: self.network.over_mut(),
+            bands: &mut self.bands,
+            links: &mut self.links,
+            last: &mut self.last,
+            amounts: &mut self.amounts,
+        }
+    }
+
+    /// Makes the strips of some runs, which are in order, active, and no others but those beside liquid: what is [`Stored`] has changed.
+    pub(super) fn wake(
+        &mut self,
+        columns: &Columns,
+        runs: impl Iterator<Item = std::ops::Range<usize>> + Clone,
+    ) {
+        self.active.reset(columns, &self.depth, runs);
+    }
+
+    /// Units of liquid in all columns.
+    pub fn units(&self) -> i64 {
+        self.depth.iter().map(|&depth| i64::from(depth)).sum()
+    }
+
+    /// Carries other scalars, of which there is nothing yet.
+    pub(super) fn carry(&mut self, columns: &Columns, amounts: Amounts) {
+        self.bands.carry(columns, amounts.count());
+        self.links.carry(amounts.count());
+        self.amounts = amounts;
+        self.active.rouse_all();
+    }
+
+    /// As [`Flow::change_depth`], of liquid that comes with these concentrations, or goes with what it carries.
+    pub(super) fn add(
+        &mut self,
+        columns: &Columns,
+        index: usize,
+        units: i64,
+        levels: &Levels,
+        account: Account,
+    ) -> i64 {
+        let before = i64::from(self.depth[index]);
+        let added = self.change_depth(columns, index, units);
+        if added != 0 {
+            self.amounts.add(index, before, added, levels, account);
+        }
+        added
+    }
+
+    /// Adds to the depth of a column, or takes from it, within 0 and its ceiling; returns what was added.
+    pub(super) fn change_depth(&mut self, columns: &Columns, index: usize, units: i64) -> i64 {
+        let room = i64::from(columns.ceilings()[index]) - i64::from(columns.bases()[index]);
+        let before = i64::from(self.depth[index]);
+        let after = (before + units).clamp(0, room.max(0));
+        self.depth[index] = after as i32;
+        self.bands.deepen(columns.cell(index)[1], after as i32);
+        let strip = index / STRIP;
+        if after > 0 && !self.active.wet()[strip] || after != before && !self.active.moving()[strip] {
+            self.active.wake(columns, strip);
+        }
+        after - before
+    }
+
+    /// Gives a part of the columns another count of indices; what they hold is then left over from before.
+    pub(super) fn resize_part(&mut self, part: Range<usize>, len: usize) {
+        self.depth.resize_part(part.clone(), len, 0);
+        for numbers in self.flux.iter_mut().chain(&mut self.left) {
+            numbers.resize_part(part.clone(), len, 0.0);
+        }
+        self.amounts.resize_part(part.clone(), len);
+        self.fast.resize_part(part.clone(), len);
+        self.network.resize_part(part, len);
+    }
+
+    /// Finds again what depends on the columns of some rows, and on the links unless these join the same ones.
+    pub(super) fn refit(
+        &mut self,
+        columns: &Columns,
+        pipes: &Pipes,
+        rows: Range<usize>,
+        has_same_links: bool,
+    ) {
+        self.bands.refit(columns, pipes.links.most, rows.clone(), &self.depth);
+        self.walls.fit(columns);
+        let links = (!has_same_links).then_some(&pipes.links);
+        self.active.refit(columns, links, rows.clone(), &self.depth);
+        let Self { flux, left, network, active, .. } = self;
+        for strip in columns.row(rows.start).start..columns.row(rows.end - 1).end {
+            if !active.active()[strip] {
+                flux.iter_mut().chain(&mut *left).for_each(|flow| strip_mut(flow, strip).fill(0.0));
+                network.dry(strip * STRIP..(strip + 1) * STRIP);
+            }
+        }
+    }
+
+    /// Begins a frame: strips where all is dry are left, and those where all rests sleep.
+    pub fn begin_frame(&mut self, columns: &Columns, pipes: &Pipes, bounds: Bounds) {
+        self.walls.begin_frame();
+        let [east, south] = &mut self.flux;
+        let [left_east, left_south] = &mut self.left;
+        self.active.settle(columns, &self.depth, |dry| {
+            for numbers in [&mut *east, &mut *south, &mut *left_east, &mut *left_south] {
+                numbers[dry.clone()].fill(0.0);
+            }
+            self.network.dry(dry);
+        });
+        let Self { depth, links, network, active, .. } = self;
+        let numbers = [&**east, south, left_east, left_south];
+        let still = Still { columns, pipes, depth, numbers, links, heads: network.over(), bounds };
+        if bounds.level > 0 && !self.is_sleepless && !self.amounts.has_laws() {
+            active.fall_asleep(&still);
+        }
+    }
+
+    /// Wakes all that sleeps: something has changed that is not liquid.
+    pub fn rouse(&mut self) {
+        self.active.rouse_all();
+    }
+
+    /// Whether nothing is to sleep from now on.
+    pub fn set_sleepless(&mut self, is_sleepless: bool) {
+        self.is_sleepless = is_sleepless;
+        self.active.rouse_all();
+    }
+
+    /// Finds fast films; returns the least power of two of cells, to `farthest`, that no disturbance in them leaves behind in `step` times the last
+    /// step. `drive` is g unit dt^2 / dx^2 of that one (1 / units).
+    pub fn find_fast(&mut self, columns: &Columns, drive: f64, step: f64, farthest: u32) -> u32 {
+        self.active.refresh(columns, &self.depth);
+        let Self { fast, active, depth, flux: [east, south], .. } = self;
+        let films = Films { active, depth, flux: [east, south], drive: drive as f32 };
+        fast.find(&films, step as f32, farthest)
+    }
+
+    /// Lets the inertia of fast films count less in steps like one.
+    pub fn lighten(&mut self, drive: f64, step: &Step) {
+        let Self { fast, active, depth, flux: [east, south], .. } = self;
+        fast.lighten(&Films { active, depth, flux: [east, south], drive: drive as f32 }, step);
+    }
+
+    /// No film is fast.
+    pub fn calm(&mut self) {
+        self.fast.clear();
+    }
+
+    /// At least the greatest depth (units).
+    pub fn deepest(&self) -> i32 {
+        self.bands.deepest()
+    }
+
+    /// Finds the links that liquid falls freely from in the next step.
+    pub(super) fn find_lips(&mut self, columns: &Columns, links: &Links, cliffs: Cliffs) {
+        self.lips.find(columns, links, cliffs, &self.depth);
+    }
+
+    /// One step of `dt` (s); returns the count of rows in which K_min, and in which K_max, was not 1, and in which fast films were held back. Runs on
+    /// the threads of the pool around it, if [`Flow::divide`] has divided it.
+    pub fn step(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, dt: f64, stop: &Stop) -> [u32; 3] {
+        self.active.refresh(columns, &self.depth);
+        if self.active.all_rest() && self.network.is_empty() {
+            self.bands.row_depths_mut().copy_from_slice(self.active.asleep_depths());
+            self.last = dt;
+            return [0; 3];
+        }
+        self.walls.begin_step(step, &pipes.links, columns, self.bands.row_depths());
+        if self.bands.find_filling() || !self.network.is_empty() {
+            self.flood(columns, pipes, step, stop);
+            for strip in self.network.strips() {
+                self.active.stir(columns, strip);
+            }
+            self.active.refresh(columns, &self.depth);
+        }
+        self.rub(columns, pipes, step);
+        self.amounts.begin_step(dt);
+        if !self.network.is_empty() {
+            self.carry_flooded();
+        }
+        let acts = self.amounts.acts();
+        let ground = Ground {
+            columns,
+            pipes,
+            active: &self.active,
+            network: &self.network,
+            fast: &self.fast,
+            walls: &self.walls,
+            lips: &self.lips,
+            may_rest: step.level > 0,
+            may_fill: &[],
+            room: &[],
+            acts: &acts,
+        };
+        let [flux, left] =
+            [&mut self.flux, &mut self.left].map(|both| both.each_mut().map(|numbers| &mut numbers[..]));
+        let amounts = self.amounts.amounts.each_mut().map(|amounts| &mut amounts[..]);
+        let liquid = Part::new(&mut self.depth, flux, left, &mut self.links, amounts);
+        self.bands.step(step, &ground, liquid);
+        self.network.put_back(&mut self.flux, &mut self.left, &mut self.links, &mut self.lips);
+        let mut scaled = [0; 3];
+        for stepped in self.bands.results() {
+            scaled = [0, 1, 2].map(|which| scaled[which] + stepped.scaled[which]);
+            self.links.lost += stepped.outside.lost;
+            self.links.gained += stepped.outside.gained;
+            for strip in stepped.woken.drain(..) {
+                self.active.wake(columns, strip as usize);
+            }
+            self.amounts.settle(&stepped.carried);
+            (stepped.scaled, stepped.outside, stepped.carried) = Default::default();
+        }
+        if self.active.may_sleep() {
+            self.stir(columns, &pipes.links);
+        }
+        self.last = dt;
+        scaled
+    }
+
+    /// Divides steps among so many threads, where that is faster; whether it is.
+    pub fn divide(&mut self, columns: &Columns, threads: usize) -> bool {
+        self.bands.divide(columns, threads);
+        self.bands.are_several()
+    }
+
+    /// Wakes what the step has moved through links.
+    fn stir(&mut self, columns: &Columns, links: &Links) {
+        for link in (0..links.len()).filter(|&link| self.links.transfer[link] != 0.0) {
+            for end in [links.from[link], links.to[link]].into_iter().filter(|&end| end != NONE) {
+                self.active.stir(columns, end as usize / STRIP);
+            }
+        }
+    }
+
+    /// Moves what the flow through full columns takes along.
+    fn carry_flooded(&mut self) {
+        let Amounts { amounts, party_levels, scalars, .. } = &mut self.amounts;
+        let mut changes = [Changes::default(); MOST];
+        let each = amounts.iter_mut().zip(&mut self.links.fallen).zip(&mut changes);
+        for ((amounts, fallen), changes) in each.take(scalars.len()) {
+            self.network.carry(&self.depth, (&self.lips, fallen), amounts, party_levels, changes);
+        }
+        self.amounts.settle(&changes);
+    }
+
+    /// Columns of strips that a step works on, and at most how many of them may be full.
+    pub(super) fn work(&mut self, columns: &Columns) -> [usize; 2] {
+        let wet = STRIP * self.active.count();
+        if !self.bands.find_filling() {
+            return [wet, self.network.len()];
+        }
+        let may_be_full = self.bands.filling().may_be_full;
+        let rows = (0..may_be_full.len()).filter(|&row| may_be_full[row]);
+        let full = rows.map(|row| STRIP * columns.row(row).len()).sum::<usize>();
+        [wet, full.min(wet).max(self.network.len())]
+    }
+
+    /// Finds what flows with friction beside it.
+    fn rub(&mut self, columns: &Columns, pipes: &Pipes, step: &Step) {
+        let [east, south] = &self.flux;
+        let liquid = Liquid {
+            columns,
+            pipes,
+            active: &self.active,
+            fast: &self.fast,
+            network: &self.network,
+            depth: &self.depth,
+            flux: [east, south],
+            row_depths: self.bands.row_depths(),
+            is_divided: self.bands.are_several(),
+        };
+        self.walls.find(step, &liquid);
+    }
+
+    /// Finds what flows through full columns.
+    fn flood(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, stop: &Stop) {
+        let ([east, south], [left_east, left_south]) = (&self.flux, &self.left);
+        let state = State {
+            depth: &self.depth,
+            flux: [east, south],
+            left: [left_east, left_south],
+            links: &self.links,
+            lips: &self.lips,
+            walls: &self.walls,
+        };
+        self.network.find(step, columns, pipes, self.bands.filling(), &state, stop);
+    }
+}

@@ -1,0 +1,245 @@
+//! The heads of full columns by conjugate gradients, each node by its diagonal, with sums that do not depend on their order.
+//!
+//! Each iteration reads and writes all nodes several times: their numbers lie in lists of their own, and those beside a node are found without its pipes.
+
+use super::heads::{GIVE, LINK_SCALE, Node, scaled};
+use super::network::{At, Edge};
+use crate::shallow::columns::NONE;
+use crate::shallow::solver::stop::Stop;
+
+/// Most iterations for the heads of a step.
+const ITERATIONS: usize = 500;
+/// Units by which a column's head may be off, if those around it were right.
+const RESIDUAL: f64 = 0.005;
+/// Numbers of a sum that are added at once.
+const LANES: usize = 8;
+
+/// The system of a step's heads, and what iterates.
+#[derive(Debug, Clone, Default)]
+pub(in crate::shallow::solver) struct Gradients {
+    /// Nodes to the east, west, south and north of each, and the conductance of the pipes to them; the node behind the last where there is none.
+    beside: Vec<[u32; 4]>,
+    through: Vec<[f64; 4]>,
+    links: Vec<Link>,
+    /// Sum over links of each node, in 1/65536 unit; empty where there are no links.
+    linked: Vec<i64>,
+    /// 1 where a node is in the system, else 0.
+    held: Vec<f64>,
+    diagonal: Vec<f64>,
+    over: Vec<f64>,
+    residual: Vec<f64>,
+    /// Of each node, and 0 behind the last.
+    direction: Vec<f64>,
+    product: Vec<f64>,
+    /// Addends of a sum.
+    addends: Vec<f64>,
+}
+
+/// A pipe that is none between adjacent columns of a layer.
+#[derive(Debug, Clone, Copy)]
+struct Link {
+    ends: [u32; 2],
+    conductance: f64,
+}
+
+impl Gradients {
+    /// With room for so many nodes.
+    pub fn with_room(room: usize) -> Self {
+        let numbers = || Vec::with_capacity(room + 1);
+        Self {
+            beside: Vec::with_capacity(room),
+            through: Vec::with_capacity(room),
+            links: Vec::with_capacity(room),
+            linked: Vec::with_capacity(room),
+            held: numbers(),
+            diagonal: numbers(),
+            over: numbers(),
+            residual: numbers(),
+            direction: numbers(),
+            product: numbers(),
+            addends: numbers(),
+        }
+    }
+
+    /// Takes over which nodes are joined, by which pipes.
+    pub fn set(&mut self, nodes: &[Node], edges: &[Edge]) {
+        let count = nodes.len();
+        let node = |end: u32| end.min(count as u32);
+        self.beside.clear();
+        self.through.clear();
+        for node_edges in nodes.iter().map(|node| node.edges) {
+            let mut beside = [count as u32; 4];
+            let mut through = [0.0; 4];
+            for (side, edge) in node_edges.into_iter().enumerate().filter(|(_, edge)| *edge != NONE) {
+                let edge = &edges[edge as usize];
+                // To the east and to the south it is the first end.
+                beside[side] = node(edge.ends[1 - side % 2]);
+                through[side] = edge.conductance;
+            }
+            self.beside.push(beside);
+            self.through.push(through);
+        }
+        let links = edges.iter().filter(|edge| matches!(edge.at, At::Link(_)));
+        self.links.clear();
+        self.links
+            .extend(links.map(|edge| Link { ends: edge.ends.map(node), conductance: edge.conductance }));
+        self.linked.clear();
+        self.linked.resize(if self.links.is_empty() { 0 } else { count + 1 }, 0);
+    }
+
+    /// Finds the heads over the surface of the nodes in the system, from those that they have. When it is stopped they are of no use.
+    pub fn solve(&mut self, nodes: &mut [Node], stop: &Stop) {
+        self.begin(nodes);
+        let mut rest = self.by_diagonal();
+        for _ in 0..ITERATIONS {
+            if self.is_done() || stop.is_asked() {
+                break;
+            }
+            self.apply();
+            let along = self.along();
+            if along <= 0.0 || rest <= 0.0 {
+                break;
+            }
+            self.go(rest / along);
+            let next = self.by_diagonal();
+            self.turn(next / rest);
+            rest = next;
+        }
+        for (node, over) in nodes.iter_mut().zip(&self.over) {
+            node.over = *over;
+        }
+    }
+
+    /// Begins with the heads that the nodes have.
+    fn begin(&mut self, nodes: &mut [Node]) {
+        let count = nodes.len();
+        let number = |held: bool| if held { 1.0 } else { 0.0 };
+        type Value = fn(&Node) -> f64;
+        let lists: [(&mut Vec<f64>, Value); 4] = [
+            (&mut self.diagonal, |node| node.diagonal),
+            (&mut self.over, |node| node.over),
+            (&mut self.residual, |node| node.right),
+            (&mut self.direction, |node| if node.is_held { node.over } else { 0.0 }),
+        ];
+        for (list, number) in lists {
+            list.clear();
+            list.extend(nodes.iter().map(number));
+        }
+        self.direction.push(0.0);
+        self.held.clear();
+        self.held.resize(count, 1.0);
+        self.product.resize(count, 0.0);
+        self.apply();
+        for (at, node) in nodes.iter_mut().enumerate() {
+            node.is_held &= node.diagonal > 0.0;
+            let residual = if node.is_held { node.right - self.product[at] } else { 0.0 };
+            self.residual[at] = residual;
+            self.direction[at] = if node.is_held { residual / node.diagonal } else { 0.0 };
+            self.held[at] = number(node.is_held);
+        }
+    }
+
+    /// Whether all heads are near enough.
+    fn is_done(&self) -> bool {
+        // Links are not summed any closer.
+        const LEAST: f64 = 4.0 / LINK_SCALE;
+        let is_near = |(residual, diagonal): (&f64, &f64)| residual.abs() <= (RESIDUAL * diagonal).max(LEAST);
+        self.residual.iter().zip(&self.diagonal).all(is_near)
+    }
+
+    /// Applies the system to directions.
+    fn apply(&mut self) {
+        if !self.links.is_empty() {
+            self.linked.fill(0);
+            for link in &self.links {
+                let [from, to] = link.ends.map(|end| end as usize);
+                let flow = scaled(link.conductance * (self.direction[from] - self.direction[to]));
+                self.linked[from] += flow;
+                self.linked[to] -= flow;
+            }
+        }
+        let Self { beside, through, direction, diagonal, held, product, .. } = self;
+        let nodes = beside.iter().zip(through).zip(&direction[..]).zip(diagonal).zip(held).zip(product);
+        for (((((beside, through), own), diagonal), held), product) in nodes {
+            let [east, west, south, north] = beside.map(|node| direction[node as usize]);
+            let east_west = through[0] * (own - east) - through[1] * (west - own);
+            let south_north = through[2] * (own - south) - through[3] * (north - own);
+            let all = (east_west + south_north) + GIVE * *diagonal * own;
+            *product = if *held > 0.0 { all } else { 0.0 };
+        }
+        if !self.linked.is_empty() {
+            self.apply_links();
+        }
+    }
+
+    /// As [`Gradients::apply`], at nodes with links, in the same order.
+    fn apply_links(&mut self) {
+        for at in (0..self.product.len()).filter(|&at| self.linked[at] != 0 && self.held[at] > 0.0) {
+            let (beside, through, own) = (self.beside[at], self.through[at], self.direction[at]);
+            let [east, west, south, north] = beside.map(|node| self.direction[node as usize]);
+            let east_west = through[0] * (own - east) - through[1] * (west - own);
+            let south_north = through[2] * (own - south) - through[3] * (north - own);
+            let out = (east_west + south_north) + self.linked[at] as f64 / LINK_SCALE;
+            self.product[at] = out + GIVE * self.diagonal[at] * own;
+        }
+    }
+
+    /// Moves along the directions.
+    fn go(&mut self, step: f64) {
+        let Self { over, residual, direction, product, held, .. } = self;
+        let nodes = over.iter_mut().zip(residual).zip(&direction[..]).zip(product).zip(held);
+        for ((((over, residual), direction), product), held) in nodes {
+            let is_held = *held > 0.0;
+            *over = if is_held { *over + step * direction } else { *over };
+            *residual = if is_held { *residual - step * *product } else { *residual };
+        }
+    }
+
+    /// Turns the directions.
+    fn turn(&mut self, part: f64) {
+        let Self { residual, direction, diagonal, held, .. } = self;
+        for (((direction, residual), diagonal), held) in
+            direction.iter_mut().zip(residual).zip(diagonal).zip(held)
+        {
+            *direction = if *held > 0.0 { *residual / *diagonal + part * *direction } else { *direction };
+        }
+    }
+
+    fn along(&mut self) -> f64 {
+        let Self { addends, direction, product, .. } = self;
+        addends.clear();
+        addends.extend(direction.iter().zip(product).map(|(direction, product)| direction * *product));
+        fixed_sum(addends)
+    }
+
+    fn by_diagonal(&mut self) -> f64 {
+        let Self { addends, residual, diagonal, held, .. } = self;
+        let nodes = residual.iter().zip(&*diagonal).zip(&*held);
+        let part = |((residual, diagonal), held): ((&f64, &f64), &f64)| {
+            if *held > 0.0 { residual * residual / diagonal } else { 0.0 }
+        };
+        addends.clear();
+        addends.extend(nodes.map(part));
+        fixed_sum(addends)
+    }
+}
+
+/// A sum that does not depend on its order: addends are cut to 2^-40 of the power of two below the greatest.
+fn fixed_sum(numbers: &[f64]) -> f64 {
+    let (chunks, rest) = numbers.as_chunks::<LANES>();
+    let mut most = [0.0; LANES];
+    let larger = |most: f64, number: f64| if number.abs() > most { number.abs() } else { most };
+    for chunk in chunks {
+        for lane in 0..LANES {
+            most[lane] = larger(most[lane], chunk[lane]);
+        }
+    }
+    let greatest = rest.iter().chain(&most).fold(0.0, |most, number| larger(most, *number));
+    if greatest == 0.0 || !greatest.is_finite() {
+        return greatest;
+    }
+    let exponent = (greatest.to_bits() >> 52) as i64 - 1023;
+    let power = |exponent: i64| f64::from_bits(((1023 + exponent.clamp(-1022, 1023)) as u64) << 52);
+    let scale = power(40 - exponent);
+    numbers.iter().map(|number| (number * scale) as i64).sum::<i64>() as f64 / scale
+}

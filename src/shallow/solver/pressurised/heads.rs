@@ -1,0 +1,155 @@
+//! The heads of full columns: the system that they follow from, which [`super::gradients`] solves.
+
+use super::network::{At, Edge, Network};
+use crate::shallow::columns::{Columns, NONE};
+use crate::shallow::solver::stop::Stop;
+
+/// What is missing of a full column, and comes in a step.
+const REFILL: f64 = 0.5;
+/// Heads closer than this (units) are equal, as surfaces are that do not differ by a unit: liquid at rest stays at rest.
+pub(in crate::shallow::solver) const EQUAL: f64 = 0.5;
+/// What a head over the surface takes up, as part of the conductance: so little that a closed cavity has a solution.
+pub(in crate::shallow::solver) const GIVE: f64 = 1e-12;
+/// Rounds in which columns below their surface leave the system.
+const RELEASES: usize = 3;
+/// Parts of a unit in which flows through links are summed.
+pub(in crate::shallow::solver) const LINK_SCALE: f64 = 65536.0;
+
+/// A full column in the system of heads.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::shallow::solver) struct Node {
+    /// Its pipes to the east, west, south and north, or [`NONE`].
+    pub edges: [u32; 4],
+    /// Whether it is in the system: else it has left it.
+    pub is_held: bool,
+    /// Head over its surface (units).
+    pub over: f64,
+    /// What is to come in, less what would without heads; and the diagonal of the system.
+    pub right: f64,
+    pub diagonal: f64,
+    /// Sum over links, in 1/65536 unit.
+    pub linked: i64,
+}
+
+impl Node {
+    /// A node with the head over its surface of the last step.
+    pub fn new(over: f64) -> Self {
+        Self { edges: [NONE; 4], is_held: true, over, right: 0.0, diagonal: 0.0, linked: 0 }
+    }
+}
+
+impl Network {
+    /// Finds the heads of full columns with which as much flows out of each as flows in.
+    pub(in crate::shallow::solver) fn find_heads(&mut self, columns: &Columns, stop: &Stop) {
+        self.gradients.set(&self.nodes, &self.edges);
+        for _ in 0..=RELEASES {
+            self.set_up(columns);
+            self.gradients.solve(&mut self.nodes, stop);
+            let mut released = false;
+            for node in self.nodes.iter_mut().filter(|node| node.is_held && node.over < 0.0) {
+                (node.is_held, node.over) = (false, 0.0);
+                released = true;
+            }
+            if !released {
+                break;
+            }
+        }
+        for (node, party) in self.nodes.iter().zip(&self.parties) {
+            self.over[party.column as usize] = node.over as f32;
+        }
+    }
+
+    /// The surface at an end of a pipe (units).
+    pub(in crate::shallow::solver) fn surface(&self, columns: &Columns, edge: &Edge, end: usize) -> f64 {
+        match edge.ends[end] {
+            NONE => edge.outside,
+            party => {
+                let party = &self.parties[party as usize];
+                (i64::from(columns.bases()[party.column as usize]) + party.has) as f64
+            }
+        }
+    }
+
+    /// The right side of the system: what is to come in, less what would without heads over the surface; and its diagonal.
+    fn set_up(&mut self, columns: &Columns) {
+        for at in 0..self.edges.len() {
+            let edge = self.edges[at];
+            let fall = self.surface(columns, &edge, 0) - self.surface(columns, &edge, 1);
+            self.edges[at].flux = edge.kept + edge.conductance * fall;
+        }
+        self.sum_links(|edge| edge.flux);
+        for node in 0..self.nodes.len() {
+            let out = self.out(node, |edge| edge.flux);
+            let missing = REFILL * self.parties[node].room as f64;
+            self.nodes[node].right = -missing - out;
+        }
+        // The same sums of conductances: all count as out.
+        let links = self.edges.iter().filter(|edge| matches!(edge.at, At::Link(_)));
+        self.nodes.iter_mut().for_each(|node| node.linked = 0);
+        for edge in links {
+            for end in edge.ends {
+                if let Some(node) = self.nodes.get_mut(end as usize) {
+                    node.linked += scaled(edge.conductance);
+                }
+            }
+        }
+        for node in &mut self.nodes {
+            let conductance =
+                |edge: u32| if edge == NONE { 0.0 } else { self.edges[edge as usize].conductance };
+            let [east, west, south, north] = node.edges.map(conductance);
+            node.diagonal =
+                ((east + west) + (south + north) + node.linked as f64 / LINK_SCALE) * (1.0 + GIVE);
+        }
+    }
+
+    /// Adds what flows through links to their nodes.
+    fn sum_links(&mut self, flow: impl Fn(&Edge) -> f64) {
+        self.nodes.iter_mut().for_each(|node| node.linked = 0);
+        for edge in self.edges.iter().filter(|edge| matches!(edge.at, At::Link(_))) {
+            let flow = scaled(flow(edge));
+            for (end, flow) in edge.ends.into_iter().zip([flow, -flow]) {
+                if let Some(node) = self.nodes.get_mut(end as usize) {
+                    node.linked += flow;
+                }
+            }
+        }
+    }
+
+    /// What flows out of a node, with its links as they were summed.
+    fn out(&self, node: usize, flow: impl Fn(&Edge) -> f64) -> f64 {
+        let node = &self.nodes[node];
+        let through = |edge: u32| if edge == NONE { 0.0 } else { flow(&self.edges[edge as usize]) };
+        let [east, west, south, north] = node.edges.map(through);
+        (east - west) + (south - north) + node.linked as f64 / LINK_SCALE
+    }
+}
+
+/// A number of a link for a sum of such, whatever is asked for: their sums stay within 64 bits.
+pub(in crate::shallow::solver) fn scaled(number: f64) -> i64 {
+    (number * LINK_SCALE).clamp(-1e16, 1e16) as i64
+}
+
+/// The height of a pipe's section (units): the depth of the column that gave last, within the opening between both.
+pub(in crate::shallow::solver) fn section(
+    columns: &Columns,
+    depth: &[i32],
+    i: usize,
+    j: Option<usize>,
+    flux: f32,
+) -> f64 {
+    let (base, ceiling) = (columns.bases(), columns.ceilings());
+    let Some(j) = j else { return f64::from(depth[i]) };
+    let opening = ceiling[i].min(ceiling[j]) - base[i].max(base[j]);
+    let eta = |k: usize| base[k] + depth[k];
+    let gives = match flux.partial_cmp(&0.0) {
+        Some(std::cmp::Ordering::Greater) => depth[i],
+        Some(std::cmp::Ordering::Less) => depth[j],
+        // From both ends the same.
+        _ => match eta(i).cmp(&eta(j)) {
+            std::cmp::Ordering::Greater => depth[i],
+            std::cmp::Ordering::Less => depth[j],
+            std::cmp::Ordering::Equal => depth[i].min(depth[j]),
+        },
+    };
+    f64::from(gives.min(opening))
+}

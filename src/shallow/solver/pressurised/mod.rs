@@ -1,0 +1,5 @@
+//! Columns that are full up to their ceiling: they push with a head instead of a surface.
+
+mod gradients;
+mod heads;
+pub(in crate::shallow::solver) mod network;

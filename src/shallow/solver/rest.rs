@@ -1,0 +1,110 @@
+//! Liquid at rest: where no step changes anything, steps pass over it.
+//!
+//! A pipe *rests* when nothing has flowed through it and nothing will: its flux and what transfers have left are 0, and it is closed, or its giver is
+//! dry, or its surfaces differ by at most [`Step::level`](super::flux::Step), which drives nothing. A strip rests with all its pipes, those that its
+//! neighbours own among them, and sleeps when its neighbours rest, too (`active.rs`). A step would leave it as it is, to the bit: so nothing depends on
+//! what sleeps, and strips of 16 cells along x are as good as any others.
+
+use super::links::{LinkFlow, beyond};
+use super::pressurised::network::full_of;
+use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
+use crate::shallow::pipes::{Links, Pipes};
+
+/// A liquid in which what rests is found.
+#[derive(Clone, Copy)]
+pub struct Still<'a> {
+    /// Columns.
+    pub columns: &'a Columns,
+    /// Pipes between them.
+    pub pipes: &'a Pipes,
+    /// H (units).
+    pub depth: &'a [i32],
+    /// Fluxes and what transfers left, to the east and to the south.
+    pub numbers: [&'a [f32]; 4],
+    /// Flow through links.
+    pub links: &'a LinkFlow,
+    /// Heads over the surface of full columns (units).
+    pub heads: &'a [f32],
+    /// What rests, in the next steps.
+    pub bounds: Bounds,
+}
+
+/// What of a step decides what rests.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// Surfaces that differ by so much at most drive nothing (units); 0: nothing comes to rest.
+    pub level: i32,
+    /// What gravity adds to the fall of the surface over a cell along x and along z (units).
+    pub tilt: [i32; 2],
+    /// Surface of the liquid at rest beyond the border (units), or BOTTOMLESS: there is none.
+    pub still: i32,
+}
+
+impl Still<'_> {
+    /// Whether the columns of a strip rest, with all their pipes but for links.
+    pub fn rests(&self, strip: usize) -> bool {
+        let [east, south, left_east, left_south] = self.numbers.map(|numbers| strip_of(numbers, strip));
+        // What flows mostly does so from the first.
+        if has_any(east) || has_any(south) || has_any(left_east) || has_any(left_south) {
+            return false;
+        }
+        let (first, columns) = (strip * STRIP, self.columns);
+        let numbers =
+            [columns.bases(), columns.ceilings(), self.depth].map(|numbers| strip_of(numbers, strip));
+        // Full columns are a network, which steps look at.
+        if full_of(numbers) != [0; STRIP] || has_any(strip_of(self.heads, strip)) {
+            return false;
+        }
+        let rests_east = |i: usize| self.is_held([i, i + 1], self.pipes.east[i], 0);
+        let rests_south = |i: usize, south: u32| {
+            self.is_held([i, south as usize * STRIP + i % STRIP], self.pipes.south[i], 1)
+        };
+        let is_empty = |i: usize| [0, 2].iter().all(|&east| self.numbers[east][i].to_bits() == 0);
+        let (north, below) = (columns.north(strip), columns.south(strip));
+        let mut own = first..first + STRIP;
+        own.all(|i| rests_east(i) && (below == NONE || rests_south(i, below)))
+            && (columns.west(strip).is_none() || is_empty(first - 1) && rests_east(first - 1))
+            && (north == NONE || self.rests_before(strip, north as usize))
+    }
+
+    /// Whether the pipes to a strip from the one to the north rest.
+    fn rests_before(&self, strip: usize, north: usize) -> bool {
+        let [_, south, _, left_south] = self.numbers.map(|numbers| strip_of(numbers, north));
+        let from = north * STRIP;
+        let is_held = |x: usize| self.is_held([from + x, strip * STRIP + x], self.pipes.south[from + x], 1);
+        !has_any(south) && !has_any(left_south) && (0..STRIP).all(is_held)
+    }
+
+    /// Whether nothing will flow through a pipe without a flux.
+    fn is_held(&self, [i, j]: [usize; 2], open: f32, axis: usize) -> bool {
+        let base = self.columns.bases();
+        let fall = base[i] + self.depth[i] - (base[j] + self.depth[j]) + self.bounds.tilt[axis];
+        open == 0.0 || fall.abs() <= self.bounds.level || self.depth[if fall > 0 { i } else { j }] == 0
+    }
+
+    /// The ends of those of some links that do not rest.
+    pub fn moving_links(&self, links: std::ops::Range<usize>) -> impl Iterator<Item = [u32; 2]> {
+        let Links { from, to, .. } = &self.pipes.links;
+        links.filter(|&link| !self.link_rests(link)).map(|link| [from[link], to[link]])
+    }
+
+    fn link_rests(&self, link: usize) -> bool {
+        let (links, flow, base) = (&self.pipes.links, self.links, self.columns.bases());
+        if has_any(&[flow.flux[link], flow.left[link], flow.transfer[link]]) {
+            return false;
+        }
+        let i = links.from[link] as usize;
+        let (eta, taker, is_still) = match links.to[link] {
+            NONE => beyond(links, self.columns, link, self.bounds.still),
+            j => (base[j as usize] + self.depth[j as usize], self.depth[j as usize], false),
+        };
+        let fall = (base[i] + self.depth[i]).saturating_sub(eta);
+        let giver = if fall > 0 { self.depth[i] } else { taker };
+        links.open[link] == 0.0 || fall.saturating_abs() <= self.bounds.level || giver == 0 && !is_still
+    }
+}
+
+/// Whether a number is not 0; a step would change -0 into 0.
+fn has_any<const N: usize>(numbers: &[f32; N]) -> bool {
+    numbers.iter().fold(0, |any, number| any | number.to_bits()) != 0
+}

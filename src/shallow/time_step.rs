@@ -1,0 +1,179 @@
+//! How long a step may be, and what the pipes share in it (thesis 4.3, Fig. 4.12).
+
+use std::ops::RangeInclusive;
+
+use super::grid::TOP;
+use super::params::{Friction, Pace, Params, Section};
+use super::solver::fast_films::FAST_WAVES;
+use super::solver::flux::{Step, Thinning};
+use super::solver::rest::Bounds;
+
+/// Steps are this much shorter than the bound of stability.
+const SAFETY: f64 = 0.9;
+/// Most steps in a frame: a frame that needs more is refused.
+pub const MOST_STEPS: u32 = 1_000_000;
+/// Lengths of frames, and of the steps of a replay (s). In shorter ones nothing would move, and numbers in single precision would not hold what they
+/// share.
+pub const LENGTHS: RangeInclusive<f64> = 1e-12..=1e6;
+
+/// The domain's measures that steps depend on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measures {
+    /// Edge of a cell (m).
+    pub cell: f64,
+    /// A unit of height (m).
+    pub unit: f64,
+    /// Most pipes of a column.
+    pub pipes: usize,
+    /// Surface of the liquid at rest beyond the border (units), or BOTTOMLESS.
+    pub still: i32,
+}
+
+/// The longest stable step (s) with liquid of a depth (m): the largest dt with P g A' dt^2 / dx^2 <= 1/q + zeta, for P pipes a column, and
+/// 1/q = 1 + 3 dt nu / H^2. With four pipes and nothing lost this is dt = dx / (c sqrt 2). Infinite where nothing bounds it, as on dry ground. `frame` is
+/// what is left of the frame (s).
+pub fn longest(params: &Params, measures: &Measures, depth: f64, frame: f64) -> f64 {
+    let g = -params.gravity[1];
+    let height = if params.section == Section::Wetted { depth } else { measures.cell };
+    let a = measures.pipes as f64 * g * height / (measures.cell * measures.cell);
+    let b = if depth > 0.0 { 3.0 * least_viscosity(params) / (depth * depth) } else { 0.0 };
+    let c = 1.0 + libm::pow(params.kept, frame);
+    if a <= 0.0 || !b.is_finite() {
+        return f64::INFINITY;
+    }
+    SAFETY * (b + (b * b + 4.0 * a * c).sqrt()) / (2.0 * a)
+}
+
+/// The least viscosity (m2/s) that liquid may have.
+fn least_viscosity(params: &Params) -> f64 {
+    let times = params.thickening.map_or(1.0, |law| law.times.min(1.0));
+    params.liquid.least_viscosity() * times
+}
+
+/// The greatest depth (m) in a pipe's section for which steps of `dt` are stable without viscosity.
+fn deepest_section(params: &Params, measures: &Measures, dt: f64) -> f64 {
+    let waves = measures.pipes as f64 * -params.gravity[1] * dt * dt / (measures.cell * measures.cell);
+    SAFETY * SAFETY * (1.0 + libm::pow(params.kept, dt)) / waves
+}
+
+/// Where a frame is when its next step is chosen.
+pub struct Next<'a> {
+    /// Parameters.
+    pub params: &'a Params,
+    /// Measures of the domain.
+    pub measures: &'a Measures,
+    /// What is left of the frame (s).
+    pub left: f64,
+    /// Greatest depth (m).
+    pub deepest: f64,
+    /// Steps made in this frame.
+    pub steps: u32,
+    /// Length of the last step (s).
+    pub last: f64,
+    /// How many times steps are halved, for fast films.
+    pub halvings: u32,
+}
+
+/// A step stays as long as it was while more is stable, up to this much more: each change of its length heats waves.
+const STEADY: f64 = 0.45;
+
+/// The length of the next step (s).
+pub fn next(at: &Next) -> f64 {
+    let halved = f64::from(1 << at.halvings);
+    let longest = match at.params.pace {
+        Pace::Exact => {
+            let longest = longest(at.params, at.measures, at.deepest, at.left) / halved;
+            if (STEADY * longest..=longest).contains(&at.last) { at.last } else { longest }
+        }
+        Pace::Realtime(longest) => longest / halved,
+    };
+    // Rounding of what is left is no reason for another step; where nothing bounds a step it takes all that is left.
+    at.left / (at.left / longest - 1e-9).ceil().max(1.0)
+}
+
+/// How often steps are halved at most, so that a disturbance in fast films stays within a cell. Where it cannot, these are held back.
+pub fn most_halvings(params: &Params) -> u32 {
+    if params.pace == Pace::Exact { 3 } else { 0 }
+}
+
+/// What a pipe of a fast film moves in a step at most, as part of the depth of the column that gives. A disturbance travels at three times the film's
+/// speed, and where this no longer grows with depth, at that speed: within a cell a step everywhere, or it would grow.
+const FASTEST: f32 = 1.0 / 3.0;
+
+/// The mean of phi^2, phi being the profile of a film's velocity over its depth (`flow::walls`).
+const BESIDE: f64 = 1.2;
+
+/// g unit dt^2 / dx^2 of a step (1 / units).
+pub fn drive(params: &Params, measures: &Measures, dt: f64) -> f64 {
+    let Measures { cell, unit, .. } = *measures;
+    dt * dt * -params.gravity[1] * unit / (cell * cell)
+}
+
+/// The time (s) in which a surface that counts as level would bring liquid from rest to [`Params::rest`].
+const LEVEL: f64 = 1.0 / 60.0;
+
+/// The speed (m/s) of what comes to rest. Beside walls nothing does: what flows drags along what is beside it.
+fn rest(params: &Params) -> f64 {
+    if params.friction == Friction::Walls { 0.0 } else { params.rest }
+}
+
+/// By how much surfaces of adjacent cells may differ where liquid comes to rest (units): a unit at least, unless it never does.
+fn level(params: &Params, measures: &Measures) -> i32 {
+    let fall = rest(params) * measures.cell / (LEVEL * -params.gravity[1]);
+    if rest(params) > 0.0 { (fall / measures.unit).round().clamp(1.0, 1e6) as i32 } else { 0 }
+}
+
+/// Flux over the depth in its section, in a step of `dt` (s), that is slow: a level surface does not bring liquid at rest over it, in steps of any length.
+fn slow(params: &Params, measures: &Measures, dt: f64) -> f64 {
+    let driven = 1.001 * drive(params, measures, dt) * f64::from(level(params, measures));
+    (rest(params) * dt / measures.cell).max(driven)
+}
+
+/// What gravity adds to the fall of the surface over a cell along x and along z (units).
+fn tilt(params: &Params, measures: &Measures) -> [i32; 2] {
+    let [x, y, z] = params.gravity;
+    [x, z].map(|along| (along / -y * measures.cell / measures.unit).round().clamp(-1e9, 1e9) as i32)
+}
+
+/// What rests in all steps.
+pub fn bounds(params: &Params, measures: &Measures) -> Bounds {
+    Bounds { level: level(params, measures), tilt: tilt(params, measures), still: measures.still }
+}
+
+/// What the pipes share in a step of `dt` after one of `last` (s).
+pub fn step(params: &Params, measures: &Measures, dt: f64, last: f64) -> Step {
+    let Measures { cell, unit, .. } = *measures;
+    let y = params.gravity[1];
+    let section = match (params.section, params.pace) {
+        (Section::Whole, _) => cell / unit,
+        (Section::Wetted, Pace::Exact) => f64::from(TOP),
+        (Section::Wetted, Pace::Realtime(_)) => deepest_section(params, measures, dt) / unit,
+    };
+    Step {
+        kept: (libm::pow(params.kept, dt) * dt / last) as f32,
+        drive: drive(params, measures, dt) as f32,
+        drag: (3.0 * dt * params.liquid.viscosity / (unit * unit)).min(1e36) as f32,
+        section: section as f32,
+        lighter: (f64::from(FAST_WAVES) / drive(params, measures, dt)).min(1e36) as f32,
+        fastest: FASTEST,
+        is_whole: params.section == Section::Whole,
+        thinning: params.liquid.thinning.map(|law| Thinning {
+            shear: (3.0 * law.time * cell / (last * unit)).min(1e30) as f32,
+            thinnest: (law.thinnest / params.liquid.viscosity) as f32,
+            power: ((law.power - 1.0) / 2.0) as f32,
+        }),
+        still: measures.still,
+        wave: (dt / cell * (-y * unit).sqrt()) as f32,
+        tilt: tilt(params, measures),
+        lateral: match (params.friction, params.section) {
+            (Friction::Walls, Section::Wetted) => {
+                (BESIDE * dt * params.liquid.viscosity / (cell * cell)).min(1e12) as f32
+            }
+            _ => 0.0,
+        },
+        again: (dt / last) as f32,
+        cell: (cell / unit) as f32,
+        level: level(params, measures),
+        slow: slow(params, measures, dt) as f32,
+    }
+}

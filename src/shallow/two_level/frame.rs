@@ -1,0 +1,89 @@
+//! Frames of a liquid in cells of two sizes, in steps that both take.
+
+use std::sync::atomic::AtomicBool;
+
+use super::Detail;
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::numeric::cpu::FlushDenormals;
+use crate::shallow::Shallow;
+use crate::shallow::frame::{check_length, too_many_steps};
+use crate::shallow::solver::bands::attended;
+use crate::shallow::solver::stop::Stop;
+use crate::shallow::system::Report;
+use crate::shallow::time_step;
+use crate::shallow::time_step::MOST_STEPS;
+
+impl Detail {
+    /// One frame of `dt` (s).
+    ///
+    /// # Errors
+    /// As [`Shallow::step`].
+    pub fn step(&mut self, ctx: &Context, dt: f64) -> Result<Report> {
+        check_length(dt)?;
+        let running = ctx.begin_light();
+        if ctx.is_cancelled() {
+            return Err(Error::Cancelled);
+        }
+        let cancel = running.latch();
+        let threads = ctx.pool().threads();
+        let divided =
+            [&mut self.fine, &mut self.coarse].map(|liquid| liquid.flow.divide(&liquid.columns, threads));
+        if divided.contains(&true) {
+            ctx.pool().install(|| attended(threads, || self.whole(dt, cancel)))
+        } else {
+            let _flush = FlushDenormals::begin();
+            self.whole(dt, cancel)
+        }
+    }
+
+    /// All of a frame, or nothing of it.
+    fn whole(&mut self, dt: f64, cancel: &AtomicBool) -> Result<Report> {
+        // Both, as the steps are those of the one with the shorter ones.
+        let may_take_long = [&mut self.fine, &mut self.coarse].map(|liquid| liquid.may_take_long(dt, None));
+        if !may_take_long.contains(&true) {
+            return self.steps(dt, &Stop::NEVER);
+        }
+        let mut kept = std::mem::take(&mut self.kept);
+        self.keep(&mut kept);
+        let result = self.steps(dt, &Stop::when(cancel));
+        if result.is_err() {
+            self.put_back(&kept);
+        }
+        self.kept = kept;
+        result
+    }
+
+    fn steps(&mut self, dt: f64, stop: &Stop) -> Result<Report> {
+        let Self { fine, coarse, seam, rest, .. } = self;
+        let measures = [fine.measures(), coarse.measures()];
+        let mut report = Report::default();
+        let halvings = [&mut *fine, &mut *coarse]
+            .into_iter()
+            .zip(&measures)
+            .map(|(liquid, measures)| liquid.begin(dt, measures, |pace| Some(time_step::next(pace))))
+            .fold(0, u32::max);
+        while report.seconds < dt {
+            let left = dt - report.seconds;
+            let steps = report.steps;
+            let next = |liquid: &Shallow, at: usize| {
+                time_step::next(&liquid.next(&measures[at], left, steps, halvings))
+            };
+            let length = next(fine, 0).min(next(coarse, 1));
+            if steps == 0 && left / length > f64::from(MOST_STEPS) || steps >= MOST_STEPS {
+                return Err(too_many_steps(dt, report.seconds, length));
+            }
+            seam.begin_step(fine, coarse, &measures[0], length);
+            fine.advance(&measures[0], length, &mut report, stop);
+            coarse.advance(&measures[1], length, &mut report, stop);
+            if stop.is_asked() {
+                return Err(Error::Cancelled);
+            }
+            seam.end_step(fine, coarse, rest);
+            report.steps = steps + 1;
+            report.seconds = if length >= left { dt } else { report.seconds + length };
+        }
+        report.deepest = measures[0].unit * f64::from(fine.flow.deepest().max(coarse.flow.deepest()));
+        Ok(report)
+    }
+}

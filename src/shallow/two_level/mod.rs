@@ -1,0 +1,361 @@
+//! Level of detail: cells of the terrain's size near what matters, and of twice the size everywhere else.
+//!
+//! Two liquids over one lattice of heights: a *fine* one whose ground is there in a box of cells only, the *near* part, and a *coarse* one whose ground is
+//! there in all others (`ground.rs`). What is not theirs is without columns, and a wall. Along the edge of the box pipes of their own join them (`seam.rs`). A coarse unit is four
+//! fine ones, so volumes are counted in fine units; what makes no coarse unit waits, with the scalars that it carries, and is part of the balance (`rests.rs`). When the box moves, four
+//! fine columns become a coarse one, and back (`shift.rs`), and what flows goes on (`momentum.rs`). Nothing is lost. `surface/` writes one mesh of both.
+
+mod frame;
+mod ground;
+mod momentum;
+pub(in crate::shallow) mod rests;
+mod scalars;
+mod seam;
+mod shift;
+pub mod surface;
+
+use std::ops::Range;
+
+use super::Shallow;
+use super::grid::Grid;
+use super::params::Params;
+use super::remap::Moved;
+use super::sources::FlowPoint;
+use super::system::{Balance, Units};
+use super::terrain::Solids;
+use super::terrain::shapes::Shape;
+use crate::context::Context;
+use crate::error::{Error, Result};
+use ground::Ground;
+use momentum::Momentum;
+use rests::Rests;
+use seam::Seam;
+use shift::Shift;
+
+/// A box of cells: ranges of x and of z.
+pub type Cells = [Range<usize>; 2];
+
+/// By how much a side of a box may be off one of cells that it is taken to be (coarse cells).
+const ROUNDING: f64 = 1e-6;
+/// Fine units in a coarse one.
+const FINE: i64 = 4;
+
+/// Liquid that flows over a terrain, in fine cells near and in coarse ones far away.
+pub struct Detail {
+    pub(super) fine: Shallow,
+    pub(super) coarse: Shallow,
+    ground: Ground,
+    pub(super) seam: Seam,
+    shift: Shift,
+    momentum: Momentum,
+    /// The near cells.
+    pub(super) near: Cells,
+    /// What of each coarse cell is no coarse unit.
+    pub(super) rest: Rests,
+    points: Vec<FlowPoint>,
+    /// The state at the beginning of a frame that may take long.
+    kept: Vec<u8>,
+}
+
+impl Detail {
+    /// Dry ground; the cells of `near` are fine. All others are of twice the size: their ground is the mean of that of four, layer by layer.
+    ///
+    /// # Errors
+    /// As [`Shallow::new`]; `Argument` also where the domain has an odd count of cells along an axis, as [`Detail::set_near`], and for falls and thickening.
+    pub fn new(ctx: &Context, solids: &Solids, params: Params, near: Cells) -> Result<Self> {
+        params.validate()?;
+        solids.grid.validate()?;
+        let [nx, nz] = solids.grid.size;
+        if nx % 2 + nz % 2 > 0 {
+            return Err(Error::argument(format!("{nx} x {nz} cells are not an even count along both axes")));
+        }
+        check_near(&near, solids.grid.size)?;
+        if params.falls.is_some() {
+            return Err(Error::argument("liquid with a level of detail does not fall freely"));
+        }
+        check_carried(&params)?;
+        if solids.layers() == 0 {
+            return Err(Error::argument("the terrain has no surface that faces up within the domain"));
+        }
+        let ground = Ground::new(solids);
+        let [beyond, within] = Ground::apart(&near).map(Some);
+        let fine = Shallow::beside(ctx, &ground.fine_solids(&near), params.clone(), beyond)?;
+        let coarse = Shallow::beside(ctx, &ground.coarse_solids(&near), params, within)?;
+        let mut detail = Self {
+            rest: Rests::new(coarse.columns.grid.cells()),
+            fine,
+            coarse,
+            ground,
+            seam: Seam::default(),
+            shift: Shift::default(),
+            momentum: Momentum::default(),
+            near,
+            points: Vec::new(),
+            kept: Vec::new(),
+        };
+        detail.seam.find(&detail.fine, &detail.coarse, &detail.near);
+        Ok(detail)
+    }
+
+    /// The liquid of the near cells; in all others it has no columns.
+    pub fn fine(&self) -> &Shallow {
+        &self.fine
+    }
+
+    /// The liquid of the cells of twice the size; where they are near it has no columns.
+    pub fn coarse(&self) -> &Shallow {
+        &self.coarse
+    }
+
+    /// The near cells.
+    pub fn near(&self) -> &Cells {
+        &self.near
+    }
+
+    /// Moves the near cells. Liquid keeps its volume; its surface stays level where it was.
+    ///
+    /// # Errors
+    /// `Argument`: a box that is not within the domain, or whose sides are not at even cells.
+    pub fn set_near(&mut self, near: Cells) -> Result<()> {
+        check_near(&near, self.fine.columns.grid.size)?;
+        if near == self.near {
+            return Ok(());
+        }
+        let mut momentum = std::mem::take(&mut self.momentum);
+        momentum.begin(self, &self.near, shift::changed(&self.near, &near));
+        let old = std::mem::replace(&mut self.near, near);
+        [self.fine.apart, self.coarse.apart] = Ground::apart(&self.near).map(Some);
+        self.convert(&old)?;
+        self.seam.find(&self.fine, &self.coarse, &self.near);
+        momentum.end(self);
+        self.momentum = momentum;
+        self.route();
+        Ok(())
+    }
+
+    /// Changes the terrain everywhere.
+    ///
+    /// # Errors
+    /// As [`Shallow::update_terrain`].
+    pub fn update_terrain(&mut self, solids: &Solids) -> Result<Moved> {
+        if (solids.grid, solids.heights) != (self.fine.columns.grid, self.fine.columns.heights) {
+            return Err(Error::argument("the terrain's cells or heights are not those of the liquid"));
+        }
+        if solids.layers() == 0 {
+            return Err(Error::argument("the terrain has no surface that faces up within the domain"));
+        }
+        self.ground = Ground::new(solids);
+        let Self { ground, near, fine, coarse, .. } = &mut *self;
+        // One of them may have no ground.
+        let all = |liquid: &Shallow| liquid.columns.grid.size.map(|count| 0..count);
+        let moved = [
+            fine.update_cells(all(fine), |cell| ground.fine_cell(near, ground.fine.grid.place(cell)))?,
+            coarse
+                .update_cells(all(coarse), |cell| ground.coarse_cell(near, ground.coarse.grid.place(cell)))?,
+        ];
+        Ok(self.after(moved))
+    }
+
+    /// Sets the solid shapes that move over the terrain.
+    ///
+    /// # Errors
+    /// As [`Shallow::set_bodies`].
+    pub fn set_bodies(&mut self, bodies: &[Shape]) -> Result<Moved> {
+        let moved = [self.fine.set_bodies(bodies)?, self.coarse.set_bodies(bodies)?];
+        Ok(self.after(moved))
+    }
+
+    /// Joins cells of both sizes again after the ground has moved; returns what that did in all.
+    fn after(&mut self, [fine, coarse]: [Moved; 2]) -> Moved {
+        if fine.cells + coarse.cells > 0 {
+            self.seam.find(&self.fine, &self.coarse, &self.near);
+            self.route();
+        }
+        Moved {
+            cells: fine.cells + coarse.cells,
+            displaced: fine.displaced + coarse.displaced,
+            held: fine.held + coarse.held,
+            fallen: fine.fallen + coarse.fallen,
+        }
+    }
+
+    /// The solid shapes that move over the terrain.
+    pub fn bodies(&self) -> &[Shape] {
+        self.fine.bodies()
+    }
+
+    /// Changes the parameters.
+    ///
+    /// # Errors
+    /// As [`Shallow::set_params`]; also for thickening.
+    pub fn set_params(&mut self, params: Params) -> Result<()> {
+        check_carried(&params)?;
+        self.fine.set_params(params.clone())?;
+        self.coarse.set_params(params)
+    }
+
+    /// Sets sources, drains and absorbers; `which` names one in an error. Each acts on the cells of the size that its centre lies in.
+    ///
+    /// # Errors
+    /// As [`Shallow::set_flows`].
+    pub fn set_flows(&mut self, points: &[FlowPoint], which: impl Fn(usize) -> String) -> Result<()> {
+        for (at, point) in points.iter().enumerate() {
+            let owner = if self.is_near(point) { &self.fine } else { &self.coarse };
+            let mut found = Vec::new();
+            point.validate().map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
+            point.find_columns(&owner.columns, &mut found);
+            if found.is_empty() {
+                let [x, y, z] = point.at;
+                return Err(Error::argument(format!(
+                    "{}: at ({x}, {y}, {z}) there is only solid, or it lies outside of the domain",
+                    which(at)
+                )));
+            }
+        }
+        self.fine.set_flows_resting(points, &which)?;
+        self.coarse.set_flows_resting(points, &which)?;
+        self.points = points.to_vec();
+        self.route();
+        Ok(())
+    }
+
+    /// Gives a flow point another rate (m3/s).
+    ///
+    /// # Errors
+    /// As [`Shallow::set_rate`].
+    pub fn set_rate(&mut self, point: usize, rate: f64) -> Result<()> {
+        self.fine.set_rate(point, rate)?;
+        self.coarse.set_rate(point, rate)?;
+        self.points[point].rate = rate;
+        Ok(())
+    }
+
+    /// Pours a volume (m3; negative: takes it) as [`Shallow::pour_at`], into the cells of the size that the place lies in; returns what came in (m3).
+    ///
+    /// # Errors
+    /// As [`Shallow::pour_at`].
+    pub fn pour_at(&mut self, at: [f64; 3], radius: f64, volume: f64) -> Result<f64> {
+        let is_near = self.holds(at);
+        if is_near { &mut self.fine } else { &mut self.coarse }.pour_at(at, radius, volume)
+    }
+
+    /// Fills all columns up to a height (m), as [`Shallow::fill`].
+    pub fn fill(&mut self, height: f64) {
+        self.fine.fill(height);
+        self.coarse.fill(height);
+    }
+
+    /// What a flow point has moved since it was set (m3), in or out.
+    pub fn moved(&self, point: usize) -> f64 {
+        self.fine.moved(point) + self.coarse.moved(point)
+    }
+
+    /// Moves a flow point, as [`Shallow::move_flow`].
+    pub fn move_flow(&mut self, point: usize, at: [f64; 3]) {
+        self.points[point].at = at;
+        self.fine.move_flow(point, at);
+        self.coarse.move_flow(point, at);
+        self.route();
+    }
+
+    fn is_near(&self, point: &FlowPoint) -> bool {
+        self.holds(point.at)
+    }
+
+    /// Whether a place lies over near cells.
+    fn holds(&self, [x, _, z]: [f64; 3]) -> bool {
+        let grid = self.fine.columns.grid;
+        let within = |axis: usize, at: f64| {
+            let at = (at - grid.origin[axis]) / grid.cell;
+            self.near[axis].start as f64 <= at && at < self.near[axis].end as f64
+        };
+        within(0, x) && within(1, z)
+    }
+
+    /// Lets each flow point act on the cells of one size, and takes what it waits for and has moved along.
+    fn route(&mut self) {
+        for at in 0..self.points.len() {
+            let is_near = self.is_near(&self.points[at]);
+            let place = self.points[at].at;
+            let [own, other] =
+                if is_near { [&mut self.fine, &mut self.coarse] } else { [&mut self.coarse, &mut self.fine] };
+            own.flows.move_to(&own.columns, at, place);
+            let (waiting, moved) = other.flows.rest(at);
+            let (own_waiting, own_moved) = own.flows.waiting_and_moved(at);
+            // In units of its own.
+            let (waiting, moved) = match is_near {
+                true => (waiting * FINE as f64, moved * FINE),
+                false => (waiting / FINE as f64, moved / FINE),
+            };
+            own.flows.set_progress(at, own_waiting + waiting, own_moved + moved);
+        }
+    }
+
+    /// Simulated time (s).
+    pub fn time(&self) -> f64 {
+        self.fine.time()
+    }
+
+    /// Where all liquid is; what is no whole coarse unit counts as held.
+    pub fn balance(&self) -> Balance {
+        let [fine, coarse] = [self.fine.units(), self.coarse.units()];
+        let sum = |of: fn(&Units) -> i64| of(&fine) + FINE * of(&coarse);
+        let Grid { cell, .. } = self.fine.columns.grid;
+        let units = Units {
+            inside: sum(|units| units.inside),
+            poured: sum(|units| units.poured),
+            sourced: sum(|units| units.sourced),
+            drained: sum(|units| units.drained),
+            absorbed: sum(|units| units.absorbed),
+            lost: sum(|units| units.lost),
+            gained: sum(|units| units.gained),
+            held: sum(|units| units.held) + self.rest.units(),
+            falling: 0,
+        };
+        units.balance(cell * cell * self.fine.columns.heights.unit)
+    }
+}
+
+fn check_carried(params: &Params) -> Result<()> {
+    match params.thickening {
+        Some(_) => Err(Error::argument("liquid with a level of detail has no scalar that thickens it")),
+        None => Ok(()),
+    }
+}
+
+/// The smallest box of near cells with all that lies between two corners (m), as far as there are cells: least x and z, then greatest.
+///
+/// # Errors
+/// `Argument`: corners that have no inside, or lie outside of the domain.
+pub fn cells_around(grid: &Grid, bounds: [f64; 4]) -> Result<Cells> {
+    let [x0, z0, x1, z1] = bounds;
+    // Also where one is NaN.
+    if !(x0 < x1 && z0 < z1) {
+        return Err(Error::argument(format!("bounds = {bounds:?} m have no inside")));
+    }
+    let range = |axis: usize, low: f64, high: f64| {
+        let [low, high] = [low, high].map(|at| 0.5 * (at - grid.origin[axis]) / grid.cell);
+        let count = (grid.size[axis] / 2) as f64;
+        // What is off by rounding only adds no cells.
+        let [low, high] = [(low + ROUNDING).floor(), (high - ROUNDING).ceil()];
+        2 * low.clamp(0.0, count) as usize..2 * high.clamp(0.0, count) as usize
+    };
+    let cells = [range(0, x0, x1), range(1, z0, z1)];
+    if cells.iter().any(Range::is_empty) {
+        return Err(Error::argument(format!("bounds = {bounds:?} m lie outside of the domain")));
+    }
+    Ok(cells)
+}
+
+pub(super) fn check_near(near: &Cells, [nx, nz]: [usize; 2]) -> Result<()> {
+    let [x, z] = near;
+    if x.start >= x.end || z.start >= z.end || x.end > nx || z.end > nz {
+        return Err(Error::argument(format!(
+            "near cells {x:?} x {z:?} are not a box within {nx} x {nz} cells"
+        )));
+    }
+    if [x.start, x.end, z.start, z.end].iter().any(|side| side % 2 > 0) {
+        return Err(Error::argument(format!("near cells {x:?} x {z:?} do not begin and end at even ones")));
+    }
+    Ok(())
+}

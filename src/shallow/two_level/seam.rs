@@ -1,0 +1,394 @@
+//! The pipes between fine and coarse columns, along the edge of the near cells.
+//!
+//! Each leads from a fine cell over its side to the coarse one beyond: Eq. 4.1 and 4.5 over the distance of their middles, 1.5 cells, through the section of
+//! the fine cell. The coarse surface is taken beside the fine cell's middle, a quarter of a coarse cell aside, where the coarse columns along the edge
+//! say how it leans: or a film that runs along the edge would swing across it.
+
+use super::rests::{Load, Rests, change, of_column};
+use super::{Cells, FINE};
+use crate::numeric::cpu::dispatch;
+use crate::shallow::Shallow;
+use crate::shallow::columns::{Columns, NONE};
+use crate::shallow::grid::TOP;
+use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::shares::level;
+use crate::shallow::solver::fast_films;
+use crate::shallow::solver::flux::{Kind, Of, Step, flux_of, split};
+use crate::shallow::time_step;
+use crate::shallow::time_step::Measures;
+
+/// Fine cells between the middles of a fine and a coarse cell.
+const APART: f32 = 1.5;
+/// Scaled transfers stay a little below what there is, in 32 bits.
+const MARGIN: f32 = 1.0 - 1.0 / (1 << 20) as f32;
+
+/// A pipe.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Pipe {
+    /// Columns of the fine and of the coarse liquid.
+    ends: [u32; 2],
+    /// Coarse columns before and behind along the edge, or [`NONE`].
+    along: [u32; 2],
+    /// Where the fine cell lies along the edge beside the middle of the coarse one: -1 before, 1 behind.
+    side: i32,
+    /// Which way it leads to the coarse column: along x or z, and -1 or 1.
+    axis: usize,
+    way: i32,
+    open: f32,
+    /// Flux out of the fine column (fine units a step), what rounding left, and the transfer.
+    flux: f32,
+    left: f32,
+    transfer: f32,
+}
+
+/// All pipes along the edge.
+#[derive(Debug, Clone, Default)]
+pub(in crate::shallow) struct Seam {
+    pipes: Vec<Pipe>,
+    /// The pipes before.
+    old: Vec<Pipe>,
+    /// Columns of both liquids that have such pipes, each once, and the place among them of each pipe's ends.
+    columns: [Vec<u32>; 2],
+    places: Vec<[u32; 2]>,
+    /// What each of these gives, and takes (fine units), then by which factor it does so.
+    gives: [Vec<f64>; 2],
+    takes: [Vec<f64>; 2],
+    factors: [Vec<f32>; 2],
+    /// Of each scalar, what each of these takes, less what it gives; empty where nothing is carried.
+    amounts: [Vec<[i64; MOST]>; 2],
+    /// Cell of each coarse one (`Grid::index`).
+    cells: Vec<u32>,
+    /// Whether a column has a ceiling.
+    has_ceilings: bool,
+    /// Whether a pipe is to move something in this step.
+    is_moving: bool,
+    /// Length of the step in whose measure fluxes are (s).
+    last: f64,
+}
+
+impl Seam {
+    /// Finds the pipes again; those between the same columns keep what flows.
+    pub fn find(&mut self, fine: &Shallow, coarse: &Shallow, near: &Cells) {
+        std::mem::swap(&mut self.pipes, &mut self.old);
+        self.pipes.clear();
+        for axis in 0..2 {
+            let sides = [(near[axis].start, -1), (near[axis].end - 1, 1)];
+            for (across, way) in sides {
+                for along in near[1 - axis].clone() {
+                    let cell = if axis == 0 { [across, along] } else { [along, across] };
+                    self.join(fine, coarse, cell, axis, way);
+                }
+            }
+        }
+        let key = |pipe: &Pipe| (pipe.axis, pipe.way, pipe.ends);
+        self.pipes.sort_unstable_by_key(key);
+        let mut old = self.old.iter().peekable();
+        for pipe in &mut self.pipes {
+            while old.next_if(|old| key(old) < key(pipe)).is_some() {}
+            if let Some(same) = old.next_if(|old| key(old) == key(pipe)) {
+                (pipe.flux, pipe.left) = (same.flux, same.left);
+            }
+        }
+        for end in 0..2 {
+            let columns = &mut self.columns[end];
+            columns.clear();
+            columns.extend(self.pipes.iter().map(|pipe| pipe.ends[end]));
+            columns.sort_unstable();
+            columns.dedup();
+            for sums in [&mut self.gives[end], &mut self.takes[end]] {
+                sums.clear();
+                sums.resize(columns.len(), 0.0);
+            }
+            self.factors[end].resize(columns.len(), 1.0);
+        }
+        let cell = |&column: &u32| coarse.columns.grid.index(coarse.columns.cell(column as usize)) as u32;
+        let is_open = |(liquid, columns): (&Shallow, &Vec<u32>)| {
+            columns.iter().all(|&column| liquid.columns.ceilings()[column as usize] == TOP)
+        };
+        self.has_ceilings = ![fine, coarse].into_iter().zip(&self.columns).all(is_open);
+        self.cells.clear();
+        self.cells.extend(self.columns[1].iter().map(cell));
+        let place =
+            |end: usize, column: u32| self.columns[end].partition_point(|&other| other < column) as u32;
+        self.places.clear();
+        let places = self.pipes.iter().map(|pipe| [place(0, pipe.ends[0]), place(1, pipe.ends[1])]);
+        self.places.extend(places);
+        if self.last == 0.0 {
+            self.last = 1.0;
+        }
+    }
+
+    /// Joins the columns of a fine cell to those of the coarse one beyond a side.
+    fn join(&mut self, fine: &Shallow, coarse: &Shallow, cell: [usize; 2], axis: usize, way: i32) {
+        let size = fine.columns.grid.size;
+        let beyond = cell[axis].wrapping_add_signed(way as isize);
+        if beyond >= size[axis] {
+            return;
+        }
+        let mut other = cell.map(|at| at / 2);
+        other[axis] = beyond / 2;
+        let side = if cell[1 - axis].is_multiple_of(2) { -1 } else { 1 };
+        for i in fine.columns.of_cell(cell) {
+            for j in coarse.columns.of_cell(other) {
+                let bottom = fine.columns.bases()[i].max(coarse.columns.bases()[j]);
+                if bottom >= fine.columns.ceilings()[i].min(coarse.columns.ceilings()[j]) {
+                    continue;
+                }
+                let layer = coarse.columns.layer(j);
+                let along = [-1, 1].map(|step| {
+                    let mut cell = other;
+                    cell[1 - axis] = cell[1 - axis].wrapping_add_signed(step);
+                    let column = coarse.columns.column(cell, layer);
+                    let column = column.filter(|&column| coarse.columns.overlap(j, column));
+                    column.map_or(NONE, |column| column as u32)
+                });
+                self.pipes.push(Pipe {
+                    ends: [i as u32, j as u32],
+                    along,
+                    side,
+                    axis,
+                    way,
+                    open: openness(fine, coarse, [i, j], along),
+                    flux: 0.0,
+                    left: 0.0,
+                    transfer: 0.0,
+                });
+            }
+        }
+    }
+
+    /// The flux of the pipe of a fine column over a side (fine units a step); 0 where there is none.
+    pub fn flux(&self, column: usize, axis: usize, way: i32) -> f32 {
+        self.find_pipe(column, axis, way).map_or(0.0, |pipe| self.pipes[pipe].flux)
+    }
+
+    /// Changes that flux, if there is a pipe.
+    pub fn set_flux(&mut self, column: usize, axis: usize, way: i32, flux: f32) {
+        if let Some(pipe) = self.find_pipe(column, axis, way) {
+            self.pipes[pipe].flux = flux;
+        }
+    }
+
+    /// What flows in each pipe and what rounding left, in order: its part of a saved state.
+    pub fn numbers(&self) -> impl ExactSizeIterator<Item = [f32; 2]> + '_ {
+        self.pipes.iter().map(|pipe| [pipe.flux, pipe.left])
+    }
+
+    /// Length of the step in whose measure fluxes are (s).
+    pub fn last(&self) -> f64 {
+        self.last
+    }
+
+    /// Puts a saved state's part back.
+    pub fn set_numbers(&mut self, last: f64, numbers: impl Iterator<Item = [f32; 2]>) {
+        self.last = last;
+        for (pipe, [flux, left]) in self.pipes.iter_mut().zip(numbers) {
+            (pipe.flux, pipe.left) = (flux, left);
+        }
+    }
+
+    fn find_pipe(&self, column: usize, axis: usize, way: i32) -> Option<usize> {
+        let wanted = (axis, way, column as u32);
+        let key = |pipe: &Pipe| (pipe.axis, pipe.way, pipe.ends[0]);
+        let pipe = self.pipes.partition_point(|pipe| key(pipe) < wanted);
+        self.pipes.get(pipe).filter(|pipe| key(pipe) == wanted).map(|_| pipe)
+    }
+
+    /// Finds the fluxes of a step of a length (s), from the surfaces before it, as those of all other pipes: from later ones waves would grow.
+    pub fn begin_step(&mut self, fine: &Shallow, coarse: &Shallow, measures: &Measures, length: f64) {
+        let step = time_step::step(&fine.params, measures, length, self.last);
+        let step = Step { drive: step.drive / APART, ..step };
+        self.last = length;
+        /// A copy for each kind of flow and each set of instructions.
+        macro_rules! run {
+            ($($viscous:literal $whole:literal $thins:literal)*) => {
+                match (step.drag > 0.0, step.is_whole, step.drag > 0.0 && step.thinning.is_some()) {
+                    $(($viscous, $whole, $thins) => {
+                        #[inline(always)]
+                        fn body(seam: &mut Seam, step: &Step, fine: &Shallow, coarse: &Shallow) -> bool {
+                            seam.drive::<Of<$viscous, $whole, $thins>>(step, fine, coarse)
+                        }
+                        let (seam, step) = (&mut *self, &step);
+                        dispatch!(body(seam: &mut Seam, step: &Step, fine: &Shallow, coarse: &Shallow) -> bool)
+                    })*
+                    (false, _, true) => unreachable!("only viscosity thins"),
+                }
+            };
+        }
+        self.is_moving = run!(true true true true true false true false true true false false false true false false false false);
+    }
+
+    /// Moves what is to cross the edge, of what the step has left.
+    pub fn end_step(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut Rests) {
+        if !self.is_moving {
+            return;
+        }
+        for gives in [true, false] {
+            if (gives || self.has_ceilings) && self.is_beyond(gives, fine, coarse) {
+                self.scale(gives);
+            }
+        }
+        self.move_units(fine, coarse, rest);
+    }
+
+    /// Finds all fluxes and transfers; whether there is one.
+    #[inline(always)]
+    fn drive<K: Kind>(&mut self, step: &Step, fine: &Shallow, coarse: &Shallow) -> bool {
+        let (bases, coarse_bases) = (fine.columns.bases(), coarse.columns.bases());
+        let (depths, coarse_depths) = (fine.flow.depths(), coarse.flow.depths());
+        let Self { pipes, places, gives, takes, .. } = self;
+        let mut any = false;
+        for (pipe, place) in pipes.iter_mut().zip(places) {
+            let [i, j] = pipe.ends.map(|end| end as usize);
+            let depth = [depths[i], coarse_depths[j]];
+            if depth == [0; 2] {
+                (pipe.flux, pipe.left, pipe.transfer) = (0.0, 0.0, 0.0);
+                continue;
+            }
+            let eta = coarse_bases[j] + depth[1];
+            let beside = |end: u32| {
+                let end = end as usize;
+                (end != NONE as usize && coarse_depths[end] > 0)
+                    .then(|| coarse_bases[end] + coarse_depths[end])
+            };
+            // Eight times the rise to a quarter of a cell aside.
+            let rise = match pipe.along.map(beside) {
+                _ if depth[1] == 0 => 0,
+                [Some(before), Some(behind)] => behind - before,
+                [Some(before), None] => 2 * (eta - before),
+                [None, Some(behind)] => 2 * (behind - eta),
+                [None, None] => 0,
+            };
+            // The tilt of gravity is that of a cell.
+            let tilt = (APART * step.tilt[pipe.axis] as f32) as i32 * pipe.way;
+            let fall = bases[i] + depth[0] - eta - (pipe.side * rise) / 8 + tilt;
+            let depth = depth.map(|depth| depth as f32);
+            let light = if K::VISCOUS && !K::WHOLE { fast_films::light(step, depth, pipe.flux) } else { 1.0 };
+            let flux = flux_of::<K>(step, fall, depth, pipe.flux, pipe.open, light);
+            pipe.flux = step.rested::<K>(fall, depth, flux);
+            [pipe.transfer, pipe.left] = split(pipe.flux, pipe.left);
+            if pipe.transfer != 0.0 {
+                any = true;
+                add(gives, takes, place, pipe.transfer);
+            }
+        }
+        any
+    }
+
+    /// Finds K_min of the columns that give, or K_max of those that take, as if nothing left them; whether one is under 1.
+    fn is_beyond(&mut self, gives: bool, fine: &Shallow, coarse: &Shallow) -> bool {
+        let Self { gives: given, takes: taken, factors, columns, .. } = self;
+        let sums = if gives { given } else { taken };
+        let mut any = false;
+        factors.iter_mut().for_each(|factors| factors.fill(1.0));
+        for (end, liquid) in [fine, coarse].into_iter().enumerate() {
+            let each = if end == 0 { 1.0 } else { FINE as f64 };
+            for ((&sum, factor), &column) in sums[end].iter().zip(&mut factors[end]).zip(&columns[end]) {
+                let column = column as usize;
+                let depth = liquid.flow.depths()[column];
+                let room = liquid.columns.ceilings()[column] - liquid.columns.bases()[column] - depth;
+                // A coarse column may take less than a unit more than it is given.
+                let has = if gives { depth } else { room - 1 };
+                let has = each * f64::from(has.max(0));
+                // Few are.
+                if sum > has {
+                    (*factor, any) = ((has / sum) as f32 * MARGIN, true);
+                }
+            }
+        }
+        any
+    }
+
+    /// Multiplies transfers by the factors of the columns that give, or of those that take.
+    fn scale(&mut self, gives: bool) {
+        let Self { pipes, places, gives: given, takes: taken, factors, .. } = self;
+        given.iter_mut().chain(&mut *taken).for_each(|sums| sums.fill(0.0));
+        for (pipe, places) in pipes.iter_mut().zip(places) {
+            let end = usize::from((pipe.transfer > 0.0) != gives);
+            let factor = factors[end][places[end] as usize];
+            if factor < 1.0 {
+                pipe.transfer = (pipe.transfer * factor).trunc();
+                pipe.flux *= factor;
+            }
+            add(given, taken, places, pipe.transfer);
+        }
+    }
+
+    /// Moves whole fine units with what they carry; what makes no coarse one waits in its cell.
+    fn move_units(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut Rests) {
+        self.find_amounts(fine, coarse);
+        let Self { gives, takes, columns, cells, amounts, .. } = self;
+        let net = |end: usize, place: usize| Load {
+            units: (takes[end][place] - gives[end][place]) as i64,
+            amounts: amounts[end].get(place).copied().unwrap_or_default(),
+        };
+        for (place, &column) in columns[0].iter().enumerate() {
+            change(fine, column as usize, &net(0, place));
+        }
+        for (place, (&column, &cell)) in columns[1].iter().zip(&*cells).enumerate() {
+            let net = net(1, place);
+            if net != Load::default() {
+                // All of the column, and what waits.
+                let own = of_column(coarse, column as usize);
+                let now = rest.whole(cell as usize, &own.in_fine().with(&net));
+                change(coarse, column as usize, &now.without(&own));
+            }
+        }
+        for liquid in [fine, coarse] {
+            liquid.remap.held.unite();
+        }
+        self.gives.iter_mut().chain(&mut self.takes).for_each(|sums| sums.fill(0.0));
+    }
+
+    /// Finds how much of each scalar every column takes (less what it gives): of what a pipe moves, by the concentration of the column that gives.
+    fn find_amounts(&mut self, fine: &Shallow, coarse: &Shallow) {
+        let Self { pipes, places, columns, amounts, .. } = self;
+        let count = fine.flow.amounts.count();
+        for (amounts, columns) in amounts.iter_mut().zip(columns) {
+            amounts.clear();
+            amounts.resize(if count > 0 { columns.len() } else { 0 }, [0; MOST]);
+        }
+        if count == 0 {
+            return;
+        }
+        for (pipe, places) in pipes.iter().zip(places).filter(|(pipe, _)| pipe.transfer != 0.0) {
+            let end = usize::from(pipe.transfer < 0.0);
+            let (liquid, column) = ([fine, coarse][end], pipe.ends[end] as usize);
+            let (depth, units) = (liquid.flow.depths()[column], f64::from(pipe.transfer.abs()));
+            let carried = liquid.flow.amounts.amounts.iter().take(count);
+            for (at, own) in carried.enumerate() {
+                let moved = (level(own[column], depth) * units).round_ties_even() as i64;
+                amounts[end][places[end] as usize][at] -= moved;
+                amounts[1 - end][places[1 - end] as usize][at] += moved;
+            }
+        }
+    }
+}
+
+/// Adds a transfer to the sums of both ends: whole numbers, whose sums do not depend on their order.
+fn add(gives: &mut [Vec<f64>; 2], takes: &mut [Vec<f64>; 2], places: &[u32; 2], transfer: f32) {
+    let [fine, coarse] = places.map(|place| place as usize);
+    let units = f64::from(transfer.abs());
+    if transfer > 0.0 {
+        gives[0][fine] += units;
+        takes[1][coarse] += units;
+    } else {
+        gives[1][coarse] += units;
+        takes[0][fine] += units;
+    }
+}
+
+/// 1 / (1 + slope^2)^2 of the ground between both columns, as between all others: slopes of over 60 degrees count as that.
+fn openness(fine: &Shallow, coarse: &Shallow, [i, j]: [usize; 2], along: [u32; 2]) -> f32 {
+    let bases = |columns: &Columns, column: usize| f64::from(columns.bases()[column]);
+    let cell = fine.columns.grid.cell / fine.columns.heights.unit;
+    let across = match along.map(|end| (end != NONE).then(|| bases(&coarse.columns, end as usize))) {
+        [Some(before), Some(behind)] => (behind - before) / (4.0 * cell),
+        [Some(before), None] => (bases(&coarse.columns, j) - before) / (2.0 * cell),
+        [None, Some(behind)] => (behind - bases(&coarse.columns, j)) / (2.0 * cell),
+        [None, None] => 0.0,
+    };
+    let down = (bases(&fine.columns, i) - bases(&coarse.columns, j)) / (f64::from(APART) * cell);
+    let square = (down * down + across * across).min(3.0);
+    (1.0 / ((1.0 + square) * (1.0 + square))) as f32
+}

@@ -1,0 +1,181 @@
+//! The strip between fine and coarse cells: its triangles.
+
+use crate::shallow::Shallow;
+use crate::shallow::columns::NONE;
+use crate::shallow::surface::Counts;
+use crate::shallow::surface::cells::Entry;
+use crate::shallow::surface::odd_quartets::{OTHERS, add_triangles};
+use crate::shallow::two_level::Detail;
+
+/// A cell at each corner of a piece of the strip, north-west, north-east, south-west and south-east: whether it is coarse, and where it is.
+type Piece = [Option<(bool, [usize; 2])>; 4];
+
+/// The triangles of the strip. Of both liquids' columns those of the coarse one have ids behind those of the fine one.
+#[derive(Debug, Default)]
+pub(super) struct Stitches {
+    /// Columns of the triangles: they face up.
+    pub triangles: Vec<[u32; 3]>,
+    /// Their vertices.
+    pub indices: Vec<u32>,
+    /// Columns that have a vertex in neither mesh, in order.
+    pub sewn: Vec<u32>,
+    corners: [Vec<Entry>; 4],
+}
+
+/// The most vertices and triangles that the strip may have, besides those of both meshes.
+pub(super) fn bound(detail: &Detail) -> [usize; 2] {
+    let (mut columns, mut triangles) = (0, 0);
+    each_piece(detail, |piece| {
+        let counts = piece.map(|cell| cell.map_or(0, |cell| of_cell(detail, cell).count()));
+        // A wet column is in one group of four or in three of three.
+        triangles += 3 * counts.iter().sum::<usize>();
+        columns += counts.iter().sum::<usize>();
+    });
+    [columns, triangles]
+}
+
+impl Stitches {
+    /// Makes room for so many triangles, and columns of a cell.
+    pub fn reserve(&mut self, triangles: usize, layers: usize) {
+        self.forget();
+        self.triangles.reserve(triangles);
+        self.indices.reserve(3 * triangles);
+        // Before those of several triangles are united.
+        self.sewn.reserve(3 * triangles);
+        self.corners.iter_mut().for_each(|corner| corner.reserve(layers));
+    }
+
+    fn forget(&mut self) {
+        self.triangles.clear();
+        self.indices.clear();
+        self.sewn.clear();
+        self.corners.iter_mut().for_each(Vec::clear);
+    }
+
+    /// Finds the strip. `columns` are those of both meshes' vertices, in order, but for the extras behind.
+    pub fn find(&mut self, detail: &Detail, depths: [&[i32]; 2], columns: [&Vec<u32>; 2], both: [Counts; 2]) {
+        self.forget();
+        let Self { triangles, indices, sewn, corners } = self;
+        each_piece(detail, |piece| {
+            for (corner, cell) in corners.iter_mut().zip(piece) {
+                corner.clear();
+                corner.extend(cell.into_iter().flat_map(|cell| entries(detail, depths, cell)));
+            }
+            join(corners, triangles);
+        });
+        let first = detail.fine.columns.len() as u32;
+        let vertex = |id: u32| {
+            let end = usize::from(id >= first);
+            let own = &columns[end][..both[end].vertices - both[end].extras];
+            let place = own.binary_search(&(id - [0, first][end])).ok()?;
+            Some(([0, both[0].vertices][end] + place) as u32)
+        };
+        sewn.extend(triangles.iter().flatten().filter(|id| vertex(**id).is_none()));
+        sewn.sort_unstable();
+        sewn.dedup();
+        let behind = both[0].vertices + both[1].vertices;
+        let of_strip = |id: u32| (behind + sewn.partition_point(|other| *other < id)) as u32;
+        indices.extend(triangles.iter().flatten().map(|&id| vertex(id).unwrap_or_else(|| of_strip(id))));
+    }
+}
+
+/// Adds the triangles of a piece.
+fn join(corners: &[Vec<Entry>; 4], triangles: &mut Vec<[u32; 3]>) {
+    for (corner, others) in OTHERS.into_iter().enumerate() {
+        for wet in corners[corner].iter().filter(|entry| entry.wet) {
+            let mut near = [None; 4];
+            for other in others {
+                let holder = corners[other].iter().find(|entry| entry.holds(wet.height));
+                near[other] = holder.filter(|holder| wet.holds(holder.height));
+            }
+            add_triangles(corner, wet, near, triangles);
+        }
+    }
+}
+
+/// The liquid of a cell.
+fn liquid(detail: &Detail, is_coarse: bool) -> &Shallow {
+    if is_coarse { &detail.coarse } else { &detail.fine }
+}
+
+fn of_cell(detail: &Detail, (is_coarse, cell): (bool, [usize; 2])) -> impl Iterator<Item = usize> + '_ {
+    liquid(detail, is_coarse).columns.of_cell(cell)
+}
+
+/// The columns of a cell.
+fn entries<'a>(
+    detail: &'a Detail,
+    depths: [&'a [i32]; 2],
+    cell @ (is_coarse, _): (bool, [usize; 2]),
+) -> impl Iterator<Item = Entry> + 'a {
+    let columns = &liquid(detail, is_coarse).columns;
+    let (depth, first) = match is_coarse {
+        true => (depths[1], detail.fine.columns.len()),
+        false => (depths[0], 0),
+    };
+    of_cell(detail, cell).map(move |index| {
+        let base = columns.bases()[index];
+        Entry {
+            id: (first + index) as u32,
+            layer: columns.layer(index) as u32,
+            height: base.wrapping_add(depth[index].max(0)),
+            under: columns.unders()[index],
+            ceiling: columns.ceilings()[index],
+            base,
+            wet: depth[index] > 0,
+            wall: NONE,
+        }
+    })
+}
+
+/// Calls `see` with each piece of the strip.
+fn each_piece(detail: &Detail, mut see: impl FnMut(Piece)) {
+    let (near, size) = (&detail.near, detail.fine.columns.grid.size);
+    // The outermost fine cells of a side, if there are coarse ones beyond.
+    let outer = |axis: usize, way: i32| match way {
+        1 => (near[axis].end < size[axis]).then(|| near[axis].end - 1),
+        _ => (near[axis].start > 0).then(|| near[axis].start),
+    };
+    let beyond = |at: usize, way: i32| at.wrapping_add_signed(way as isize) / 2;
+    let sides = [(0, -1), (0, 1), (1, -1), (1, 1)];
+    for (axis, way) in sides {
+        let Some(across) = outer(axis, way) else { continue };
+        let along = &near[1 - axis];
+        // A place of a piece: before or behind along the edge, and fine or coarse.
+        let corner = |is_behind: bool, is_coarse: bool| {
+            let bits = [is_coarse == (way > 0), is_behind];
+            let [x, z] = if axis == 0 { bits } else { [bits[1], bits[0]] };
+            usize::from(x) + 2 * usize::from(z)
+        };
+        let cell = |across: usize, along: usize| if axis == 0 { [across, along] } else { [along, across] };
+        let fine = |along: usize| Some((false, cell(across, along)));
+        let coarse = |along: usize| Some((true, cell(beyond(across, way), along / 2)));
+        for first in along.clone().step_by(2) {
+            let mut piece = [None; 4];
+            piece[corner(false, false)] = fine(first);
+            piece[corner(true, false)] = fine(first + 1);
+            piece[corner(false, true)] = coarse(first);
+            see(piece);
+            if first + 2 < along.end {
+                let mut piece = [None; 4];
+                for is_behind in [false, true] {
+                    let at = first + 1 + usize::from(is_behind);
+                    piece[corner(is_behind, false)] = fine(at);
+                    piece[corner(is_behind, true)] = coarse(at);
+                }
+                see(piece);
+            }
+        }
+    }
+    for (way_x, way_z) in [(-1, -1), (1, -1), (-1, 1), (1, 1)] {
+        if let (Some(x), Some(z)) = (outer(0, way_x), outer(1, way_z)) {
+            // The coarse mesh has the triangle of the three coarse cells.
+            let corner = |x: bool, z: bool| usize::from(x == (way_x > 0)) + 2 * usize::from(z == (way_z > 0));
+            let mut piece = [None; 4];
+            piece[corner(false, false)] = Some((false, [x, z]));
+            piece[corner(true, false)] = Some((true, [beyond(x, way_x), z / 2]));
+            piece[corner(false, true)] = Some((true, [x / 2, beyond(z, way_z)]));
+            see(piece);
+        }
+    }
+}
