@@ -122,7 +122,7 @@ impl Args {
         for &frame in frames {
             for path in self.paths() {
                 // A gap in a sequence is known before any work.
-                io::source::open(&of_frame(path, frame)).before()?;
+                io::files::source::open(&of_frame(path, frame)).before()?;
             }
         }
         let is_watched = |path: &PathBuf| self.flicker && Pattern::parse(path).is_some();

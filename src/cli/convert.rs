@@ -176,7 +176,7 @@ pub struct Losses<'a> {
 impl Losses<'_> {
     /// Warns about what a file of the input, from which these texture coordinates were read, contains and the output cannot.
     pub fn warn(&self, one: &Path, uvs: Option<&Uvs>) -> frazil::Result<()> {
-        let mut lost = if is_gltf(one) { Character::extras(one)? } else { io::extras::of(one)? };
+        let mut lost = if is_gltf(one) { Character::extras(one)? } else { io::mesh::extras::of(one)? };
         let uvs = uvs.filter(|_| io::mesh::holds_uvs(self.output));
         let to = extension(self.output);
         lost.retain(|name| match *name {
@@ -261,7 +261,7 @@ impl Sequence {
         has_warned: &mut bool,
     ) -> frazil::Result<usize> {
         let own = self.pattern.path(frame);
-        io::source::open(&own).inspect_err(|_| self.run = None)?;
+        io::files::source::open(&own).inspect_err(|_| self.run = None)?;
         if self.run.is_none() {
             let is_there = |frame: &i32| self.pattern.path(*frame).is_file();
             let last = (frame..=self.last).take_while(is_there).last().unwrap_or(frame);

@@ -39,7 +39,7 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
             #[cfg(not(feature = "vdb"))]
             "vdb" => super::needs_openvdb(path),
             _ if is_gltf(path) => character(path, &args.origin),
-            "ply" if io::points_ply::holds_points(path).is_ok_and(|yes| yes) => {
+            "ply" if io::particles::ply::holds_points(path).is_ok_and(|yes| yes) => {
                 super::cloud::info(path, args.origin.at)
             }
             _ if super::cloud::is_named(path) => super::cloud::info(path, args.origin.at),

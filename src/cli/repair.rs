@@ -63,7 +63,7 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
     for frame in frames.iter() {
         let from = of_frame(&args.input, frame);
         // A gap in a sequence is known before any work.
-        io::source::open(&from).before()?;
+        io::files::source::open(&from).before()?;
         output::refuse_input(&of_frame(&args.output, frame), [from.as_path()]).before()?;
     }
     let mut chosen = args.cell.map(Cell::given);

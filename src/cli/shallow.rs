@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use frazil::scene::shot::Report;
+use frazil::scene::run::Report;
 use frazil::scene::{Scene, shallow};
 use serde_json::{Map, Value, json};
 

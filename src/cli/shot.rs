@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-use frazil::scene::shot::{Plan, Report, Run};
+use frazil::scene::run::{Plan, Report, Run};
 use frazil::scene::{FrameChoice, Override, Scene};
 
 use super::exit::{Failure, Phase};

@@ -2,25 +2,25 @@
 //! against its inputs and run frame by frame.
 //!
 //! [`shot`] runs any stage; [`snow`], [`surface`] and [`shallow`] have the inputs, the check and the stages of a system; the stage `objects`
-//! writes the objects as they move. A new stage is a type with the traits [`shot::Stage`] and [`shot::Stepping`] beside its
+//! writes the objects as they move. A new stage is a type with the traits [`run::Stage`] and [`run::Stepping`] beside its
 //! system, named in the system's plan ([`snow::plan`]) and in the scopes of the keys that it depends on.
 
 mod moving;
 mod objects;
+pub mod run;
+mod schema;
 pub mod shallow;
-pub mod shot;
 pub mod snow;
 pub mod surface;
-mod text;
 
 pub use objects::Objects;
+pub use schema::{FrameChoice, Frames, Override, Value, Values, reference, template};
 pub use shallow::Shallow;
 #[cfg(feature = "vdb")]
 pub use snow::{
     Forecast, Inputs, Rebuild, RebuildGrains, Walk, changes_since, check_memory, estimate, partial,
 };
 pub use surface::Surface;
-pub use text::{FrameChoice, Frames, Override, Value, Values, reference, template};
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::shot::{
+use super::run::{
     Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
 };
-use super::text::keys::settings_of;
+use super::schema::keys::settings_of;
 use super::{Role, Scene, moving};
 use crate::context::Context;
 use crate::error::Result;

@@ -9,7 +9,7 @@ mod shallow;
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use frazil::scene::shot::verify::{Verified, verify};
+use frazil::scene::run::verify::{Verified, verify};
 use frazil::scene::{Override, Scene, System};
 
 use super::exit::{Failure, Phase};

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use frazil::io::mesh::{self, extension};
-use frazil::scene::shot::Stored;
+use frazil::scene::run::Stored;
 use frazil::scene::{Rebuild, RebuildGrains, Scene};
 use frazil::vdb::{FloatGrid, file};
 use frazil::{Context, Error, Result};

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use frazil::geometry::TriMesh;
 use frazil::io::mesh;
 use frazil::scene::Scene;
+use frazil::scene::run::Stored;
 use frazil::scene::shallow::Around;
-use frazil::scene::shot::Stored;
 use frazil::{Context, Error, Result};
 
 use super::sources::{Part, Wet};

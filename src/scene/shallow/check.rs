@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::course::Course;
 use super::inputs::area;
+use super::liquid_over_time::Course;
 use super::{Inputs, ML, Shallow, disk, memory};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -111,7 +111,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     Ok(Report {
         frames: [frames.first, frames.last],
         fps: scene.shot.fps,
-        terrain: crate::scene::text::name(&of.terrain_at(frames.first)),
+        terrain: crate::scene::schema::name(&of.terrain_at(frames.first)),
         files: if of.sequence().is_some() { frames.count() } else { 1 },
         triangles: inputs.triangles,
         size_m: (high - low).into(),

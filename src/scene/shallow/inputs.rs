@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::attached::{Attached, attach};
-use super::course::Course;
+use super::liquid_over_time::Course;
 use super::terrain::{Terrain, read_mesh};
 use super::{Point, Shallow, memory, obstacles};
 use crate::context::Context;

@@ -1,8 +1,8 @@
 //! The keys of `[shallow]`, of what a scene with it may have many of, and those of `[output]` in such scenes.
 
 use crate::io::mesh::EXTENSIONS;
-use crate::scene::text::key::{Key, Kind, OBJECT, Scope};
-use crate::scene::text::{FAR, NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
+use crate::scene::schema::key::{Key, Kind, OBJECT, Scope};
+use crate::scene::schema::{FAR, NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
 
 type Scopes = &'static [(&'static str, Scope)];
 const FIRST: Scopes = &[("liquid", Scope::First)];

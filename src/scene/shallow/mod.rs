@@ -2,14 +2,12 @@
 //! ([`Inputs`]), what a check says of it ([`check`]), memory and disk space that it takes among it, the stage `liquid` (`stage.rs`), and
 //! what a picture of it shows besides ([`Around`]).
 
-mod around;
 mod attached;
 mod check;
-mod course;
 mod disk;
 mod inputs;
-mod kept;
 mod keys;
+mod liquid_over_time;
 mod memory;
 mod mesh;
 mod obstacles;
@@ -17,24 +15,24 @@ mod plan;
 mod points;
 mod pours;
 mod rules;
+mod saved_liquid;
 mod scalars;
 mod stage;
+mod surroundings;
 mod terrain;
 #[cfg(feature = "vdb")]
 mod volume;
 
 use std::path::{Path, PathBuf};
 
+pub use check::{Report, check};
+pub use inputs::Inputs;
 pub(super) use keys::{KEYS, MANY_KEYS};
-pub use {
-    around::Around,
-    check::{Report, check},
-    inputs::Inputs,
-    plan::plan,
-    scalars::Carried,
-};
+pub use plan::plan;
+pub use scalars::Carried;
+pub use surroundings::Around;
 
-use super::text::{Value, Values};
+use super::schema::{Value, Values};
 use super::{KeyPose, Role};
 use crate::io::files::sequence::Pattern;
 use crate::motion::{Space, Up};
@@ -373,8 +371,8 @@ const ROLES: &[Role] = &[];
 
 #[cfg(test)]
 mod tests {
+    use super::super::schema::{keys, template};
     use super::*;
-    use crate::scene::text::{keys, template};
     use crate::scene::{Scene, System};
     use crate::shallow::Thickening;
 

@@ -4,7 +4,7 @@ use super::Inputs;
 use super::stage::Liquid;
 use crate::error::Result;
 use crate::scene::Scene;
-use crate::scene::shot::Plan;
+use crate::scene::run::Plan;
 
 /// The stage of a scene with a liquid on a terrain.
 ///

@@ -4,7 +4,7 @@ use super::{Form, Obstacle, Shallow, scalars};
 use crate::error::Result;
 use crate::io::files::sequence::Pattern;
 use crate::io::mesh::{EXTENSIONS, extension};
-use crate::scene::text::{Table, Value, Values};
+use crate::scene::schema::{Table, Value, Values};
 
 impl Shallow {
     /// Checks what single keys of `[shallow]` do not show.

@@ -3,7 +3,7 @@
 use super::{ML, Point, Shallow};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
-use crate::scene::text::{Table, Value, Values};
+use crate::scene::schema::{Table, Value, Values};
 use crate::shallow::scalars::MOST;
 use crate::shallow::{self, Law, Scalar, ScalarBalance, Thickening};
 

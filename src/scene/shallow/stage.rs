@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::course::Course;
+use super::liquid_over_time::Course;
 use super::mesh::{Drawn, Mesher};
 use super::{Inputs, ML, ROLES, Shallow, scalars};
 use crate::context::{Context, PhaseTime};
@@ -13,11 +13,11 @@ use crate::io::records::manifest::Keeps;
 use crate::io::usd::materials::Look;
 use crate::io::usd::primvars;
 use crate::io::{mesh, usd};
-use crate::scene::shot::{
+use crate::scene::run::{
     CONTENT, Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Report, Settings, Stage, Stepped, Stepping,
     Stored, To, Volume,
 };
-use crate::scene::text::keys::{first_of, settings_of};
+use crate::scene::schema::keys::{first_of, settings_of};
 use crate::scene::{Scene, System};
 use crate::shallow;
 use crate::shallow::remap::Moved;
@@ -87,7 +87,7 @@ impl<'a> Liquid<'a> {
         let liquid = &course.liquid;
         let drawn = ctx.phase("surface", || mesher.draw(liquid, self.of.opaque_depth))?;
         let volume = self.volume(ctx, liquid, to.frame, made_from)?;
-        let state = super::kept::save(&course.shapes, &course.points, liquid, course.stains.as_ref());
+        let state = super::saved_liquid::save(&course.shapes, &course.points, liquid, course.stains.as_ref());
         Ok(Written { drawn, state, volume, terrain: course.stained()? })
     }
 

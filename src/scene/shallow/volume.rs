@@ -9,7 +9,7 @@ use crate::geometry::DVec3;
 use crate::io::usd::{Field, Holds};
 use crate::numeric::blocks::{Block, BlockEdit, DIM, Origin, VOXELS, offset, origin_of};
 use crate::scene::Scene;
-use crate::scene::shot::Volume;
+use crate::scene::run::Volume;
 use crate::shallow;
 use crate::vdb::file::{WriteOptions, to_bytes};
 use crate::vdb::{DENSITY_SCALE_KEY, FloatGrid, GridClass, MetaValue};

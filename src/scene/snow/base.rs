@@ -8,7 +8,7 @@ use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::{Field, Holds};
-use crate::scene::shot::{
+use crate::scene::run::{
     FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
 use crate::scene::{BaseMode, Scene, moving};

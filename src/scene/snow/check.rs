@@ -5,13 +5,13 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::course::Course;
+use super::foot_slip::Walk;
+use super::object_path::Course;
 use super::relief::Relief;
-use super::walks::Walk;
 use super::{Forecast, Inputs, MistForecast, disk, has_grains, has_mist, memory};
 use crate::context::Context;
 use crate::error::Result;
-use crate::scene::shot::Stored;
+use crate::scene::run::Stored;
 use crate::scene::{Layer, Scene, Value};
 use crate::snow::base_layer::initial::thin;
 

@@ -7,7 +7,7 @@ use super::grains::params;
 use super::{Inputs, disk, memory};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
-use crate::scene::shot::Stored;
+use crate::scene::run::Stored;
 use crate::snow::grains::PACKING;
 
 /// Relative error that an estimate of the grains may have.

@@ -14,7 +14,7 @@ use crate::geometry::points::{Column, Points, Values};
 use crate::io::files::hash::Hasher;
 use crate::io::mesh::extension;
 use crate::scene::Scene;
-use crate::scene::shot::{FrameFiles, Stored};
+use crate::scene::run::{FrameFiles, Stored};
 use crate::vdb::file::{self, WriteOptions};
 use crate::vdb::{MetaValue, points};
 

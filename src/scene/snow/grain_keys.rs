@@ -1,8 +1,8 @@
 //! The keys of `[grains]`, and those that grains have of each object.
 
 use crate::error::Result;
-use crate::scene::text::key::{Key, Kind, OBJECT, Scope};
-use crate::scene::text::{FAR, Table, Values, rounded};
+use crate::scene::schema::key::{Key, Kind, OBJECT, Scope};
+use crate::scene::schema::{FAR, Table, Values, rounded};
 use crate::snow::{grain_cohesion, grain_friction};
 
 type Scopes = &'static [(&'static str, Scope)];

@@ -9,18 +9,18 @@ use super::forecast::Forecast;
 use super::grain_files::{self, WHOLE_EVERY, ordered, told_apart};
 use super::grain_keys::material;
 use super::inputs::Inputs;
-use super::{base, drift};
+use super::{base, initial_grains};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::{DVec3, Points, TriMesh};
 use crate::io::particles::ply;
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::points;
-use crate::scene::shot::{
+use crate::scene::run::{
     Clip, FrameFiles, Kind, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
 };
-use crate::scene::text::key::OBJECT;
-use crate::scene::text::keys::{first_of, settings_of};
+use crate::scene::schema::key::OBJECT;
+use crate::scene::schema::keys::{first_of, settings_of};
 use crate::scene::{self, Role, Scene, System, moving};
 use crate::snow::base_layer::Grids;
 use crate::snow::grains::{self, Base, Ground, Object, Params, StepReport, Surroundings};
@@ -100,7 +100,7 @@ impl<'a> Grains<'a> {
     /// Adds the grains that a file gives at the first frame, except those in the snow or below the ground; returns the frame's report.
     fn begin(&self, ctx: &Context, grains: &mut grains::Grains, layer: &Grids) -> Result<Report> {
         let Some(drift) = &self.inputs.drift else { return Ok(Report::default()) };
-        let path = drift::file(self.scene).unwrap_or(&self.scene.path);
+        let path = initial_grains::file(self.scene).unwrap_or(&self.scene.path);
         let frame = self.scene.shot.frames.first;
         let all = drift.places.len();
         let (places, velocities) = drift.outside(ctx, self.inputs, &layer.surface, grains.params().radius)?;
@@ -229,12 +229,12 @@ impl Stage for Grains<'_> {
         let roles = [&Role::MOVING[..], &[Role::Static]].concat();
         let mut settings = settings_of(self.scene, self.name(), &self.inputs.seen, &roles)?;
         let files = self.scene.snow.iter().flat_map(|snow| snow.files());
-        let initial = drift::file(self.scene).map(Path::to_path_buf);
+        let initial = initial_grains::file(self.scene).map(Path::to_path_buf);
         let ground = files.filter(|(key, _)| *key == "snow.ground").map(|(key, path)| (key, path.clone()));
         for (key, path) in ground.chain(initial.map(|path| ("grains.initial", path))) {
             settings.insert(
                 key.into(),
-                format!("{}{}", crate::scene::shot::CONTENT, self.inputs.seen.hash(&path)?),
+                format!("{}{}", crate::scene::run::CONTENT, self.inputs.seen.hash(&path)?),
             );
         }
         Ok(settings)

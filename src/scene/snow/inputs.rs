@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::drift::Drift;
+use super::initial_grains::Drift;
 use super::mist;
 use super::warnings::{replaced, too_small};
 use crate::context::Context;
@@ -17,7 +17,7 @@ use crate::io::files::sequence::Pattern;
 use crate::io::mesh;
 use crate::io::records::input_hashes::Seen;
 use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs};
-use crate::scene::{Ground, Layer, Object, Role, Scene, Snow, text};
+use crate::scene::{Ground, Layer, Object, Role, Scene, Snow, schema};
 use crate::snow::base_layer::initial::{self, Cover};
 use crate::sweep::{self, Body, REACH};
 use crate::vdb::{FloatGrid, GridClass, VectorGrid, distances, file};
@@ -213,7 +213,7 @@ impl Inputs {
             let (low, high) = mesh.bounds()?;
             let far = (low.cast::<f64>() - middle).abs().sup(&(high.cast::<f64>() - middle).abs()).max();
             // The layer's own lattice begins at the mean of the ground's vertices, which may lie off its middle.
-            let what = format!("object {} ({}), static, reaches", index + 1, text::name(&object.file));
+            let what = format!("object {} ({}), static, reaches", index + 1, schema::name(&object.file));
             let is_far = far > 0.9 * REACH * self.snow.cell;
             is_far.then(|| sweep::too_far(&what, far, "the middle of the ground", self.snow.cell))
         })
@@ -283,7 +283,7 @@ impl Source {
 }
 
 fn object_name(index: usize, object: &Object) -> String {
-    format!("object {} ({})", index + 1, text::name(&object.file))
+    format!("object {} ({})", index + 1, schema::name(&object.file))
 }
 
 /// A mesh with its closed parts outward; what of that is not decided joins the warnings.

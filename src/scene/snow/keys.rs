@@ -3,8 +3,8 @@
 use super::mist_keys::mist_params;
 use crate::error::Result;
 use crate::io::mesh::{EXTENSIONS, extension};
-use crate::scene::text::key::{Key, Kind, OBJECT, Scope};
-use crate::scene::text::{FAR, NO_ORIGIN, ORIGIN, Table, Value, Values};
+use crate::scene::schema::key::{Key, Kind, OBJECT, Scope};
+use crate::scene::schema::{FAR, NO_ORIGIN, ORIGIN, Table, Value, Values};
 use crate::scene::{Ground, Layer, Snow};
 use crate::snow::NoiseParams;
 

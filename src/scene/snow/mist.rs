@@ -16,10 +16,10 @@ use crate::geometry::{DVec3, Points, TriMesh};
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::{Field, Holds};
 use crate::motion::{Keys, Rigid};
-use crate::scene::shot::{
+use crate::scene::run::{
     FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
-use crate::scene::text::keys::{first_of, settings_of};
+use crate::scene::schema::keys::{first_of, settings_of};
 use crate::scene::{Role, Scene, System, moving};
 use crate::snow::base_layer;
 use crate::snow::mist::{self, Around, Grids, Params, Source, Start, StepReport, Surroundings, Wind};
@@ -269,7 +269,7 @@ impl Stage for Mist<'_> {
         let wind = wind_file(self.scene).map(|path| ("mist.wind", path.to_path_buf()));
         for (key, path) in ground.chain(wind) {
             let hash = self.inputs.seen.hash(&path)?;
-            settings.insert(key.into(), format!("{}{hash}", crate::scene::shot::CONTENT));
+            settings.insert(key.into(), format!("{}{hash}", crate::scene::run::CONTENT));
         }
         Ok(settings)
     }

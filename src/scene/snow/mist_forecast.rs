@@ -6,13 +6,13 @@ use std::collections::HashMap;
 
 use serde::Serialize;
 
-use super::course::Course;
 use super::mist_keys::mist_params;
+use super::object_path::Course;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::scene::Scene;
-use crate::scene::shot::Stored;
+use crate::scene::run::Stored;
 use crate::snow::mist::{self, LEAST, Params};
 use crate::vdb::file;
 

@@ -2,8 +2,8 @@
 
 use super::has_grains;
 use crate::error::{Error, Result};
-use crate::scene::text::key::{Key, Kind, Scope};
-use crate::scene::text::{Table, Values};
+use crate::scene::schema::key::{Key, Kind, Scope};
+use crate::scene::schema::{Table, Values};
 use crate::snow::mist::{FASTEST_WIND, Params};
 
 type Scopes = &'static [(&'static str, Scope)];

@@ -1,6 +1,6 @@
 //! The keys of `[output]` in scenes with snow.
 
-use crate::scene::text::key::{Key, Kind, Scope};
+use crate::scene::schema::key::{Key, Kind, Scope};
 
 type Scopes = &'static [(&'static str, Scope)];
 const BASE_OUTPUT: Scopes = &[("base", Scope::Output)];

@@ -8,7 +8,7 @@ use super::volumes::Volumes;
 use super::{has_grains, has_mist};
 use crate::scene::Scene;
 use crate::scene::objects::Objects;
-use crate::scene::shot::{AnyStage, Plan};
+use crate::scene::run::{AnyStage, Plan};
 
 /// The stages of a scene with snow.
 pub fn plan<'a>(scene: &'a Scene, inputs: &'a Inputs) -> Plan<'a> {

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::base;
 use crate::context::Context;
 use crate::error::Result;
-use crate::scene::shot::Stored;
+use crate::scene::run::Stored;
 use crate::snow::base_layer::Grids;
 
 /// The whole layers of a cache, one frame after another.

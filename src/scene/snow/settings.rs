@@ -2,10 +2,11 @@
 
 use crate::error::Result;
 use crate::io::records::input_hashes::Seen;
-use crate::scene::shot::Settings;
-use crate::scene::text::key::{Key, Scope};
-use crate::scene::text::keys::{self, settings_of};
-use crate::scene::{Layer, Role, Scene, System, shot};
+use crate::scene::run::Settings;
+use crate::scene::schema::key::{Key, Scope};
+use crate::scene::schema::keys;
+use crate::scene::schema::keys::settings_of;
+use crate::scene::{Layer, Role, Scene, System, run};
 
 /// The settings that the base depends on. Of the frames only the first counts: a shot may grow.
 ///
@@ -14,7 +15,7 @@ use crate::scene::{Layer, Role, Scene, System, shot};
 pub(super) fn of_base(scene: &Scene, seen: &Seen) -> Result<Settings> {
     let mut settings = settings_of(scene, "base", seen, &[Role::Collide, Role::Base, Role::Static])?;
     for (key, path) in scene.snow.iter().flat_map(|snow| snow.files()) {
-        settings.insert(key.into(), format!("{}{}", shot::CONTENT, seen.hash(path)?));
+        settings.insert(key.into(), format!("{}{}", run::CONTENT, seen.hash(path)?));
     }
     // A layer that is given is as it is, whatever it lies on.
     if scene.snow.as_ref().is_some_and(|snow| matches!(snow.layer, Layer::Grid(_))) {
@@ -58,7 +59,7 @@ fn declared(path: &str) -> Option<&'static Key> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shot::changed;
+    use run::changed;
 
     fn settings(all: &[(&str, &str)]) -> Settings {
         all.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect()

@@ -2,7 +2,7 @@
 
 use super::{has_grains, has_mist};
 use crate::error::Result;
-use crate::scene::text::{Table, Values};
+use crate::scene::schema::{Table, Values};
 use crate::scene::{Output, VolumesOutput};
 
 /// The stages that a scene's volumes are made from.

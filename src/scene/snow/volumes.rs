@@ -13,10 +13,10 @@ use crate::geometry::{DVec3, Points, TriMesh};
 use crate::io::mesh;
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::{self, Field, Holds};
-use crate::scene::shot::{
+use crate::scene::run::{
     Clip, FrameFiles, Kind, Prims, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
-use crate::scene::text::keys::settings_of;
+use crate::scene::schema::keys::settings_of;
 use crate::scene::{Scene, VolumesOutput};
 use crate::snow::base_layer::Grids;
 use crate::snow::volumes::{fog, united};

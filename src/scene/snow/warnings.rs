@@ -3,8 +3,8 @@
 use super::GRAIN_KEYS;
 use crate::error::Result;
 use crate::motion::span;
-use crate::scene::text::key::Fallback;
-use crate::scene::text::{Values, rounded};
+use crate::scene::schema::key::Fallback;
+use crate::scene::schema::{Values, rounded};
 use crate::scene::{Object, Scene};
 use crate::sweep::Body;
 

@@ -1,8 +1,8 @@
 //! The keys of `[surface]`, and those of `[output]` in scenes that have it.
 
 use crate::io::mesh::EXTENSIONS;
-use crate::scene::text::key::{Key, Kind, Scope};
-use crate::scene::text::{NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
+use crate::scene::schema::key::{Key, Kind, Scope};
+use crate::scene::schema::{NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
 
 type Scopes = &'static [(&'static str, Scope)];
 const FIRST: Scopes = &[("surface", Scope::First)];

@@ -6,26 +6,26 @@ mod check;
 #[cfg(feature = "vdb")]
 mod disk;
 #[cfg(feature = "vdb")]
-mod inputs;
+mod frame_report;
 #[cfg(feature = "vdb")]
-mod kept;
+mod inputs;
 mod keys;
 #[cfg(feature = "vdb")]
 mod memory;
 #[cfg(feature = "vdb")]
 mod plan;
 #[cfg(feature = "vdb")]
+mod saved_arrays;
+#[cfg(feature = "vdb")]
 mod sculpts;
 #[cfg(feature = "vdb")]
 mod time;
 #[cfg(feature = "vdb")]
-mod told;
-#[cfg(feature = "vdb")]
 mod track;
 #[cfg(feature = "vdb")]
-mod trail;
+mod tracked_shot;
 #[cfg(feature = "vdb")]
-mod walk;
+mod vertex_paths;
 
 use std::path::PathBuf;
 
@@ -38,7 +38,7 @@ pub use {
 };
 
 use super::Frames;
-use super::text::{Value, Values};
+use super::schema::{Value, Values};
 use crate::io::files::sequence::Pattern;
 use crate::motion::{Space, Up};
 use crate::surface::Weighting;

@@ -4,7 +4,7 @@ use super::Inputs;
 use super::track::Track;
 use crate::error::Result;
 use crate::scene::Scene;
-use crate::scene::shot::Plan;
+use crate::scene::run::Plan;
 
 /// The stages of a scene with a mesh that follows a liquid.
 ///

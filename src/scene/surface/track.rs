@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::walk::{At, Walk, reads};
-use super::{Inputs, Surface, kept};
+use super::tracked_shot::{At, Walk, reads};
+use super::{Inputs, Surface, saved_arrays};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::mesh::attributes::{Number, On};
@@ -12,10 +12,10 @@ use crate::io::records::manifest::Keeps;
 use crate::io::usd::materials::Look;
 use crate::io::usd::primvars;
 use crate::io::{mesh, usd};
-use crate::scene::shot::{
+use crate::scene::run::{
     CONTENT, Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Settings, Stage, Stepped, Stepping, Stored, To,
 };
-use crate::scene::text::keys::{first_of, settings_of};
+use crate::scene::schema::keys::{first_of, settings_of};
 use crate::scene::{Scene, System};
 use crate::surface::Traced;
 
@@ -169,7 +169,7 @@ impl<'a> Stepping for Track<'a> {
         let path = done.state_file(frame)?;
         let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
         let params = self.surface.params(self.inputs.spacing);
-        let kept = kept::resume(params, &self.inputs.mesh, &bytes);
+        let kept = saved_arrays::resume(params, &self.inputs.mesh, &bytes);
         let kept = kept.map_err(|error| Error::file(path, error.to_string()))?;
         Walk::resume(ctx, (self.scene, self.surface, self.inputs), frame, kept)
     }
@@ -179,7 +179,7 @@ impl<'a> Stepping for Track<'a> {
         let At { tracker, detail, report, source, is_dry, .. } = walk.now();
         let written = || {
             let carried = detail.as_deref().unwrap_or(&self.inputs.mesh);
-            let state = kept::save(tracker, carried, source.sculpted);
+            let state = saved_arrays::save(tracker, carried, source.sculpted);
             if *is_dry {
                 return Ok(Written::nothing(carried, state));
             }

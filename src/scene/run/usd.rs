@@ -1,7 +1,7 @@
 //! `shot.usda`: everything that a shot made, for programs that read USD.
 
-use super::own::Own;
-use super::run::Plan;
+use super::own_files::Own;
+use super::runner::Plan;
 use super::stage::Stage;
 use super::stored::Stored;
 use crate::error::Result;

@@ -5,18 +5,18 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::kept::Kept;
+use super::frame_report::told;
+use super::saved_arrays::Kept;
 use super::sculpts::{path_at, read_sculpt};
 use super::time::Liquid;
-use super::told::told;
-use super::trail::Trail;
+use super::vertex_paths::Trail;
 use super::{Inputs, Surface};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::check::deviation::NearestTree;
 use crate::geometry::{DVec3, DetailedMesh, TriMesh, Vec3};
 use crate::io::usd;
-use crate::scene::shot::{Reads, Report};
+use crate::scene::run::{Reads, Report};
 use crate::scene::{Frames, Scene};
 use crate::surface::{
     Change, Displaced, Eased, Leads, Params, Particles, Rest, StepReport, TOO_FAR, Traced, Tracker,

@@ -1,6 +1,6 @@
 //! How vertices go from a frame to the next, through changes of the mesh.
 
-use super::walk::Way;
+use super::tracked_shot::Way;
 use crate::geometry::check::topology::around;
 use crate::geometry::{DVec3, Vec3};
 use crate::surface::Change;

@@ -8,8 +8,8 @@ pub(super) mod key;
 pub(super) mod keys;
 mod overrides;
 mod resolved;
-mod table;
 mod template;
+mod toml_table;
 mod typed;
 mod values;
 
@@ -20,17 +20,17 @@ pub use values::{Value, Values};
 
 pub(super) use file::name;
 pub(super) use keys::{FAR, NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
-pub(super) use table::Table;
 pub(super) use template::rounded;
+pub(super) use toml_table::Table;
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Scene, System};
     use super::key::{Key, Kind, Scope};
     use super::keys::{self, settings_of};
     use super::values::path;
     use super::*;
     use crate::io::records::input_hashes::Seen;
-    use crate::scene::{Scene, System};
     use std::path::Path;
 
     const TEXT: &str =

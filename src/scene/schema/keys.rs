@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::io::files::sequence::Pattern;
 use crate::io::mesh::EXTENSIONS;
 use crate::io::records::input_hashes::Seen;
-use crate::scene::shot::{CONTENT, Settings};
+use crate::scene::run::{CONTENT, Settings};
 use crate::scene::{Role, Scene, System, shallow, snow, surface};
 
 /// Farthest coordinate that a scene may name (m): f32 positions keep millimetres up to here.

@@ -6,7 +6,8 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::own::{self, Own};
+use super::own_files;
+use super::own_files::Own;
 use super::stored::record_of;
 use super::usd;
 use crate::context::Context;
@@ -71,7 +72,7 @@ pub fn verify(ctx: &Context, folder: &Path) -> Result<Verified> {
     }
     let (own_files, faults) = own.faults();
     damaged.extend(faults.into_iter().map(|(file, what)| Damage { file, what }));
-    known.extend([own::SCENE, usd::SHOT, FILES].map(String::from));
+    known.extend([own_files::SCENE, usd::SHOT, FILES].map(String::from));
     known.extend(own.loose().map(String::from));
     let files: Vec<&Written> = manifests
         .iter()

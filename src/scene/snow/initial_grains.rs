@@ -16,7 +16,7 @@ use crate::io::mesh::extension;
 use crate::io::particles::ply;
 use crate::io::records::input_hashes::Seen;
 use crate::scene::Scene;
-use crate::scene::text::rounded;
+use crate::scene::schema::rounded;
 use crate::snow::grains::{FASTEST, Grains, Params};
 use crate::vdb::{FloatGrid, points};
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::{Serialize, Serializer};
 
 use super::key::{Fallback, Key, Kind};
-use super::table::{Table, with_value};
+use super::toml_table::{Table, with_value};
 use crate::error::{Error, Result};
 use crate::io::mesh::extension;
 use crate::io::particles;

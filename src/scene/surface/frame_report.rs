@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::scene::shot::Report;
+use crate::scene::run::Report;
 use crate::surface::{Apart, Change, StepReport, Tracker};
 
 /// Parts apart from the mesh that a report lists.

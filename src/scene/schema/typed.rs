@@ -1,6 +1,6 @@
 //! What every system shares, from the values of a scene: the shot, the objects, the output.
 
-use super::table::Table;
+use super::toml_table::Table;
 use super::values::{Value, Values};
 use crate::error::Result;
 use crate::motion::{Space, Up};

@@ -3,7 +3,7 @@
 use super::key::{Fallback, Key, heading, is_many};
 use super::keys::{self, tables};
 use super::overrides::Override;
-use super::table::{Document, Table};
+use super::toml_table::{Document, Table};
 use super::values::Values;
 use crate::error::{Error, Result};
 use crate::scene::{Object, Output, Scene, Shallow, Shot, Snow, Surface, System, snow};

@@ -4,8 +4,8 @@ use rayon::prelude::*;
 
 use super::Inputs;
 use super::check::{Deepest, ObjectReport};
+use super::foot_slip::walk;
 use super::relief::Relief;
-use super::walks::walk;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
@@ -57,7 +57,7 @@ impl<'a> Course<'a> {
     pub fn all(ctx: &Context, scene: &'a Scene, inputs: &'a Inputs) -> Result<Vec<Self>> {
         let colliders = scene.objects.iter().enumerate().filter(|(_, object)| object.role.moves());
         let of = |((index, object), body): ((usize, &'a Object), &'a Body)| {
-            let name = format!("object {} ({})", index + 1, crate::scene::text::name(&object.file));
+            let name = format!("object {} ({})", index + 1, crate::scene::schema::name(&object.file));
             let extents = ctx.phase("inputs", || extents(ctx, scene, body))?;
             Ok(Self { scene, inputs, name, object, body, extents })
         };

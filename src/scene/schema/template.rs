@@ -3,7 +3,7 @@
 use super::key::{Example, Fallback, Key, Kind, heading, is_many};
 use super::keys::{self, tables};
 use super::resolved::line;
-use super::table::with_value;
+use super::toml_table::with_value;
 use super::values::any_of;
 use crate::scene::System;
 use std::fmt::Write;

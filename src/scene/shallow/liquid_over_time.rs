@@ -1,7 +1,7 @@
 //! The liquid of a scene from frame to frame.
 
 use super::inputs::united;
-use super::{Inputs, Point, Shallow, kept, obstacles, points, pours};
+use super::{Inputs, Point, Shallow, obstacles, points, pours, saved_liquid};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::TriMesh;
@@ -58,7 +58,7 @@ impl<'a> Course<'a> {
     /// # Errors
     /// Files that can no longer be read; a state of another terrain.
     pub fn resume(ctx: &Context, (scene, of, inputs): Of<'a>, frame: i32, bytes: &[u8]) -> Result<Self> {
-        let kept = kept::read(bytes)?;
+        let kept = saved_liquid::read(bytes)?;
         let mut course = Self::dry(ctx, (scene, of, inputs), frame, kept.shapes)?;
         // The terrain may have covered some of them since the first frame.
         let named = |index: usize| format!("flow point {}", index + 1);

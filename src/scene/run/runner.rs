@@ -9,7 +9,8 @@ use std::thread::ScopedJoinHandle;
 
 use super::cache::{Asked, Cache, refuse_asked};
 use super::chain;
-use super::own::{self, Own};
+use super::own_files;
+use super::own_files::Own;
 use super::pass::{AnyStage, Pass, Shared};
 use super::stage::{Report, Stage};
 use super::stored::Stored;
@@ -258,7 +259,7 @@ impl<'a> Run<'a> {
                 cache.commit(run.stage.as_stage())?;
             }
         }
-        self.own.write(own::SCENE, self.plan.scene.to_toml_in(self.own.folder()).as_bytes())
+        self.own.write(own_files::SCENE, self.plan.scene.to_toml_in(self.own.folder()).as_bytes())
     }
 
     /// Number of frames to be made, of all stages together.

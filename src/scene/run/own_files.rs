@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::run::Plan;
+use super::runner::Plan;
 use super::stage::Stage;
 use super::stored::record_of;
 use super::usd;
