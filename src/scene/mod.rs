@@ -1,4 +1,4 @@
-//! Scene files (TOML): what a shot is made of, read with every default filled in ([`Scene::read`], `text/`), checked
+//! Scene files (TOML): what a shot is made of, read with every default filled in ([`Scene::read`], `schema/`), checked
 //! against its inputs and run frame by frame.
 //!
 //! [`shot`] runs any stage; [`snow`], [`surface`] and [`shallow`] have the inputs, the check and the stages of a system; the stage `objects`

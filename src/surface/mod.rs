@@ -5,9 +5,9 @@
 //! particles is 0 (`level_set/implicit.rs`), turned into signed distances (`level_set/band.rs`). Vertices that this would move too far are where
 //! the liquid has merged or split: they are flagged, and so are those beside which the mesh does not cover the surface (`topology/coverage.rs`).
 //!
-//! There the mesh is changed (`topology/change.rs`): its own signed distances take the topology of phi (`topology/mesh_distance.rs`, `matching/`), and it is cut and
+//! There the mesh is changed (`topology/change.rs`): its own signed distances take the topology of phi (`topology/mesh_distance.rs`, `topology/matching/`), and it is cut and
 //! rebuilt in the cells where it no longer fits (`repair/`). Parts without liquid go (`topology/dry_parts.rs`), edges that were stretched or pressed are
-//! split or collapse (`improve/`).
+//! split or collapse (`remesh/`).
 //!
 //! # Glossary
 //!

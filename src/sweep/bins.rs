@@ -21,7 +21,7 @@ const GRAIN: usize = 1024;
 const FEW: usize = 8;
 /// No slot.
 const NONE: u32 = u32::MAX;
-/// Offset (units) of a voxel from its lattice point: the symbolic shift of the scan lines (`winding.rs`), mostly -z, then
+/// Offset (units) of a voxel from its lattice point: the symbolic shift of the scan lines (`distance/winding.rs`), mostly -z, then
 /// +x, then +y. Below one unit, so that no face lies between.
 const NUDGE: Point = [0.25 / 64.0, 0.25 / 4096.0, -0.25];
 /// Tolerance (cells) for a plane that touches the corner of a cube.

@@ -3,7 +3,7 @@
 //! A shot is made by stages ([`Stage`]), one pass over the frames each. A stage has records of its own, so that it is
 //! made again only when what it depends on has changed: its settings (`settings.rs`), the files that a frame reads and
 //! the frames of stages upstream of it (`chain.rs`). A frame is done when its record is there ([`Stored`]); which frames
-//! belong to which settings stands in `cache.rs`, which files of the folder are ours in `run/own_files.rs`. `run.rs` drives it all;
+//! belong to which settings stands in `cache.rs`, which files of the folder are ours in `run/own_files.rs`. `runner.rs` drives it all;
 //! [`verify`] compares a folder with its records, `usd.rs` describes the shot to other programs.
 
 mod cache;

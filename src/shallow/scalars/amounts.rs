@@ -61,7 +61,7 @@ pub(in crate::shallow) struct Act {
 }
 
 impl Act {
-    /// What it does to the amount of so many units, as `obey` in `flow/carry.rs` to that of a column; returns by how much it grows.
+    /// What it does to the amount of so many units, as `obey` in `solver/carry.rs` to that of a column; returns by how much it grows.
     pub fn change(&self, units: i64, amount: &mut i64) -> i128 {
         let (units, before) = (i128::from(units), i128::from(*amount));
         let kept = before - (*amount as f64 * self.loses).round_ties_even() as i128;
