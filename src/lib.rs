@@ -7,7 +7,7 @@
 //!
 //! | to | take |
 //! |---|---|
-//! | run a shot from a scene file into a folder, as `frazil snow` does | [`scene::Scene`], [`scene::snow::plan`], [`scene::shot::Run`] |
+//! | run a shot from a scene file into a folder, as `frazil snow` does | [`scene::Scene`], [`scene::snow::plan`], [`scene::run::Run`] |
 //! | press moving meshes into snow in a frame loop of your own | [`snow::base_layer::BaseLayer`] |
 //! | turn the volume that moving meshes sweep into a level set | [`sweep::chain()`] |
 //! | let mist flow around things, or a gas or liquid of your own | [`snow::mist`], [`flow`] |
@@ -56,7 +56,7 @@
 //! ```
 //! # #[cfg(all(feature = "vdb", feature = "scene"))]
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! use frazil::scene::{Inputs, Scene, shot::Run, snow};
+//! use frazil::scene::{Inputs, Scene, run::Run, snow};
 //! use frazil::{Context, Pool, io};
 //!
 //! # let folder = tempfile::tempdir()?;

@@ -1,7 +1,7 @@
 //! Scene files (TOML): what a shot is made of, read with every default filled in ([`Scene::read`], `schema/`), checked
 //! against its inputs and run frame by frame.
 //!
-//! [`shot`] runs any stage; [`snow`], [`surface`] and [`shallow`] have the inputs, the check and the stages of a system; the stage `objects`
+//! [`run`] runs any stage; [`snow`], [`surface`] and [`shallow`] have the inputs, the check and the stages of a system; the stage `objects`
 //! writes the objects as they move. A new stage is a type with the traits [`run::Stage`] and [`run::Stepping`] beside its
 //! system, named in the system's plan ([`snow::plan`]) and in the scopes of the keys that it depends on.
 

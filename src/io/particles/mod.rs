@@ -7,7 +7,7 @@
 //! | .vtk | legacy 1.0 to 5.1, text and binary: POLYDATA and UNSTRUCTURED_GRID |
 //! | .vtu | UnstructuredGrid, all pieces: text, base64, appended raw and base64; plain, zlib and LZ4 |
 //! | .xyz | text with x, y and z in the first three columns, or little-endian 32-bit floats |
-//! | .ply | vertices: see [`points_ply`] |
+//! | .ply | vertices: see [`ply`] |
 //!
 //! Attributes keep the names of the file. Floats become 32-bit ones, places keep 64 bits. Integers of up to 32 bits with a sign become
 //! 32-bit ones, longer ones 64-bit ones. As in .ply, `id` becomes 64-bit integers, `active` and `trapped` `bool`, and a value that all
@@ -164,7 +164,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Cloud> {
 }
 
 /// Writes points, whole or not at all: .bgeo and .bhclassic as classic version 5 in gzip, with 32-bit places and integers; .xyz as
-/// little-endian 32-bit floats, without attributes, which a warning names; .ply as [`points_ply`] does, with the voxel size if
+/// little-endian 32-bit floats, without attributes, which a warning names; .ply as [`ply`] does, with the voxel size if
 /// `keeps_voxels`.
 ///
 /// # Errors

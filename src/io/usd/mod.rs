@@ -24,7 +24,7 @@ pub struct MeshFrame<'a> {
     pub triangles: &'a [[u32; 3]],
     /// Their texture coordinates.
     pub uvs: Option<&'a Uvs>,
-    /// Other arrays, of corners three for each triangle: primvars, see [`usd_primvars`].
+    /// Other arrays, of corners three for each triangle: primvars, see [`primvars`].
     pub arrays: &'a [&'a MeshArray],
 }
 
