@@ -3,16 +3,16 @@
 use std::ptr::{null, null_mut};
 use std::time::{Duration, Instant};
 
-use frazil::capi::base::*;
-use frazil::capi::body::frz_body;
-use frazil::capi::context::*;
-use frazil::capi::grid::*;
-use frazil::capi::grid_bytes::*;
-use frazil::capi::level_set::*;
-use frazil::capi::library::FRZ_ABI_VERSION;
-use frazil::capi::mesh::*;
-use frazil::capi::pool::*;
-use frazil::capi::snow::*;
+use frazil::capi::grid::bytes::*;
+use frazil::capi::grid::sparse::*;
+use frazil::capi::level_set::body::frz_body;
+use frazil::capi::level_set::tools::*;
+use frazil::capi::mesh::triangles::*;
+use frazil::capi::runtime::context::*;
+use frazil::capi::runtime::library::FRZ_ABI_VERSION;
+use frazil::capi::runtime::pool::*;
+use frazil::capi::snow::base_layer::*;
+use frazil::capi::snow::layer::*;
 use frazil::capi::{frz_status, frz_view};
 use frazil::geometry::TriMesh;
 

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use frazil::capi::context::*;
 use frazil::capi::frz_status;
+use frazil::capi::runtime::context::*;
 
 use crate::grains::Random;
 use crate::harness::{Harness, median, timed};

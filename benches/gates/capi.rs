@@ -7,11 +7,11 @@ use std::ptr::null_mut;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use frazil::capi::base::*;
-use frazil::capi::body::frz_body;
-use frazil::capi::context::*;
-use frazil::capi::grid::*;
-use frazil::capi::grid_bytes::*;
+use frazil::capi::grid::bytes::*;
+use frazil::capi::grid::sparse::*;
+use frazil::capi::level_set::body::frz_body;
+use frazil::capi::runtime::context::*;
+use frazil::capi::snow::base_layer::*;
 use frazil::capi::{frz_status, frz_view};
 use frazil::geometry::DVec3;
 use frazil::motion::Motion;

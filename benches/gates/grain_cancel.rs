@@ -2,9 +2,9 @@
 
 use std::ptr::{null, null_mut};
 
-use frazil::capi::grains::*;
-use frazil::capi::grains_params::*;
-use frazil::capi::grains_points::*;
+use frazil::capi::snow::grains::*;
+use frazil::capi::snow::grains_params::*;
+use frazil::capi::snow::grains_points::*;
 use frazil::capi::{frz_status, frz_view};
 
 use crate::cancel_latency::{Steps, measure};

@@ -4,9 +4,9 @@
 use std::ffi::{CStr, c_void};
 use std::ptr::null_mut;
 
-use frazil::capi::context::*;
-use frazil::capi::library::{FRZ_ABI_VERSION, frz_last_error};
-use frazil::capi::pool::*;
+use frazil::capi::runtime::context::*;
+use frazil::capi::runtime::library::{FRZ_ABI_VERSION, frz_last_error};
+use frazil::capi::runtime::pool::*;
 use frazil::capi::{frz_status, frz_view};
 
 /// A pool, and a context on it.

@@ -3,10 +3,10 @@
 use std::cell::Cell;
 use std::ptr::{null, null_mut};
 
-use frazil::capi::body::{frz_body, frz_body_init};
-use frazil::capi::mist::*;
-use frazil::capi::mist_params::*;
-use frazil::capi::mist_points::*;
+use frazil::capi::level_set::body::{frz_body, frz_body_init};
+use frazil::capi::snow::mist::*;
+use frazil::capi::snow::mist_params::*;
+use frazil::capi::snow::mist_points::*;
 use frazil::capi::{frz_status, frz_view};
 
 use crate::cancel_latency::{Steps, measure};

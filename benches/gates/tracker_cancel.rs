@@ -5,9 +5,9 @@ use std::cell::Cell;
 use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
-use frazil::capi::mesh::*;
-use frazil::capi::tracker::*;
-use frazil::capi::tracker_eased::frz_tracker_read_eased;
+use frazil::capi::mesh::triangles::*;
+use frazil::capi::tracker::eased::frz_tracker_read_eased;
+use frazil::capi::tracker::mesh::*;
 use frazil::capi::{frz_span, frz_status, frz_view};
 use frazil::geometry::{DVec3, TriMesh, Vec3};
 

@@ -5,10 +5,18 @@ use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use frazil::capi::frz_status::*;
-use frazil::capi::{grains::*, grains_params::*, grains_points::*};
-use frazil::capi::{mist::*, mist_params::*, mist_points::*};
-use frazil::capi::{shallow::*, shallow_detail::*, shallow_detail_ground::*, shallow_flows::*};
-use frazil::capi::{shallow_params::*, shallow_terrain::*};
+use frazil::capi::shallow::flows::*;
+use frazil::capi::shallow::liquid::*;
+use frazil::capi::shallow::params::*;
+use frazil::capi::shallow::terrain::*;
+use frazil::capi::shallow_two_level::ground::*;
+use frazil::capi::shallow_two_level::liquid::*;
+use frazil::capi::snow::grains::*;
+use frazil::capi::snow::grains_params::*;
+use frazil::capi::snow::grains_points::*;
+use frazil::capi::snow::mist::*;
+use frazil::capi::snow::mist_params::*;
+use frazil::capi::snow::mist_points::*;
 
 use crate::harness::Harness;
 use crate::host::view;

@@ -5,8 +5,15 @@ use std::ptr::{null, null_mut};
 
 use frazil::capi::frz_span;
 use frazil::capi::frz_status::*;
-use frazil::capi::{base::*, body::*, grains::*, grid::*, mesh::*, mist::*, snow::*};
-use frazil::capi::{tracker::*, tracker_eased::*};
+use frazil::capi::grid::sparse::*;
+use frazil::capi::level_set::body::*;
+use frazil::capi::mesh::triangles::*;
+use frazil::capi::snow::base_layer::*;
+use frazil::capi::snow::grains::*;
+use frazil::capi::snow::layer::*;
+use frazil::capi::snow::mist::*;
+use frazil::capi::tracker::eased::*;
+use frazil::capi::tracker::mesh::*;
 
 use crate::host::{view, works};
 use crate::reliability_step_calls::{grain_params, mist_params, sized, step_length};

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use frazil::capi::context::*;
 use frazil::capi::frz_status::{self, *};
+use frazil::capi::runtime::context::*;
 use rustix::time::{ClockId, clock_gettime};
 
 use crate::grains::Random;

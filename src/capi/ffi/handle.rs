@@ -1,0 +1,359 @@
+//! Handles: objects that a host holds by pointer. A pointer that is NULL, of another kind, in use or poisoned is an error.
+
+use std::cell::UnsafeCell;
+use std::ops::{Deref, DerefMut};
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
+
+use super::guard::frz_status::*;
+use super::guard::{Failure, Outcome};
+
+/// A kind of handle.
+///
+/// C knows only its name: a pointer to it is one to a [`Handle`] with its value.
+pub(in crate::capi) trait Noun {
+    /// The value of the handle.
+    type Value;
+    /// Its name in messages.
+    const NAME: &'static str;
+    /// Identifies its memory.
+    const TAG: u32;
+}
+
+/// Memory of a destroyed handle, until it is used again.
+const GONE: u32 = 0xdead_0fff;
+/// Users of a handle that is being changed.
+const CHANGING: i32 = -1;
+
+/// A value with the marks that make misuse tellable; all kinds begin with the tag.
+#[repr(C)]
+pub(in crate::capi) struct Handle<T> {
+    tag: AtomicU32,
+    /// Calls that read, or [`CHANGING`].
+    users: AtomicI32,
+    poisoned: AtomicBool,
+    value: UnsafeCell<T>,
+}
+
+/// A handle that this call reads; other calls may read it too.
+pub(in crate::capi) struct Reading<'a, T>(&'a Handle<T>);
+
+/// A handle that this call alone uses; a panic poisons it.
+pub(in crate::capi) struct Changing<'a, T>(&'a Handle<T>);
+
+/// Gives a value to the host.
+///
+/// # Safety
+/// `out` must be NULL or point to memory for a pointer.
+pub(in crate::capi) unsafe fn give<N: Noun>(out: *mut *mut N, value: N::Value) -> Outcome {
+    let out = required(out, "out")?;
+    let head = Handle {
+        tag: AtomicU32::new(N::TAG),
+        users: AtomicI32::new(0),
+        poisoned: AtomicBool::new(false),
+        value: UnsafeCell::new(value),
+    };
+    // SAFETY: the caller's promise, and it is not NULL.
+    unsafe { out.write(Box::into_raw(Box::new(head)).cast()) };
+    Ok(())
+}
+
+/// Zeroes the output of a call, if requested: its value after every failure.
+///
+/// # Safety
+/// `out` must be NULL or point to memory for a number or pointer.
+pub(in crate::capi) unsafe fn clear<T>(out: *mut T) {
+    if !out.is_null() {
+        // SAFETY: the caller's promise; all zeroes are 0 and NULL.
+        unsafe { out.write_bytes(0, 1) };
+    }
+}
+
+/// Refuses NULL.
+pub(in crate::capi) fn required<T>(pointer: *mut T, name: &str) -> Outcome<*mut T> {
+    if pointer.is_null() {
+        return Err(Failure::argument(format!("{name} is NULL")));
+    }
+    Ok(pointer)
+}
+
+/// The handle behind a pointer.
+///
+/// # Safety
+/// The pointer must be NULL or point to a handle of any kind that was not destroyed, for `'a`.
+unsafe fn look<'a, N: Noun>(pointer: *const N) -> Outcome<&'a Handle<N::Value>> {
+    let handle = pointer.cast::<Handle<N::Value>>();
+    if handle.is_null() {
+        return Err(Failure::argument(format!("the {} is NULL", N::NAME)));
+    }
+    if !handle.is_aligned() {
+        return Err(Failure::new(FRZ_ERROR_HANDLE, format!("the pointer is not a {}", N::NAME)));
+    }
+    // SAFETY: the caller's promise; handles of all kinds begin with their tag.
+    match unsafe { &(*handle).tag }.load(Ordering::Acquire) {
+        // SAFETY: the tag says that it is a handle of this kind.
+        tag if tag == N::TAG => Ok(unsafe { &*handle }),
+        GONE => Err(Failure::new(FRZ_ERROR_HANDLE, format!("the {} was destroyed", N::NAME))),
+        _ => Err(Failure::new(FRZ_ERROR_HANDLE, format!("the pointer is not a {}", N::NAME))),
+    }
+}
+
+/// The handle behind a pointer, to read.
+///
+/// # Safety
+/// The pointer must be NULL or point to a handle of any kind that was not destroyed, for `'a`.
+pub(in crate::capi) unsafe fn read<'a, N: Noun>(pointer: *const N) -> Outcome<Reading<'a, N::Value>> {
+    // SAFETY: the caller's promise.
+    let handle = unsafe { look(pointer) }?;
+    let one_more = |users: i32| (users >= 0).then_some(users + 1);
+    if handle.users.fetch_update(Ordering::Acquire, Ordering::Relaxed, one_more).is_err() {
+        return Err(busy::<N>());
+    }
+    let reading = Reading(handle);
+    sound::<N>(handle)?;
+    Ok(reading)
+}
+
+/// The handle behind a pointer, to read; none for NULL.
+///
+/// # Safety
+/// As [`read`].
+pub(in crate::capi) unsafe fn read_some<'a, N: Noun>(
+    pointer: *const N,
+) -> Outcome<Option<Reading<'a, N::Value>>> {
+    // SAFETY: the caller's promise.
+    if pointer.is_null() { Ok(None) } else { unsafe { read(pointer) }.map(Some) }
+}
+
+/// The handle behind a pointer, to change.
+///
+/// # Safety
+/// As [`read`].
+pub(in crate::capi) unsafe fn change<'a, N: Noun>(pointer: *mut N) -> Outcome<Changing<'a, N::Value>> {
+    // SAFETY: the caller's promise.
+    let handle = unsafe { look(pointer.cast_const()) }?;
+    if handle.users.compare_exchange(0, CHANGING, Ordering::Acquire, Ordering::Relaxed).is_err() {
+        return Err(busy::<N>());
+    }
+    let changing = Changing(handle);
+    sound::<N>(handle)?;
+    Ok(changing)
+}
+
+/// Destroys a handle; NULL is fine, and a handle in use is kept.
+///
+/// # Safety
+/// As [`read`]; the handle must not be used afterwards.
+pub(in crate::capi) unsafe fn destroy<N: Noun>(pointer: *mut N) -> Outcome {
+    // SAFETY: the caller's promise; there are no parts.
+    unsafe { destroy_whole::<N, N>(pointer, |_| Vec::new()) }
+}
+
+/// Destroys a handle whose value lends handles of its own, which its drop has to [`free`]; NULL is fine. Where one of
+/// all these is in use, all stay as they are.
+///
+/// # Safety
+/// As [`destroy`], also for the lent ones.
+pub(in crate::capi) unsafe fn destroy_whole<N: Noun, P: Noun>(
+    pointer: *mut N,
+    lent: impl FnOnce(&N::Value) -> Vec<*mut P>,
+) -> Outcome {
+    if pointer.is_null() {
+        return Ok(());
+    }
+    // SAFETY: the caller's promise.
+    let handle = unsafe { look(pointer.cast_const()) }?;
+    let whole = seize::<N>(handle)?;
+    // SAFETY: nobody else uses it.
+    let lent = lent(unsafe { &*handle.value.get() });
+    // SAFETY: they live as long as the value.
+    let take = |part: &*mut P| seize::<P>(unsafe { look(part.cast_const()) }?);
+    let parts = lent.iter().map(take).collect::<Outcome<Vec<Seized<'_, P::Value>>>>()?;
+    // None of them is in use now, nor can be again.
+    std::mem::forget((whole, parts));
+    // SAFETY: made by `give`, and nobody uses it.
+    unsafe { free(pointer) };
+    Ok(())
+}
+
+/// Destroys a handle that can no longer be used.
+///
+/// # Safety
+/// It must come from [`give`], and must not be used now or afterwards.
+pub(in crate::capi) unsafe fn free<N: Noun>(pointer: *mut N) {
+    if pointer.is_null() {
+        return;
+    }
+    let handle = pointer.cast::<Handle<N::Value>>();
+    // SAFETY: the caller's promise.
+    unsafe {
+        (*handle).tag.store(GONE, Ordering::Release);
+        drop(Box::from_raw(handle));
+    }
+}
+
+/// A handle that is locked against use; poisoned or not.
+struct Seized<'a, T>(&'a Handle<T>);
+
+fn seize<N: Noun>(handle: &Handle<N::Value>) -> Outcome<Seized<'_, N::Value>> {
+    if handle.users.compare_exchange(0, CHANGING, Ordering::AcqRel, Ordering::Relaxed).is_err() {
+        return Err(busy::<N>());
+    }
+    Ok(Seized(handle))
+}
+
+impl<T> Drop for Seized<'_, T> {
+    fn drop(&mut self) {
+        self.0.users.store(0, Ordering::Release);
+    }
+}
+
+fn busy<N: Noun>() -> Failure {
+    Failure::new(FRZ_ERROR_BUSY, format!("the {} is in use by another call", N::NAME))
+}
+
+fn sound<N: Noun>(handle: &Handle<N::Value>) -> Outcome {
+    if handle.poisoned.load(Ordering::Acquire) {
+        let text = format!("the {} saw an internal error before and can only be destroyed", N::NAME);
+        return Err(Failure::new(FRZ_ERROR_POISONED, text));
+    }
+    Ok(())
+}
+
+impl<T> Deref for Reading<'_, T> {
+    type Target = T;
+    fn deref(&self) -> &T {
+        // SAFETY: while this exists nobody changes the value.
+        unsafe { &*self.0.value.get() }
+    }
+}
+
+impl<T> Drop for Reading<'_, T> {
+    fn drop(&mut self) {
+        self.0.users.fetch_sub(1, Ordering::Release);
+    }
+}
+
+impl<T> Deref for Changing<'_, T> {
+    type Target = T;
+    fn deref(&self) -> &T {
+        // SAFETY: while this exists nobody else uses the value.
+        unsafe { &*self.0.value.get() }
+    }
+}
+
+impl<T> DerefMut for Changing<'_, T> {
+    fn deref_mut(&mut self) -> &mut T {
+        // SAFETY: while this exists nobody else uses the value.
+        unsafe { &mut *self.0.value.get() }
+    }
+}
+
+impl<T> Drop for Changing<'_, T> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.poisoned.store(true, Ordering::Release);
+        }
+        self.0.users.store(0, Ordering::Release);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::guard::guard;
+    use super::*;
+
+    struct Jar;
+    struct Tin;
+
+    impl Noun for Jar {
+        type Value = i32;
+        const NAME: &'static str = "jar";
+        const TAG: u32 = 1;
+    }
+
+    impl Noun for Tin {
+        type Value = [u8; 3];
+        const NAME: &'static str = "tin";
+        const TAG: u32 = 2;
+    }
+
+    fn jar(value: i32) -> *mut Jar {
+        let mut out = std::ptr::null_mut();
+        // SAFETY: `out` is a pointer.
+        unsafe { give(&mut out, value) }.ok().unwrap();
+        out
+    }
+
+    #[test]
+    fn misuse_is_told() {
+        let jar = jar(7);
+        // SAFETY: the jar lives until it is destroyed.
+        unsafe {
+            assert_eq!(*read(jar.cast_const()).ok().unwrap(), 7);
+            let reading = read(jar.cast_const()).ok().unwrap();
+            assert_eq!(change(jar).err().unwrap().status, FRZ_ERROR_BUSY);
+            assert_eq!(destroy(jar).err().unwrap().status, FRZ_ERROR_BUSY);
+            drop(reading);
+            *change(jar).ok().unwrap() += 1;
+            assert_eq!(*read(jar.cast_const()).ok().unwrap(), 8);
+            assert_eq!(read(jar.cast::<Tin>().cast_const()).err().unwrap().status, FRZ_ERROR_HANDLE);
+            assert_eq!(read::<Jar>(std::ptr::null()).err().unwrap().text, "the jar is NULL");
+            assert!(destroy(jar).is_ok());
+            assert!(destroy::<Jar>(std::ptr::null_mut()).is_ok());
+        }
+    }
+
+    /// Lends a jar.
+    struct Shelf(*mut Jar);
+
+    impl Noun for Shelf {
+        type Value = Shelf;
+        const NAME: &'static str = "shelf";
+        const TAG: u32 = 3;
+    }
+
+    impl Drop for Shelf {
+        fn drop(&mut self) {
+            // SAFETY: the test lets nobody use it then.
+            unsafe { free(self.0) };
+        }
+    }
+
+    #[test]
+    fn what_lends_a_handle_in_use_stays_with_all_that_it_lends() {
+        let lent = jar(7);
+        let mut shelf: *mut Shelf = std::ptr::null_mut();
+        // SAFETY: jar and shelf live until the shelf is destroyed.
+        unsafe {
+            assert!(give(&mut shelf, Shelf(lent)).is_ok());
+            let destroyed = || destroy_whole(shelf, |shelf| vec![shelf.0]);
+            let reading = read(lent.cast_const()).ok().unwrap();
+            let refused = destroyed().err().unwrap();
+            assert_eq!(
+                (refused.status, refused.text.as_str()),
+                (FRZ_ERROR_BUSY, "the jar is in use by another call")
+            );
+            assert_eq!(*reading, 7);
+            drop(reading);
+            assert!(read(shelf.cast_const()).is_ok(), "the shelf is as it was");
+            *change(lent).ok().unwrap() += 1;
+            assert!(destroyed().is_ok());
+        }
+    }
+
+    #[test]
+    fn a_handle_that_saw_a_panic_is_poisoned_and_can_be_destroyed() {
+        let jar = jar(7);
+        // SAFETY: the jar lives until it is destroyed.
+        unsafe {
+            let status = guard(|| {
+                let _changing = change(jar)?;
+                panic!("on purpose")
+            });
+            assert_eq!(status, FRZ_ERROR_INTERNAL);
+            assert_eq!(change(jar).err().unwrap().status, FRZ_ERROR_POISONED);
+            assert_eq!(read(jar.cast_const()).err().unwrap().status, FRZ_ERROR_POISONED);
+            assert!(destroy(jar).is_ok());
+        }
+    }
+}

@@ -1,0 +1,480 @@
+//! Arrays and structs that cross the border: the only place that follows a host's pointers.
+
+use std::ffi::{CStr, c_char, c_void};
+use std::ops::RangeInclusive;
+
+use super::guard::frz_status::FRZ_ERROR_CAPACITY;
+use super::guard::frz_status::FRZ_ERROR_VERSION;
+use super::guard::{Failure, Outcome};
+use crate::numeric::digits;
+
+/// An array that the caller lends for the time of the call.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct frz_view {
+    /// First element; NULL when there is none. It need not be aligned.
+    pub data: *const c_void,
+    /// Number of elements.
+    pub count: usize,
+    /// Bytes from one element to the next; 0: they are packed.
+    pub stride: usize,
+}
+
+/// Memory of the caller that is written in the time of the call.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct frz_span {
+    /// First element; NULL where the function says so. It need not be aligned.
+    pub data: *mut c_void,
+    /// Elements that there is room for.
+    pub count: usize,
+    /// Bytes from one element to the next; 0: they are packed. Bytes between elements are not touched.
+    pub stride: usize,
+}
+
+/// Types of which any bytes are a value.
+///
+/// # Safety
+/// Every pattern of bits must be valid.
+pub(in crate::capi) unsafe trait Plain: Copy {}
+// SAFETY: numbers and arrays of numbers.
+unsafe impl Plain for u8 {}
+// SAFETY: as above.
+unsafe impl Plain for u16 {}
+// SAFETY: as above.
+unsafe impl Plain for u32 {}
+// SAFETY: as above.
+unsafe impl Plain for i32 {}
+// SAFETY: as above.
+unsafe impl Plain for i64 {}
+// SAFETY: as above.
+unsafe impl Plain for f32 {}
+// SAFETY: as above.
+unsafe impl Plain for f64 {}
+// SAFETY: as above.
+unsafe impl Plain for [f32; 2] {}
+// SAFETY: as above.
+unsafe impl Plain for [f32; 3] {}
+// SAFETY: as above.
+unsafe impl Plain for [f32; 4] {}
+// SAFETY: as above.
+unsafe impl Plain for [f64; 3] {}
+// SAFETY: as above.
+unsafe impl Plain for [i32; 2] {}
+// SAFETY: as above.
+unsafe impl Plain for [i32; 3] {}
+// SAFETY: as above.
+unsafe impl Plain for [f32; 512] {}
+// SAFETY: as above.
+unsafe impl Plain for [[f32; 3]; 512] {}
+// SAFETY: as above.
+unsafe impl Plain for [u64; 8] {}
+// SAFETY: as above.
+unsafe impl Plain for [u32; 3] {}
+
+/// Most memory that one array may span (bytes): the largest pointer offset.
+const MOST: usize = isize::MAX as usize;
+
+/// Bytes between elements, when all of them can be reached.
+fn stride<T>(name: &str, data: *const c_void, count: usize, stride: usize) -> Outcome<usize> {
+    let size = size_of::<T>();
+    let stride = if stride == 0 { size } else { stride };
+    if stride < size {
+        return Err(Failure::argument(format!(
+            "{name}: the stride of {stride} bytes is less than an element's {size}"
+        )));
+    }
+    let span = (count.max(1) - 1).checked_mul(stride).and_then(|bytes| bytes.checked_add(size));
+    if span.is_none_or(|span| span > MOST || (data as usize).checked_add(span).is_none()) {
+        return Err(Failure::argument(format!(
+            "{name}: {count} elements of {stride} bytes are more than a memory holds"
+        )));
+    }
+    if data.is_null() && count > 0 {
+        return Err(Failure::argument(format!("{name}: the data is NULL, but the count is {count}")));
+    }
+    Ok(stride)
+}
+
+impl frz_view {
+    /// No elements.
+    pub(in crate::capi) const NONE: Self = Self { data: std::ptr::null(), count: 0, stride: 0 };
+
+    /// The elements, copied.
+    ///
+    /// # Safety
+    /// The view must describe memory that can be read.
+    pub(in crate::capi) unsafe fn elements<T: Plain>(&self, name: &str) -> Outcome<Vec<T>> {
+        // SAFETY: the caller's promise.
+        let elements = unsafe { self.in_place::<T>(name) }?;
+        let mut out = Vec::new();
+        out.try_reserve_exact(self.count)
+            .map_err(|_| Failure::argument(format!("{name}: {} elements do not fit", self.count)))?;
+        out.extend(elements);
+        Ok(out)
+    }
+
+    /// The elements one after another, read where they lie.
+    ///
+    /// # Safety
+    /// The view must describe memory that can be read, for `'a`.
+    pub(in crate::capi) unsafe fn in_place<'a, T: Plain>(
+        &self,
+        name: &str,
+    ) -> Outcome<impl ExactSizeIterator<Item = T> + Clone + use<'a, T>> {
+        let stride = stride::<T>(name, self.data, self.count, self.stride)?;
+        let first = self.data.cast::<u8>();
+        // SAFETY: the caller's promise, and the whole span was checked to be one that pointers can reach.
+        let element = move |index: usize| unsafe { first.add(index * stride).cast::<T>().read_unaligned() };
+        Ok((0..self.count).map(element))
+    }
+
+    /// Packed bytes where they lie.
+    ///
+    /// # Safety
+    /// As [`frz_view::in_place`].
+    pub(in crate::capi) unsafe fn bytes<'a>(&self, name: &str) -> Outcome<&'a [u8]> {
+        stride::<u8>(name, self.data, self.count, 1)?;
+        if self.count == 0 {
+            return Ok(&[]);
+        }
+        // SAFETY: the caller's promise, and all of them can be reached.
+        Ok(unsafe { std::slice::from_raw_parts(self.data.cast(), self.count) })
+    }
+
+    /// Positions or other triples, all finite.
+    ///
+    /// # Safety
+    /// As [`frz_view::elements`].
+    pub(in crate::capi) unsafe fn finite(&self, name: &str) -> Outcome<Vec<[f32; 3]>> {
+        // SAFETY: the caller's promise.
+        let elements = unsafe { self.elements::<[f32; 3]>(name) }?;
+        match elements.iter().position(|triple| !triple.iter().all(|number| number.is_finite())) {
+            Some(at) => Err(Failure::argument(format!("{name}: element {at} is not finite"))),
+            None => Ok(elements),
+        }
+    }
+}
+
+impl frz_span {
+    /// Writes elements, if there is room for all of them.
+    ///
+    /// # Safety
+    /// The span must describe memory that can be written.
+    pub(in crate::capi) unsafe fn fill<T: Plain>(&self, name: &str, elements: &[T]) -> Outcome {
+        // SAFETY: the caller's promise.
+        unsafe { self.put(name, elements.iter().copied()) }
+    }
+
+    /// Refuses a span that has no room for so many elements.
+    pub(in crate::capi) fn check_room(&self, name: &str, needed: usize) -> Outcome {
+        if self.count < needed {
+            let text = format!("{name}: there is room for {} elements, {needed} are needed", self.count);
+            return Err(Failure::new(FRZ_ERROR_CAPACITY, text));
+        }
+        Ok(())
+    }
+
+    /// As [`frz_span::fill`], one after another.
+    ///
+    /// # Safety
+    /// As [`frz_span::fill`].
+    pub(in crate::capi) unsafe fn put<T: Plain>(
+        &self,
+        name: &str,
+        elements: impl ExactSizeIterator<Item = T>,
+    ) -> Outcome {
+        self.check_room(name, elements.len())?;
+        let stride = stride::<T>(name, self.data, elements.len(), self.stride)?;
+        let first = self.data.cast::<u8>();
+        for (index, element) in elements.enumerate() {
+            // SAFETY: the caller's promise, and the whole span was checked to be one that pointers can reach.
+            unsafe { first.add(index * stride).cast::<T>().write_unaligned(element) };
+        }
+        Ok(())
+    }
+
+    /// Packed, aligned numbers to be written in place, `width` an element; none where the data are NULL.
+    ///
+    /// # Safety
+    /// As [`frz_span::fill`], for `'a`; nothing else may use the memory meanwhile.
+    pub(in crate::capi) unsafe fn numbers<'a, T: Plain>(
+        &self,
+        name: &str,
+        width: usize,
+    ) -> Outcome<Option<&'a mut [T]>> {
+        if self.data.is_null() {
+            return Ok(None);
+        }
+        let packed = width * size_of::<T>();
+        if self.stride != 0 && self.stride != packed {
+            let stride = self.stride;
+            return Err(Failure::argument(format!(
+                "{name}: the stride of {stride} bytes is not {packed}, that of packed elements"
+            )));
+        }
+        let first = self.data.cast::<T>();
+        if !first.is_aligned() {
+            let text = format!("{name}: the data are not aligned to {} bytes", align_of::<T>());
+            return Err(Failure::argument(text));
+        }
+        let count = self.count.saturating_mul(width);
+        stride::<T>(name, self.data, count, 0)?;
+        // SAFETY: the caller's promise, and all of it can be reached.
+        Ok(Some(unsafe { std::slice::from_raw_parts_mut(first, count) }))
+    }
+
+    /// Reports how many elements there are, and writes them unless the span's data are NULL.
+    ///
+    /// # Safety
+    /// As [`frz_span::fill`]; `count` must be writable.
+    pub(in crate::capi) unsafe fn list<T: Plain>(
+        &self,
+        count: *mut usize,
+        total: usize,
+        elements: impl FnOnce() -> Outcome<Vec<T>>,
+    ) -> Outcome {
+        // SAFETY: the caller's promise.
+        unsafe {
+            if self.data.is_null() {
+                count.write(total);
+                return Ok(());
+            }
+            let elements = elements()?;
+            count.write(elements.len());
+            self.fill("dst", &elements)
+        }
+    }
+}
+
+/// Writes bytes to the host, or reports how many there are: with `dst` NULL, `size` becomes `bound` at least.
+///
+/// # Safety
+/// `dst` must be NULL or have room for `capacity` bytes; `size` must be NULL or point to a number.
+pub(in crate::capi) unsafe fn write_bytes<B: AsRef<[u8]>>(
+    dst: *mut c_void,
+    capacity: usize,
+    size: *mut usize,
+    bound: impl FnOnce() -> usize,
+    bytes: impl FnOnce() -> Outcome<B>,
+) -> Outcome {
+    let size = super::handle::required(size, "size")?;
+    // SAFETY: the caller's promise, and it is not NULL.
+    let tell = |count: usize| unsafe { size.write(count) };
+    tell(0);
+    if dst.is_null() {
+        tell(bound());
+        return Ok(());
+    }
+    let bytes = bytes()?;
+    let bytes = bytes.as_ref();
+    tell(bytes.len());
+    if capacity < bytes.len() {
+        let text = format!("there is room for {capacity} bytes, {} are needed", bytes.len());
+        return Err(Failure::new(FRZ_ERROR_CAPACITY, text));
+    }
+    // SAFETY: the caller's promise.
+    unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), dst.cast(), bytes.len()) };
+    Ok(())
+}
+
+/// Refuses a value that is not finite, by its name.
+pub(in crate::capi) fn finite(name: &str, value: f64) -> Outcome {
+    if value.is_finite() { Ok(()) } else { Err(Failure::argument(format!("{name} is not finite"))) }
+}
+
+/// Refuses a number that is not finite, or outside its range.
+pub(in crate::capi) fn within(name: &str, value: f64, range: RangeInclusive<f64>, unit: &str) -> Outcome {
+    finite(name, value)?;
+    if !range.contains(&value) {
+        let (low, high) = range.into_inner();
+        let (value, low, high) = (digits::given(value), digits::end(low), digits::end(high));
+        return Err(Failure::argument(format!("{name} = {value} is not within {low} to {high}{unit}")));
+    }
+    Ok(())
+}
+
+/// The value for a number of a host's enum.
+pub(in crate::capi) fn meaning<T: Copy>(
+    name: &str,
+    kind: &str,
+    number: u32,
+    known: &[(u32, T)],
+) -> Outcome<T> {
+    let found = known.iter().find(|(known, _)| *known == number);
+    found
+        .map(|(_, meaning)| *meaning)
+        .ok_or_else(|| Failure::argument(format!("{name} = {number} is not a value of {kind}")))
+}
+
+/// A text of the host; none for NULL.
+///
+/// # Safety
+/// The pointer must be NULL or point to a text that ends with a zero.
+pub(in crate::capi) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Outcome<Option<&'a str>> {
+    if pointer.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: the caller's promise.
+    let text = unsafe { CStr::from_ptr(pointer) };
+    text.to_str().map(Some).map_err(|_| Failure::argument(format!("{name} is not valid UTF-8")))
+}
+
+/// A text that the host must give.
+///
+/// # Safety
+/// As [`text`].
+pub(in crate::capi) unsafe fn required_text<'a>(pointer: *const c_char, name: &str) -> Outcome<&'a str> {
+    // SAFETY: the caller's promise.
+    unsafe { text(pointer, name) }?.ok_or_else(|| Failure::argument(format!("{name} is NULL")))
+}
+
+/// A struct that begins with its own size: a host's header may be older or newer than this library.
+///
+/// # Safety
+/// The struct must be `repr(C)`, begin with a `u32` of its size, and consist of numbers and pointers for which all
+/// zeroes are a value.
+pub(in crate::capi) unsafe trait Sized32: Copy {
+    /// Sizes that a header may give: after the fields of each version.
+    const SIZES: &'static [usize];
+    /// Its name in messages.
+    const NAME: &'static str;
+}
+
+/// A host's struct over defaults: fields that its header does not have keep them.
+///
+/// # Safety
+/// The pointer must be NULL or point to a struct of the size in its struct_size.
+pub(in crate::capi) unsafe fn sized<T: Sized32>(pointer: *const T, mut defaults: T) -> Outcome<T> {
+    let pointer = super::handle::required(pointer.cast_mut(), T::NAME)?;
+    // SAFETY: the caller's promise: a size is there at least.
+    let size = unsafe { pointer.cast::<u32>().read_unaligned() } as usize;
+    check_size::<T>(size)?;
+    // SAFETY: so many bytes are there, and no more than the struct has are copied.
+    unsafe {
+        std::ptr::copy_nonoverlapping(
+            pointer.cast::<u8>(),
+            (&raw mut defaults).cast::<u8>(),
+            size.min(size_of::<T>()),
+        );
+    }
+    let beyond = size.saturating_sub(size_of::<T>());
+    // SAFETY: as above: the bytes up to the size that the struct says.
+    let newer = unsafe { std::slice::from_raw_parts(pointer.cast::<u8>().add(size - beyond), beyond) };
+    if newer.iter().any(|&byte| byte != 0) {
+        let text = format!(
+            "{}: fields are set that this library does not have; it is older than the header",
+            T::NAME
+        );
+        return Err(Failure::new(FRZ_ERROR_VERSION, text));
+    }
+    Ok(defaults)
+}
+
+/// Fills a host's struct, as far as its header knows it.
+///
+/// # Safety
+/// The pointer must be NULL or have room for the bytes that the struct, or `size`, says.
+pub(in crate::capi) unsafe fn fill<T: Sized32>(pointer: *mut T, size: Option<usize>, value: T) -> Outcome {
+    let pointer = super::handle::required(pointer, T::NAME)?;
+    // SAFETY: the caller's promise.
+    let size = size.unwrap_or_else(|| unsafe { pointer.cast::<u32>().read_unaligned() } as usize);
+    check_size::<T>(size)?;
+    // SAFETY: as many bytes are there.
+    unsafe {
+        pointer.cast::<u8>().write_bytes(0, size);
+        std::ptr::copy_nonoverlapping(
+            (&raw const value).cast::<u8>(),
+            pointer.cast::<u8>(),
+            size.min(size_of::<T>()),
+        );
+        pointer.cast::<u32>().write_unaligned(size as u32);
+    }
+    Ok(())
+}
+
+/// Largest struct that a newer header is believed to have (bytes).
+const LARGEST: usize = 4096;
+
+/// Refuses sizes that no version of a struct has.
+pub(in crate::capi) fn check_size<T: Sized32>(size: usize) -> Outcome {
+    let known = T::SIZES.contains(&size) || (size > size_of::<T>() && size <= LARGEST);
+    if !known {
+        let text = format!("{}: struct_size = {size} is that of no version", T::NAME);
+        return Err(Failure::new(FRZ_ERROR_VERSION, text));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[repr(C)]
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    struct Params {
+        struct_size: u32,
+        first: f32,
+        second: u64,
+    }
+
+    // SAFETY: numbers only.
+    unsafe impl Sized32 for Params {
+        const SIZES: &'static [usize] = &[8, 16];
+        const NAME: &'static str = "params";
+    }
+
+    const DEFAULTS: Params = Params { struct_size: 16, first: 1.0, second: 2 };
+
+    #[test]
+    fn older_headers_get_defaults_and_newer_ones_are_read_as_far_as_known() {
+        // SAFETY: all structs have the bytes that they say.
+        unsafe {
+            let older = Params { struct_size: 8, first: 5.0, second: u64::MAX };
+            assert_eq!(
+                sized(&older, DEFAULTS).ok().unwrap(),
+                Params { struct_size: 8, first: 5.0, second: 2 }
+            );
+            let mut newer = [0u64; 4];
+            newer[0] = 32;
+            newer[1] = 9;
+            let pointer = newer.as_ptr().cast::<Params>();
+            assert_eq!(sized(pointer, DEFAULTS).ok().unwrap().second, 9);
+            newer[3] = 1;
+            let pointer = newer.as_ptr().cast::<Params>();
+            assert_eq!(sized(pointer, DEFAULTS).err().unwrap().status, FRZ_ERROR_VERSION);
+            for size in [0, 4, 12, 5000, u32::MAX] {
+                let odd = Params { struct_size: size, ..DEFAULTS };
+                assert_eq!(sized(&odd, DEFAULTS).err().unwrap().status, FRZ_ERROR_VERSION);
+            }
+        }
+    }
+
+    #[test]
+    fn views_are_read_with_their_stride_and_wild_ones_are_refused() {
+        let bytes: Vec<u8> = (0..64).collect();
+        let view =
+            |offset: usize, count, stride| frz_view { data: bytes[offset..].as_ptr().cast(), count, stride };
+        // SAFETY: the good views lie within the bytes; the others are refused before they are followed.
+        unsafe {
+            assert_eq!(
+                view(1, 3, 16).elements::<u32>("n").ok().unwrap(),
+                [0x0403_0201, 0x1413_1211, 0x2423_2221]
+            );
+            assert_eq!(view(0, 2, 0).elements::<u32>("n").ok().unwrap().len(), 2);
+            assert!(view(0, 2, 3).elements::<u32>("n").is_err());
+            assert!(view(0, usize::MAX, 8).elements::<u32>("n").is_err());
+            assert!(view(0, usize::MAX / 4, 4).elements::<u32>("n").is_err());
+            assert!(frz_view { count: 1, ..frz_view::NONE }.elements::<u32>("n").is_err());
+            assert!(frz_view::NONE.elements::<u32>("n").ok().unwrap().is_empty());
+        }
+        let mut room = [7u8; 12];
+        let span = frz_span { data: room.as_mut_ptr().cast(), count: 2, stride: 6 };
+        // SAFETY: the span lies within the room.
+        unsafe {
+            assert!(span.fill("n", &[1u32, 2]).is_ok());
+            assert_eq!(span.fill("n", &[1u32, 2, 3]).err().unwrap().status, FRZ_ERROR_CAPACITY);
+        }
+        assert_eq!(room, [1, 0, 0, 0, 7, 7, 2, 0, 0, 0, 7, 7]);
+    }
+}

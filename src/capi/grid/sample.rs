@@ -1,0 +1,302 @@
+//! Grids as numbers and meshes: samples, and the triangles along their surface.
+
+use std::ffi::c_char;
+
+use super::leaves::check_origin;
+use super::sparse::frz_grid;
+use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{Changing, change, read, required};
+use crate::capi::ffi::views::{frz_span, frz_view, meaning, text, within};
+use crate::capi::mesh::triangles::{Mesh, frz_mesh};
+use crate::capi::runtime::context::{creates, enter, frz_context};
+use crate::context::Context;
+use crate::error::Result;
+use crate::geometry::{DVec3, TriMesh};
+use crate::vdb::{FloatGrid, GridRef, VectorGrid, level_set};
+
+/// How values between voxels are found.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_sampling {
+    /// The value of the voxel that holds the position.
+    FRZ_SAMPLE_NEAREST = 0,
+    /// Trilinear between voxel centres.
+    FRZ_SAMPLE_LINEAR = 1,
+}
+
+/// Whether values are to be trilinear.
+fn sampling_of(sampling: u32) -> Outcome<bool> {
+    let known =
+        [(frz_sampling::FRZ_SAMPLE_NEAREST as u32, false), (frz_sampling::FRZ_SAMPLE_LINEAR as u32, true)];
+    meaning("sampling", "frz_sampling", sampling, &known)
+}
+
+/// Positions (m), all finite.
+///
+/// # Safety
+/// The view must describe memory that can be read.
+unsafe fn positions_of(positions: &frz_view) -> Outcome<Vec<DVec3>> {
+    // SAFETY: the caller's promise.
+    let positions = unsafe { positions.finite("positions") }?;
+    Ok(positions.iter().map(|&p| DVec3::from(p.map(f64::from))).collect())
+}
+
+/// Positions that are sampled at once: between them a cancel is heeded, and the part that is done is known.
+const PIECE: usize = 1 << 16;
+
+/// Values at positions (m), piece by piece.
+fn in_pieces<T: Clone + Send>(
+    ctx: &Context,
+    positions: &[DVec3],
+    sample: impl Fn(&[DVec3]) -> Result<Vec<T>> + Send + Sync,
+) -> Outcome<Vec<T>> {
+    let bytes = size_of::<DVec3>() + size_of::<T>();
+    ctx.allow("the samples", (positions.len() as u64).saturating_mul(bytes as u64))?;
+    Ok(ctx.phase("sample", || {
+        ctx.expect(positions.len().div_ceil(PIECE));
+        let mut out = Vec::with_capacity(positions.len());
+        for piece in positions.chunks(PIECE) {
+            ctx.check()?;
+            out.extend(sample(piece)?);
+            ctx.advance();
+        }
+        Ok(out)
+    })?)
+}
+
+fn sampled(ctx: &Context, grid: &FloatGrid, positions: &[DVec3], sampling: u32) -> Outcome<Vec<f32>> {
+    let linear = sampling_of(sampling)?;
+    in_pieces(ctx, positions, |piece| {
+        let mut values = Vec::new();
+        match linear {
+            false => grid.sample_nearest(ctx, piece, &mut values)?,
+            true => grid.sample_linear(ctx, piece, &mut values)?,
+        }
+        Ok(values)
+    })
+}
+
+fn sampled_vectors(
+    ctx: &Context,
+    grid: &VectorGrid,
+    positions: &[DVec3],
+    sampling: u32,
+) -> Outcome<Vec<[f32; 3]>> {
+    let linear = sampling_of(sampling)?;
+    in_pieces(ctx, positions, |piece| grid.sample(ctx, piece, linear))
+}
+
+/// Values of a grid of floats at world positions.
+///
+/// positions: float[3] for each (m), finite.
+/// sampling: a frz_sampling.
+/// dst: room for as many floats.
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_sample(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    positions: frz_view,
+    sampling: u32,
+    dst: frz_span,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let call = enter(context)?;
+            let ctx = call.ctx();
+            let held = read(grid)?;
+            let grid = held.floats()?;
+            let positions = positions_of(&positions)?;
+            dst.fill("dst", &sampled(ctx, grid, &positions, sampling)?)
+        }
+    })
+}
+
+/// Vectors of a grid at world positions. Components of a staggered grid are found where they lie.
+///
+/// positions: float[3] for each (m), finite.
+/// sampling: a frz_sampling.
+/// dst: room for as many float[3].
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_sample_vectors(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    positions: frz_view,
+    sampling: u32,
+    dst: frz_span,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let call = enter(context)?;
+            let held = read(grid)?;
+            let grid = held.vectors()?;
+            let positions = positions_of(&positions)?;
+            dst.fill("dst", &sampled_vectors(call.ctx(), grid, &positions, sampling)?)
+        }
+    })
+}
+
+/// Gives a mesh's vertices an attribute: a grid's values there, one float each, or three of a grid of vectors.
+///
+/// mesh: gets the attribute, in the place of one of the same name.
+/// sampling: a frz_sampling.
+/// name: of the attribute, UTF-8; NULL for the grid's own.
+///
+/// Any number of threads may read a grid; one thread at a time for each mesh and context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_sample_mesh(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    mesh: *mut frz_mesh,
+    sampling: u32,
+    name: *const c_char,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let call = enter(context)?;
+            let ctx = call.ctx();
+            let held = read(grid)?;
+            let mut mesh: Changing<'_, Mesh> = change(mesh)?;
+            let name = match text(name, "name")? {
+                Some(name) => name.to_string(),
+                None => held.any().name(),
+            };
+            if name.is_empty() {
+                return Err(Failure::argument("name: neither it nor the grid has one"));
+            }
+            let positions: Vec<DVec3> = mesh.triangles.positions.iter().map(|p| p.cast()).collect();
+            let (components, values) = match held.any() {
+                GridRef::Floats(grid) => (1, sampled(ctx, grid, &positions, sampling)?),
+                GridRef::Vectors(grid) => {
+                    (3, sampled_vectors(ctx, grid, &positions, sampling)?.into_flattened())
+                }
+            };
+            mesh.set_attribute(&name, components, values);
+            Ok(())
+        }
+    })
+}
+
+/// Bytes of a leaf's part of a mesh, while it is made.
+const BYTES_PER_LEAF: u64 = 6000;
+
+/// A function of the interface that makes a mesh of a grid.
+///
+/// # Safety
+/// The pointers must be NULL or the caller's.
+unsafe fn meshes(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    [iso, adaptivity]: [f32; 2],
+    out: *mut *mut frz_mesh,
+    make: impl FnOnce(&Context, &FloatGrid) -> Outcome<TriMesh>,
+) -> frz_status {
+    // SAFETY: the caller's promise.
+    unsafe {
+        creates(context, out, |ctx| {
+            let held = read(grid)?;
+            let grid = held.floats()?;
+            if !iso.is_finite() {
+                return Err(Failure::argument("iso is not finite"));
+            }
+            within("adaptivity", f64::from(adaptivity), 0.0..=1.0, "")?;
+            Ok(Mesh::of_triangles(make(ctx, grid)?))
+        })
+    }
+}
+
+/// Makes a mesh of triangles along the surface of a grid of floats, counter-clockwise seen from outside, also where the grid's transform
+/// mirrors.
+///
+/// A cancel is heeded before and after the work, not within.
+///
+/// iso: the value at the surface; of a level set a distance (m), 0 for its surface. Finite.
+/// adaptivity: 0 to 1; above 0 flat regions get fewer and larger triangles.
+/// out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure. It has no faces where there
+///     is no surface.
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_to_mesh(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    iso: f32,
+    adaptivity: f32,
+    out: *mut *mut frz_mesh,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        meshes(context, grid, [iso, adaptivity], out, |ctx, grid| {
+            ctx.allow("a mesh of the grid", grid.leaf_count() as u64 * BYTES_PER_LEAF)?;
+            Ok(ctx.phase("mesh", || level_set::to_mesh(ctx, grid, iso, adaptivity))?)
+        })
+    }
+}
+
+/// As frz_grid_to_mesh, of the voxels in a box. The meshes of boxes beside each other meet; each triangle is in one.
+///
+/// voxel_min: int32_t[3]: the least voxel on each axis.
+/// voxel_max: int32_t[3]: the greatest voxel on each axis, included; not less than voxel_min.
+/// out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_to_mesh_box(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    iso: f32,
+    adaptivity: f32,
+    voxel_min: *const i32,
+    voxel_max: *const i32,
+    out: *mut *mut frz_mesh,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        meshes(context, grid, [iso, adaptivity], out, |ctx, grid| {
+            let corner = |pointer: *const i32, name: &str| -> Outcome<[i32; 3]> {
+                let pointer = required(pointer.cast_mut(), name)?;
+                Ok(pointer.cast::<[i32; 3]>().read_unaligned())
+            };
+            let corners = [corner(voxel_min, "voxel_min")?, corner(voxel_max, "voxel_max")?];
+            if (0..3).any(|axis| corners[0][axis] > corners[1][axis]) {
+                let text = format!("voxel_max = {:?} is less than voxel_min = {:?}", corners[1], corners[0]);
+                return Err(Failure::argument(text));
+            }
+            ctx.allow("a mesh of the grid", grid.leaf_count() as u64 * BYTES_PER_LEAF)?;
+            Ok(ctx.phase("mesh", || level_set::box_to_mesh(ctx, grid, iso, adaptivity, corners))?)
+        })
+    }
+}
+
+/// As frz_grid_to_mesh, of some blocks only, for instance those of frz_base_dirty: the cost grows with their number.
+/// The meshes of different blocks meet; each triangle is in one.
+///
+/// origins: int32_t[3] for each block, multiples of 8.
+/// out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_to_mesh_blocks(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    iso: f32,
+    adaptivity: f32,
+    origins: frz_view,
+    out: *mut *mut frz_mesh,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        meshes(context, grid, [iso, adaptivity], out, |ctx, grid| {
+            let origins = origins.elements::<[i32; 3]>("origins")?;
+            origins.iter().try_for_each(|&origin| check_origin(origin).map(drop))?;
+            ctx.allow("a mesh of the blocks", origins.len() as u64 * BYTES_PER_LEAF)?;
+            Ok(ctx.phase("mesh", || level_set::blocks_to_mesh(ctx, grid, iso, adaptivity, &origins))?)
+        })
+    }
+}

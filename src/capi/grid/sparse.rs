@@ -1,0 +1,291 @@
+//! Sparse grids of floats, and what they have in common with those of vectors.
+
+use std::ffi::{c_char, c_void};
+use std::ptr::NonNull;
+
+use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{Noun, change, clear, destroy, read};
+use crate::capi::ffi::views::{Sized32, fill, finite, text, write_bytes};
+use crate::capi::runtime::context::{creates, frz_context};
+use crate::vdb::{AnyGrid, FloatGrid, GridClass, GridRef, VectorGrid};
+
+/// A sparse grid of 32-bit floats, or of vectors of three of them; voxel (i, j, k) has its centre at (i, j, k) x voxel
+/// size, unless a file brought another transform.
+pub struct frz_grid {
+    _opaque: [u8; 0],
+}
+
+/// The meaning of a grid's values.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_grid_class {
+    /// Not specified.
+    FRZ_GRID_UNKNOWN = 0,
+    /// Signed distances (m), negative inside, cut off at the background.
+    FRZ_GRID_LEVEL_SET = 1,
+    /// A density.
+    FRZ_GRID_FOG = 2,
+    /// Of vectors: component x of voxel (i, j, k) is that at (i - 1/2, j, k), on the voxel's face, y and z likewise.
+    FRZ_GRID_STAGGERED = 3,
+}
+
+/// The type of a grid's values.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_value_type {
+    /// A float.
+    FRZ_VALUE_FLOAT = 0,
+    /// float[3]: a velocity, a wind, a colour. Functions that say nothing of vectors refuse such a grid.
+    FRZ_VALUE_VECTOR = 1,
+}
+
+/// Properties of a grid.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_grid_info {
+    /// sizeof(frz_grid_info), set by the caller.
+    pub struct_size: u32,
+    /// A frz_grid_class.
+    pub grid_class: u32,
+    /// Edge of a voxel (m).
+    pub voxel_size: f64,
+    /// Value where nothing is stored; 0 for vectors.
+    pub background: f32,
+    /// 1 when voxel (0, 0, 0) lies at the origin and the axes are the world's, else 0.
+    pub world_fixed: u32,
+    /// Active voxels, constant blocks counted in full.
+    pub active_voxels: u64,
+    /// Leaves.
+    pub leaf_count: u64,
+    /// Memory (bytes).
+    pub memory_bytes: u64,
+    /// Least active voxel on each axis; all zeroes when there is none.
+    pub voxel_min: [i32; 3],
+    /// Greatest active voxel on each axis, included; all zeroes when there is none.
+    pub voxel_max: [i32; 3],
+    /// A frz_value_type.
+    pub value_type: u32,
+    /// Of vectors the value where nothing is stored; else zeroes.
+    pub background_vector: [f32; 3],
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_grid_info {
+    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_grid_info, value_type), size_of::<Self>()];
+    const NAME: &'static str = "frz_grid_info";
+}
+
+/// The value of a grid's handle.
+pub(in crate::capi) enum Grid {
+    /// The host's own.
+    Own(AnyGrid),
+    /// A part of another object, which keeps it alive and unchanged while it is read.
+    Lent(NonNull<FloatGrid>),
+}
+
+impl Noun for frz_grid {
+    type Value = Grid;
+    const NAME: &'static str = "grid";
+    const TAG: u32 = 0x6672_7a04;
+}
+
+impl From<FloatGrid> for Grid {
+    fn from(grid: FloatGrid) -> Self {
+        Self::Own(AnyGrid::Floats(grid))
+    }
+}
+
+/// The error for a grid whose values a function does not accept.
+fn of_another_kind(name: &str, holds: &str, needed: &str) -> Failure {
+    let name = if name.is_empty() { String::new() } else { format!(" \"{name}\"") };
+    Failure::argument(format!("the grid{name} holds {holds}, but one of {needed} is needed"))
+}
+
+impl Grid {
+    /// The grid, to read, whatever it holds.
+    pub(in crate::capi) fn any(&self) -> GridRef<'_> {
+        match self {
+            Self::Own(grid) => grid.borrow(),
+            // SAFETY: the owner changes it only while it holds this handle to change.
+            Self::Lent(grid) => GridRef::Floats(unsafe { grid.as_ref() }),
+        }
+    }
+
+    /// The grid, to read, if it is one of floats.
+    pub(in crate::capi) fn floats(&self) -> Outcome<&FloatGrid> {
+        match self.any() {
+            GridRef::Floats(grid) => Ok(grid),
+            GridRef::Vectors(grid) => Err(of_another_kind(&grid.name(), "vectors", "floats")),
+        }
+    }
+
+    /// The grid, to read, if it is one of vectors.
+    pub(in crate::capi) fn vectors(&self) -> Outcome<&VectorGrid> {
+        match self.any() {
+            GridRef::Vectors(grid) => Ok(grid),
+            GridRef::Floats(grid) => Err(of_another_kind(&grid.name(), "floats", "vectors")),
+        }
+    }
+
+    /// The grid, to change; what is lent stays as it is.
+    fn own(&mut self) -> Outcome<&mut AnyGrid> {
+        match self {
+            Self::Own(grid) => Ok(grid),
+            Self::Lent(_) => {
+                Err(Failure::argument("the grid belongs to another object: change a copy of it"))
+            }
+        }
+    }
+
+    /// The grid, to change, if it is one of floats.
+    pub(in crate::capi) fn own_floats(&mut self) -> Outcome<&mut FloatGrid> {
+        match self.own()? {
+            AnyGrid::Floats(grid) => Ok(grid),
+            AnyGrid::Vectors(grid) => Err(of_another_kind(&grid.name(), "vectors", "floats")),
+        }
+    }
+}
+
+pub(in crate::capi) const CLASSES: [(u32, GridClass); 4] = [
+    (frz_grid_class::FRZ_GRID_UNKNOWN as u32, GridClass::Unknown),
+    (frz_grid_class::FRZ_GRID_LEVEL_SET as u32, GridClass::LevelSet),
+    (frz_grid_class::FRZ_GRID_FOG as u32, GridClass::Fog),
+    (frz_grid_class::FRZ_GRID_STAGGERED as u32, GridClass::Staggered),
+];
+
+fn number_of(class: GridClass) -> u32 {
+    CLASSES.iter().find(|(_, known)| *known == class).map_or(0, |(number, _)| *number)
+}
+
+/// Checks the edge of a voxel (m).
+pub(in crate::capi) fn check_voxel(voxel: f64) -> Outcome {
+    finite("voxel_size", voxel)?;
+    if !(1e-6..=1e3).contains(&voxel) {
+        return Err(Failure::argument(format!("voxel_size = {voxel} is not within 1e-6 to 1000 m")));
+    }
+    Ok(())
+}
+
+/// Destroys a grid; NULL is fine. A grid that belongs to another object stays.
+///
+/// grid: may be NULL.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_destroy(grid: *mut frz_grid) {
+    // SAFETY: the grid is NULL or was not destroyed.
+    guard(|| unsafe {
+        if let Ok(held) = read(grid.cast_const())
+            && matches!(*held, Grid::Lent(_))
+        {
+            return Err(Failure::argument("the grid belongs to another object"));
+        }
+        destroy(grid)
+    });
+}
+
+/// Copies a grid; the copy shares no memory and belongs to the caller.
+///
+/// grid: of the caller or of another object.
+/// out: receives the copy, to be destroyed with frz_grid_destroy; NULL after a failure.
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_copy(
+    context: *mut frz_context,
+    grid: *const frz_grid,
+    out: *mut *mut frz_grid,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
+            let held = read(grid)?;
+            let source = held.any();
+            ctx.allow("a copy of the grid", source.memory_bytes())?;
+            Ok(Grid::Own(ctx.polled(|| source.deep_copy())?))
+        })
+    }
+}
+
+/// Reports the properties of a grid.
+///
+/// info: receives it; its struct_size says how much of it the caller knows.
+///
+/// Any number of threads may read a grid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_get_info(grid: *const frz_grid, info: *mut frz_grid_info) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let held = read(grid)?;
+            let grid = held.any();
+            let (voxel_min, voxel_max) = grid.active_bbox().unwrap_or_default();
+            let (value_type, background, background_vector) = match grid {
+                GridRef::Floats(grid) => (frz_value_type::FRZ_VALUE_FLOAT, grid.background(), [0.0; 3]),
+                GridRef::Vectors(grid) => (frz_value_type::FRZ_VALUE_VECTOR, 0.0, grid.background()),
+            };
+            let value = frz_grid_info {
+                struct_size: 0,
+                grid_class: number_of(grid.class()),
+                voxel_size: grid.voxel_size(),
+                background,
+                world_fixed: u32::from(grid.is_world_fixed()),
+                active_voxels: grid.active_voxels(),
+                leaf_count: grid.leaf_count() as u64,
+                memory_bytes: grid.memory_bytes(),
+                voxel_min,
+                voxel_max,
+                value_type: value_type as u32,
+                background_vector,
+            };
+            fill(info, None, value)
+        }
+    })
+}
+
+/// Copies a grid's name, in UTF-8 with a zero at its end.
+///
+/// dst: room for capacity bytes; NULL only queries the size. FRZ_ERROR_CAPACITY when it is too small.
+/// capacity: bytes at dst.
+/// size: receives the bytes that are needed, the zero counted; 0 after other failures.
+///
+/// Any number of threads may read a grid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_name(
+    grid: *const frz_grid,
+    dst: *mut c_char,
+    capacity: usize,
+    size: *mut usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(size);
+            let mut name = read(grid)?.any().name().into_bytes();
+            name.push(0);
+            let needed = name.len();
+            write_bytes(dst.cast::<c_void>(), capacity, size, || needed, || Ok(name))
+        }
+    })
+}
+
+/// Names a grid, as files know it.
+///
+/// grid: of the caller.
+/// name: UTF-8; NULL for none.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grid_set_name(grid: *mut frz_grid, name: *const c_char) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let name = text(name, "name")?.unwrap_or("");
+            match change(grid)?.own()? {
+                AnyGrid::Floats(grid) => grid.set_name(name)?,
+                AnyGrid::Vectors(grid) => grid.set_name(name)?,
+            }
+            Ok(())
+        }
+    })
+}

@@ -1,0 +1,349 @@
+//! Moving bodies, as a host describes them for one step.
+
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::views::{Sized32, check_size, fill, finite, frz_view, sized, within};
+use crate::capi::mesh::triangles::{no_flags, polygons};
+use crate::context::Context;
+use crate::error::Result;
+use crate::geometry::mesh::{renumbered, used};
+use crate::geometry::{DVec3, PolygonMesh, Vec3};
+use crate::motion::{Motion, between};
+use crate::snow::grains::Object;
+use crate::sweep::{Body, Shape};
+
+/// Flag of a body: its imprints have no noise.
+pub const FRZ_BODY_EXACT: u32 = 1;
+
+/// Flag of a body: of the snow that it removes, the share frz_body.compression becomes no grains.
+pub const FRZ_BODY_COMPRESSION: u32 = 2;
+
+/// A mesh that moves in the time of one step. All arrays are lent for the call.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_body {
+    /// sizeof(frz_body), the same in all bodies of a call.
+    pub struct_size: u32,
+    /// 0, FRZ_BODY_EXACT, FRZ_BODY_COMPRESSION or both.
+    pub flags: u32,
+    /// A number of the host that stays with the body from step to step, different in all bodies of a call. It saves
+    /// work where a body keeps its faces; results do not depend on it.
+    pub id: u64,
+    /// float[3] for each vertex (m): where it is at the step's beginning. Finite.
+    pub positions: frz_view,
+    /// float[3] for each vertex (m): where it is at the step's end. data NULL: the body rests.
+    pub positions_end: frz_view,
+    /// Poses at equal times between the two, each float[3] for each vertex; vertices move straight from pose to pose.
+    /// NULL for none, as it must be without positions_end.
+    pub between: *const frz_view,
+    /// Number of poses between.
+    pub between_count: usize,
+    /// As in frz_mesh_desc.
+    pub face_counts: frz_view,
+    /// As in frz_mesh_desc. Where open meshes press into snow or are swept they are closed, and a warning says so.
+    pub indices: frz_view,
+    /// Friction of grains against it, 0 to 10; only grains read it. It holds them, and carries them along while the body moves; loose grains
+    /// that slide over one that stands still meet the friction between grains. 0.3 in headers of interface 1.1 and from frz_body_init.
+    pub friction: f64,
+    /// With which it holds grains that touch it (weights of a grain), 0 to 1000; only grains read it.
+    pub stick: f64,
+    /// In place of frz_grains_params.compression, 0 to 1; only with FRZ_BODY_COMPRESSION, and only grains read it. Where several
+    /// bodies that differ in it took the snow, that of the one counts whose surface came nearest to the place.
+    pub compression: f64,
+}
+
+// SAFETY: numbers and pointers.
+unsafe impl Sized32 for frz_body {
+    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_body, friction), size_of::<Self>()];
+    const NAME: &'static str = "frz_body";
+}
+
+impl frz_body {
+    const USUAL: Self = Self {
+        struct_size: 0,
+        flags: 0,
+        id: 0,
+        positions: frz_view::NONE,
+        positions_end: frz_view::NONE,
+        between: std::ptr::null(),
+        between_count: 0,
+        face_counts: frz_view::NONE,
+        indices: frz_view::NONE,
+        friction: 0.3,
+        stick: 0.0,
+        compression: 0.0,
+    };
+}
+
+/// Fills a body with the usual values: none of the arrays, a friction of 0.3.
+///
+/// body: receives them.
+/// size: sizeof(frz_body).
+///
+/// Any thread.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_body_init(body: *mut frz_body, size: usize) -> frz_status {
+    // SAFETY: the body is NULL or has so many bytes.
+    guard(|| unsafe { fill(body, Some(size), frz_body::USUAL) })
+}
+
+// SAFETY: views are numbers and pointers.
+unsafe impl crate::capi::ffi::views::Plain for frz_view {}
+
+/// Most poses between a step's beginning and end.
+const MOST_BETWEEN: usize = 4096;
+
+/// A body of a host: straight motion from pose to pose, the first at time 0, the last at the step's end.
+struct HostMotion {
+    triangles: Vec<[u32; 3]>,
+    poses: Vec<Vec<Vec3>>,
+    /// Length of the step (s).
+    end: f64,
+}
+
+impl HostMotion {
+    /// Poses of all of the host's vertices, of which those that triangles name count.
+    fn new(triangles: Vec<[u32; 3]>, mut poses: Vec<Vec<Vec3>>, end: f64) -> Self {
+        let Some(used) = used(poses[0].len(), &triangles) else { return Self { triangles, poses, end } };
+        for pose in &mut poses {
+            *pose = used.iter().map(|&vertex| pose[vertex as usize]).collect();
+        }
+        Self { triangles: renumbered(&triangles, &used), poses, end }
+    }
+}
+
+impl Motion for HostMotion {
+    fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    fn vertex_count(&self) -> usize {
+        self.poses[0].len()
+    }
+
+    fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        let steps = self.poses.len() - 1;
+        let at = if self.end > 0.0 { (time / self.end).clamp(0.0, 1.0) * steps as f64 } else { 0.0 };
+        // Times of poses come from divisions: rounding must not need a neighbour.
+        let at = if (at - at.round()).abs() < 1e-9 { at.round() } else { at };
+        let (first, part) = (at.floor() as usize, at - at.floor());
+        between(&self.poses[first], &self.poses[(first + 1).min(steps)], part, out);
+        Ok(())
+    }
+
+    fn breaks(&self, from: f64, to: f64) -> Vec<f64> {
+        let steps = self.poses.len() - 1;
+        let times = (1..steps).map(|step| self.end * step as f64 / steps as f64);
+        times.filter(|&time| time > from && time < to).collect()
+    }
+}
+
+/// A body from a host, checked.
+struct Arrived {
+    id: u64,
+    exact: bool,
+    surface: Surface,
+    mesh: PolygonMesh,
+    poses: Vec<Vec<Vec3>>,
+}
+
+/// What grains have of a body.
+#[derive(Clone, Copy)]
+pub(in crate::capi) struct Surface {
+    friction: f64,
+    stick: f64,
+    compression: Option<f64>,
+}
+
+impl Surface {
+    /// A body with this surface.
+    pub(in crate::capi) fn of<'a>(&self, body: &'a Body) -> Object<'a> {
+        Object { stick: self.stick, compression: self.compression, ..Object::new(body, self.friction) }
+    }
+}
+
+/// Shapes of a host's bodies by their ids, kept from step to step.
+pub(in crate::capi) type Shapes = HashMap<u64, Arc<Shape>>;
+
+/// What bodies do in a call.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(in crate::capi) enum Role {
+    /// What they sweep is taken.
+    Sweep,
+    /// They push grains.
+    Push,
+    /// They bound the air and carry it along.
+    Bound,
+}
+
+/// Farthest from the origin (m) that a body that pushes grains or bounds the air may lie.
+const FARTHEST: f32 = 1.0e6;
+
+/// Bodies from a host's arrays, checked, each with its surface; `shapes` are those of earlier calls, and are updated.
+///
+/// # Safety
+/// The bodies must describe memory that can be read.
+pub(in crate::capi) unsafe fn bodies(
+    ctx: &Context,
+    list: *const frz_body,
+    count: usize,
+    dt: f64,
+    role: Role,
+    shapes: &mut Shapes,
+) -> Outcome<Vec<(Body, Surface)>> {
+    finite("dt", dt)?;
+    if dt < 0.0 {
+        return Err(Failure::argument(format!("dt = {dt} is not 0 or more")));
+    }
+    // SAFETY: the caller's promise.
+    let arrived = unsafe { arrived(list, count, dt) }?;
+    if role != Role::Sweep {
+        for (at, body) in arrived.iter().enumerate() {
+            check_far(body).map_err(|failure| named(at, failure))?;
+        }
+    }
+    let bytes = arrived
+        .iter()
+        .map(|body| body.poses.len() * body.poses[0].len() * 12 + body.mesh.corners.len() * 200);
+    ctx.allow("the bodies", bytes.sum::<usize>() as u64)?;
+    let known = &*shapes;
+    let make = |body: Arrived| {
+        ctx.check()?;
+        ctx.advance();
+        let motion = HostMotion::new(body.mesh.triangles(), body.poses, dt);
+        let made = Body::shaped(Box::new(motion), 0.0, known.get(&body.id).cloned())?;
+        Ok((body.id, made.with_noise(!body.exact), body.surface))
+    };
+    let made: Vec<(u64, Body, Surface)> = ctx.phase("bodies", || {
+        ctx.expect(arrived.len());
+        arrived.into_par_iter().map(make).collect::<Result<_>>()
+    })?;
+    made.iter().for_each(|(id, body, _)| warn(ctx, role, *id, body, shapes.get(id)));
+    *shapes = made.iter().map(|(id, body, _)| (*id, body.shape().clone())).collect();
+    Ok(made.into_iter().map(|(_, body, surface)| (body, surface)).collect())
+}
+
+/// Warnings about a body, once for each set of faces.
+fn warn(ctx: &Context, role: Role, id: u64, body: &Body, known: Option<&Arc<Shape>>) {
+    if known.is_some_and(|known| Arc::ptr_eq(known, body.shape())) {
+        return;
+    }
+    for what in body.doubts().map(String::from).into_iter().chain(body.weld_warning()) {
+        ctx.warn(&format!("body {id}: {what}"));
+    }
+    let (loops, edges) = (body.closed_loops(), body.contradictions());
+    if role == Role::Push && loops + edges > 0 {
+        ctx.warn(&format!("body {id}: the mesh has no inside: grains collide with both of its sides"));
+        return;
+    }
+    // Of small holes, which are closed, and of others, which are not, the air is told by a step.
+    if role == Role::Bound {
+        return;
+    }
+    if loops > 0 {
+        ctx.warn(&format!("body {id}: {loops} open loops of the mesh are closed"));
+    }
+    if edges > 0 {
+        ctx.warn(&format!("body {id}: the faces disagree about inside and outside at {edges} edges"));
+    }
+}
+
+/// Refuses a body so far away that its speed could not be computed.
+fn check_far(body: &Arrived) -> Outcome {
+    let is_far = |pose: &[Vec3], vertex: u32| pose[vertex as usize].iter().any(|x| x.abs() > FARTHEST);
+    let far_of =
+        |pose: &Vec<Vec3>| body.mesh.corners.iter().copied().filter(|&vertex| is_far(pose, vertex)).min();
+    match body.poses.iter().find_map(far_of) {
+        None => Ok(()),
+        Some(vertex) => {
+            let text = format!("vertex {vertex} lies more than {FARTHEST} m from the origin along an axis");
+            Err(Failure::argument(text))
+        }
+    }
+}
+
+/// # Safety
+/// As [`bodies`].
+unsafe fn arrived(list: *const frz_body, count: usize, dt: f64) -> Outcome<Vec<Arrived>> {
+    if count == 0 {
+        return Ok(Vec::new());
+    }
+    let first = crate::capi::ffi::handle::required(list.cast_mut(), "bodies")?.cast_const();
+    // SAFETY: the caller's promise: the size of a body is there.
+    let stride = unsafe { first.cast::<u32>().read_unaligned() } as usize;
+    // Checked before it is used: it is the stride of the bodies.
+    check_size::<frz_body>(stride).map_err(|failure| named(0, failure))?;
+    let room = frz_view { data: first.cast(), count, stride };
+    // SAFETY: as above; the sizes must be the same for the bodies to lie one after another.
+    let sizes = unsafe { room.elements::<u32>("bodies") }?;
+    if sizes.iter().any(|&size| size as usize != stride) {
+        return Err(Failure::argument("bodies: their struct_size differs"));
+    }
+    let mut out: Vec<Arrived> = Vec::with_capacity(count);
+    let mut ids = HashSet::with_capacity(count);
+    for at in 0..count {
+        // SAFETY: the caller's promise.
+        let body = unsafe { one(first.byte_add(at * stride), dt) }.map_err(|failure| named(at, failure))?;
+        if !ids.insert(body.id) {
+            return Err(Failure::argument(format!("body {at}: another one has the id {} too", body.id)));
+        }
+        out.push(body);
+    }
+    Ok(out)
+}
+
+/// A failure of one body.
+fn named(at: usize, failure: Failure) -> Failure {
+    Failure { text: format!("body {at}: {}", failure.text), ..failure }
+}
+
+/// # Safety
+/// As [`bodies`].
+unsafe fn one(body: *const frz_body, dt: f64) -> Outcome<Arrived> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let body = sized(body, frz_body::USUAL)?;
+        no_flags(body.flags, FRZ_BODY_EXACT | FRZ_BODY_COMPRESSION)?;
+        within("friction", body.friction, 0.0..=10.0, "")?;
+        within("stick", body.stick, 0.0..=1000.0, "")?;
+        let has_compression = body.flags & FRZ_BODY_COMPRESSION != 0;
+        let compression = has_compression.then_some(body.compression);
+        within("compression", compression.unwrap_or(0.0), 0.0..=1.0, "")?;
+        let surface = Surface { friction: body.friction, stick: body.stick, compression };
+        if body.between_count > MOST_BETWEEN {
+            let text = format!("between_count = {} is more than {MOST_BETWEEN}", body.between_count);
+            return Err(Failure::argument(text));
+        }
+        let mesh = polygons(&body.positions, &body.face_counts, &body.indices)?;
+        let count = mesh.positions.len();
+        let mut poses = vec![mesh.positions.clone()];
+        let moves = !body.positions_end.data.is_null() || body.positions_end.count > 0;
+        if body.between_count > 0 && !moves {
+            return Err(Failure::argument(
+                "between: there are poses, but no positions_end that they lead to",
+            ));
+        }
+        let mut pose = |view: &frz_view, name: &str| {
+            let positions = view.finite(name)?;
+            if positions.len() != count {
+                let text = format!("{name}: {} elements, but there are {count} positions", positions.len());
+                return Err(Failure::argument(text));
+            }
+            poses.push(positions.into_iter().map(Vec3::from).collect());
+            Ok(())
+        };
+        if dt > 0.0 && moves {
+            let list = frz_view { data: body.between.cast(), count: body.between_count, stride: 0 };
+            for view in list.elements::<frz_view>("between")? {
+                pose(&view, "between")?;
+            }
+            pose(&body.positions_end, "positions_end")?;
+        }
+        let exact = body.flags & FRZ_BODY_EXACT != 0;
+        Ok(Arrived { id: body.id, exact, surface, mesh, poses })
+    }
+}

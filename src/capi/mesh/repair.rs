@@ -1,0 +1,141 @@
+//! Meshes with faults become solids.
+
+use super::triangles::{Mesh, frz_mesh};
+use crate::capi::ffi::guard::{Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{clear, give, read, required};
+use crate::capi::ffi::views::{Sized32, fill, within};
+use crate::capi::runtime::context::{enter, frz_context};
+use crate::context::Context;
+use crate::geometry::mesh::attributes::{Number, On};
+use crate::geometry::{DetailedMesh, MeshArray};
+use crate::surface::{RepairReport, Repaired, carry_attributes, repair};
+
+/// What frz_mesh_repair did.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_repair_report {
+    /// sizeof(frz_repair_report), set by the caller.
+    pub struct_size: u32,
+    /// How much more was rebuilt than the cells at fault, and what they need: 0 nothing, 1 a ring of cells around them, 2 the whole
+    /// parts of the mesh that pass through them, 3 everything.
+    pub rung: u32,
+    /// Vertices joined with others that are the same corner: at the same position, or on open edges within rounding of it.
+    pub joined_vertices: u64,
+    /// Triangles left out: without area, doubled or alone, and those of parts that lay on a part like them.
+    pub dropped_triangles: u64,
+    /// Triangles turned round so that they agree with their neighbours.
+    pub turned_triangles: u64,
+    /// Parts turned outward as a whole.
+    pub turned_parts: u64,
+    /// Holes that were closed.
+    pub holes: u64,
+    /// Triangles that close them.
+    pub added_triangles: u64,
+    /// Cells in which the mesh was at fault.
+    pub flagged_cells: u64,
+    /// Cells in which it was rebuilt.
+    pub rebuilt_cells: u64,
+    /// Triangles that are still there as they were.
+    pub kept_triangles: u64,
+    /// Triangles that were made and have an altitude below 1e-4 of an edge.
+    pub slivers: u64,
+    /// Edge of the cells (m): the one asked for, or a part of it where nothing would have been left.
+    pub cell: f64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_repair_report {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_repair_report";
+}
+
+impl frz_repair_report {
+    fn of(report: &RepairReport) -> Self {
+        let done = &report.prepared;
+        Self {
+            struct_size: 0,
+            rung: report.rung as u32,
+            joined_vertices: done.joined_vertices as u64,
+            dropped_triangles: done.dropped_triangles as u64,
+            turned_triangles: done.turned_triangles as u64,
+            turned_parts: done.turned_parts as u64,
+            holes: done.holes as u64,
+            added_triangles: done.added_triangles as u64,
+            flagged_cells: report.flagged_cells as u64,
+            rebuilt_cells: report.rebuilt_cells as u64,
+            kept_triangles: report.kept_triangles as u64,
+            slivers: report.slivers as u64,
+            cell: report.cell,
+        }
+    }
+}
+
+/// Makes a closed mesh of one that is open, crosses itself, or is inside out in parts: the solid where, with each part turned
+/// outward, a point lies inside of at least one. Parts that overlap become one, holes are closed, cavities are filled.
+///
+/// The mesh is rebuilt in the cells of a grid where it is at fault, and within a cell of that solid; all its other triangles stay as
+/// they are. Vertices that are still there keep their order and their attributes; attributes of those that were made are what the
+/// mesh had at the nearest place. All faces of the result are triangles, each edge has two of them that agree about which side is
+/// out, and each vertex one fan of them.
+///
+/// mesh: it stays as it is.
+/// cell: edge of a cell (m), 1e-9 to 1e6, about as long as the mesh's edges: what is thinner may be lost where it is rebuilt.
+///     FRZ_ERROR_ARGUMENT where the mesh reaches farther than 131072 cells from its middle, encloses nothing, or nearly all of it would
+///     be lost. Where less is lost a warning says so: half of the volume, or a twentieth of its extent and two cells.
+/// out: receives the new mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
+/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+///
+/// Any number of threads may read a mesh; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mesh_repair(
+    context: *mut frz_context,
+    mesh: *const frz_mesh,
+    cell: f64,
+    out: *mut *mut frz_mesh,
+    report: *mut frz_repair_report,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(out);
+            if !report.is_null() {
+                fill(report, None, frz_repair_report::of(&RepairReport::default()))?;
+            }
+            let call = enter(context)?;
+            required(out, "out")?;
+            let mesh = read(mesh)?;
+            within("cell", cell, 1e-9..=1e6, " m")?;
+            let (repaired, done) = repaired(call.ctx(), &mesh, cell)?;
+            give(out, repaired)?;
+            if report.is_null() { Ok(()) } else { fill(report, None, frz_repair_report::of(&done)) }
+        }
+    })
+}
+
+/// A repaired mesh with its attributes, and what was done.
+fn repaired(ctx: &Context, mesh: &Mesh, cell: f64) -> Outcome<(Mesh, RepairReport)> {
+    let Repaired { mesh: solid, vertices, sources, report } = repair(ctx, &mesh.triangles, cell)?;
+    if let Some(what) = report.losses.warning(report.cell) {
+        ctx.warn(&what);
+    }
+    // One array for each component: they are carried one by one.
+    let arrays = mesh.attributes().flat_map(|(name, components, values)| {
+        (0..components).map(move |component| {
+            let values = values.iter().skip(component).step_by(components).map(|value| f64::from(*value));
+            MeshArray { name: name.into(), on: On::Vertices, number: Number::F32, values: values.collect() }
+        })
+    });
+    let detail = DetailedMesh { mesh: mesh.triangles.clone(), uvs: None, arrays: arrays.collect() };
+    let carry = || Ok(carry_attributes(&detail, solid, &vertices, &sources, None));
+    let DetailedMesh { mesh: solid, arrays, .. } = ctx.phase("carry", carry)?;
+    let count = solid.positions.len();
+    let mut out = Mesh::of_triangles(solid);
+    let mut arrays = &arrays[..];
+    for (name, components, _) in mesh.attributes() {
+        let (own, rest) = arrays.split_at(components);
+        let of_vertex = |vertex: usize| own.iter().map(move |array| array.values[vertex] as f32);
+        out.set_attribute(name, components, (0..count).flat_map(of_vertex).collect());
+        arrays = rest;
+    }
+    Ok((out, report))
+}

@@ -1,0 +1,455 @@
+//! Meshes.
+
+use std::ffi::c_char;
+
+use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{Noun, destroy, read};
+use crate::capi::ffi::views::{Plain, Sized32, fill, frz_span, frz_view, meaning, sized, text};
+use crate::capi::runtime::context::{creates, frz_context};
+use crate::context::Context;
+use crate::geometry::{PolygonMesh, TriMesh, Vec3};
+
+/// A mesh of polygons with attributes of its vertices.
+pub struct frz_mesh {
+    _opaque: [u8; 0],
+}
+
+/// Numbers of each vertex under a name.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_attribute {
+    /// Name in UTF-8, not empty.
+    pub name: *const c_char,
+    /// Floats of each vertex, 1 to 4.
+    pub components: u32,
+    /// So many floats for each vertex of the mesh, finite or not.
+    pub values: frz_view,
+}
+
+/// Description of a new mesh.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_mesh_desc {
+    /// sizeof(frz_mesh_desc).
+    pub struct_size: u32,
+    /// 0.
+    pub flags: u32,
+    /// float[3] for each vertex (m), finite.
+    pub positions: frz_view,
+    /// uint32_t for each face: its number of corners. data NULL: all faces are triangles. Faces of fewer than three
+    /// corners are passed over.
+    pub face_counts: frz_view,
+    /// uint32_t for each corner of each face, counter-clockwise seen from outside: a vertex.
+    pub indices: frz_view,
+    /// Attributes; NULL for none.
+    pub attributes: *const frz_attribute,
+    /// Number of attributes.
+    pub attribute_count: usize,
+}
+
+// SAFETY: numbers and pointers; room between fields is never looked at.
+unsafe impl Plain for frz_attribute {}
+
+// SAFETY: numbers and pointers.
+unsafe impl Sized32 for frz_mesh_desc {
+    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_mesh_desc, attributes), size_of::<Self>()];
+    const NAME: &'static str = "frz_mesh_desc";
+}
+
+/// Properties of a mesh.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_mesh_info {
+    /// sizeof(frz_mesh_info), set by the caller.
+    pub struct_size: u32,
+    /// 1 when every edge is used as often in one direction as in the other, else 0.
+    pub closed: u32,
+    /// Vertices.
+    pub vertex_count: u64,
+    /// Faces.
+    pub face_count: u64,
+    /// Corners of all faces.
+    pub corner_count: u64,
+    /// Triangles that the faces are cut into.
+    pub triangle_count: u64,
+    /// Attributes.
+    pub attribute_count: u64,
+    /// Least corner of the box around the vertices (m).
+    pub box_min: [f32; 3],
+    /// Greatest corner (m).
+    pub box_max: [f32; 3],
+    /// Surface (m2).
+    pub area: f64,
+    /// Enclosed volume (m3); it means something for closed meshes only.
+    pub volume: f64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_mesh_info {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_mesh_info";
+}
+
+/// Arrays that frz_mesh_read reads.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_mesh_part {
+    /// float[3] for each vertex (m).
+    FRZ_MESH_POSITIONS = 0,
+    /// uint32_t for each face: its number of corners.
+    FRZ_MESH_FACE_COUNTS = 1,
+    /// uint32_t for each corner: a vertex.
+    FRZ_MESH_INDICES = 2,
+    /// uint32_t[3] for each triangle that the faces are cut into: vertices.
+    FRZ_MESH_TRIANGLES = 3,
+    /// float[3] for each vertex: the outward unit normal, a mean over the triangles around it weighted by their areas;
+    /// zeroes where there is none.
+    FRZ_MESH_NORMALS = 4,
+}
+
+/// The value of a mesh's handle.
+pub(in crate::capi) struct Mesh {
+    polygons: PolygonMesh,
+    /// Its faces as triangles, cut once.
+    pub triangles: TriMesh,
+    attributes: Vec<Attribute>,
+}
+
+struct Attribute {
+    name: String,
+    components: usize,
+    values: Vec<f32>,
+}
+
+impl Noun for frz_mesh {
+    type Value = Mesh;
+    const NAME: &'static str = "mesh";
+    const TAG: u32 = 0x6672_7a03;
+}
+
+impl Mesh {
+    /// A mesh that the library made.
+    pub(in crate::capi) fn of_triangles(triangles: TriMesh) -> Self {
+        let mut polygons = PolygonMesh { positions: triangles.positions.clone(), ..PolygonMesh::default() };
+        triangles.triangles.iter().for_each(|triangle| polygons.push(*triangle));
+        Self { polygons, triangles, attributes: Vec::new() }
+    }
+
+    /// The numbers of an attribute with so many components; none without such a one.
+    pub(in crate::capi) fn attribute(&self, name: &str, components: usize) -> Option<&[f32]> {
+        let is_it = |attribute: &&Attribute| attribute.name == name && attribute.components == components;
+        self.attributes.iter().find(is_it).map(|attribute| &attribute.values[..])
+    }
+
+    /// Name, components and numbers of each attribute.
+    pub(in crate::capi) fn attributes(&self) -> impl Iterator<Item = (&str, usize, &[f32])> {
+        self.attributes.iter().map(|one| (&*one.name, one.components, &one.values[..]))
+    }
+
+    /// Adds an attribute, in the place of one of the same name.
+    pub(in crate::capi) fn set_attribute(&mut self, name: &str, components: usize, values: Vec<f32>) {
+        self.attributes.retain(|attribute| attribute.name != name);
+        self.attributes.push(Attribute { name: name.into(), components, values });
+    }
+}
+
+/// Polygons from a host's arrays, checked.
+///
+/// # Safety
+/// The views must describe memory that can be read.
+pub(in crate::capi) unsafe fn polygons(
+    positions: &frz_view,
+    counts: &frz_view,
+    indices: &frz_view,
+) -> Outcome<PolygonMesh> {
+    // SAFETY: the caller's promise.
+    let (positions, counts, corners) = unsafe {
+        (positions.finite("positions")?, face_counts(counts)?, indices.elements::<u32>("indices")?)
+    };
+    check_corners(&corners, positions.len())?;
+    let positions = positions.into_iter().map(Vec3::from).collect();
+    let mut mesh = PolygonMesh { positions, ..PolygonMesh::default() };
+    match counts {
+        None => set_triangles(&mut mesh, corners)?,
+        Some(counts) => push_faces(&mut mesh, &corners, counts)?,
+    }
+    if mesh.ends.is_empty() {
+        return Err(Failure::argument("indices: the mesh has no faces"));
+    }
+    Ok(mesh)
+}
+
+/// The corners of each face; none where all are triangles.
+///
+/// # Safety
+/// As [`polygons`].
+unsafe fn face_counts(counts: &frz_view) -> Outcome<Option<Vec<u32>>> {
+    if counts.data.is_null() && counts.count == 0 {
+        return Ok(None);
+    }
+    // SAFETY: the caller's promise.
+    unsafe { counts.elements::<u32>("face_counts") }.map(Some)
+}
+
+/// Refuses too many vertices or corners, and corners out of range.
+fn check_corners(corners: &[u32], vertices: usize) -> Outcome {
+    if u32::try_from(vertices).is_err() || u32::try_from(corners.len()).is_err() {
+        return Err(Failure::argument("a mesh has at most 4294967295 vertices and corners"));
+    }
+    match corners.iter().position(|&vertex| vertex as usize >= vertices) {
+        None => Ok(()),
+        Some(at) => {
+            Err(Failure::argument(format!("indices: corner {at} names vertex {} of {vertices}", corners[at])))
+        }
+    }
+}
+
+fn set_triangles(mesh: &mut PolygonMesh, corners: Vec<u32>) -> Outcome {
+    if !corners.len().is_multiple_of(3) {
+        let text = format!("indices: {} corners are not a multiple of 3", corners.len());
+        return Err(Failure::argument(text));
+    }
+    mesh.ends = (3..=corners.len() as u32).step_by(3).collect();
+    mesh.corners = corners;
+    Ok(())
+}
+
+fn push_faces(mesh: &mut PolygonMesh, corners: &[u32], counts: Vec<u32>) -> Outcome {
+    let sum: u64 = counts.iter().map(|&count| u64::from(count)).sum();
+    if sum != corners.len() as u64 {
+        let text = format!("face_counts: the faces have {sum} corners, indices {}", corners.len());
+        return Err(Failure::argument(text));
+    }
+    let mut rest = corners;
+    for count in counts {
+        let (face, left) = rest.split_at(count as usize);
+        mesh.push(face.iter().copied());
+        rest = left;
+    }
+    Ok(())
+}
+
+/// Makes a mesh from a host's arrays, which are copied.
+///
+/// Faces may have any number of corners, convex or not, and meshes may be open, cross themselves and repeat vertices;
+/// they are cut into triangles once.
+///
+/// desc: its description. Counts, strides, indices and positions are checked: the error names the first at fault,
+///     counted from 0.
+/// out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
+///
+/// One thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mesh_create(
+    context: *mut frz_context,
+    desc: *const frz_mesh_desc,
+    out: *mut *mut frz_mesh,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
+            let none = frz_view::NONE;
+            let defaults = frz_mesh_desc {
+                struct_size: 0,
+                flags: 0,
+                positions: none,
+                face_counts: none,
+                indices: none,
+                attributes: std::ptr::null(),
+                attribute_count: 0,
+            };
+            let desc = sized(desc, defaults)?;
+            no_flags(desc.flags, 0)?;
+            let polygons = polygons(&desc.positions, &desc.face_counts, &desc.indices)?;
+            let bytes = (polygons.positions.len() + polygons.corners.len()) as u64 * 28;
+            ctx.allow("a mesh", bytes)?;
+            let attributes = attributes(&desc, polygons.positions.len())?;
+            made(ctx, polygons, attributes)
+        })
+    }
+}
+
+fn made(ctx: &Context, polygons: PolygonMesh, attributes: Vec<Attribute>) -> Outcome<Mesh> {
+    let triangles = ctx.phase("triangles", || Ok(polygons.clone().into_triangles()))?;
+    Ok(Mesh { polygons, triangles, attributes })
+}
+
+/// Refuses flags that have no meaning.
+pub(in crate::capi) fn no_flags(flags: u32, known: u32) -> Outcome {
+    if flags & !known != 0 {
+        return Err(Failure::argument(format!("flags = {flags:#x} has bits without a meaning")));
+    }
+    Ok(())
+}
+
+unsafe fn attributes(desc: &frz_mesh_desc, vertices: usize) -> Outcome<Vec<Attribute>> {
+    let view = frz_view { data: desc.attributes.cast(), count: desc.attribute_count, stride: 0 };
+    // SAFETY: the caller of `frz_mesh_create` promises so many attributes.
+    let list = unsafe { view.elements::<frz_attribute>("attributes") }?;
+    let mut out: Vec<Attribute> = Vec::with_capacity(list.len());
+    for attribute in list {
+        // SAFETY: as above.
+        let name = unsafe { text(attribute.name, "an attribute's name") }?.filter(|name| !name.is_empty());
+        let name = name.ok_or_else(|| Failure::argument("an attribute has no name"))?.to_string();
+        if out.iter().any(|other| other.name == name) {
+            return Err(Failure::argument(format!("two attributes are named \"{name}\"")));
+        }
+        let values = attribute.values;
+        if values.count != vertices {
+            let text =
+                format!("attribute \"{name}\" has {} elements, the mesh {vertices} vertices", values.count);
+            return Err(Failure::argument(text));
+        }
+        let components = attribute.components as usize;
+        // SAFETY: as above.
+        let values: Vec<f32> = unsafe {
+            match components {
+                1 => values.elements::<f32>(&name)?,
+                2 => values.elements::<[f32; 2]>(&name)?.into_flattened(),
+                3 => values.elements::<[f32; 3]>(&name)?.into_flattened(),
+                4 => values.elements::<[f32; 4]>(&name)?.into_flattened(),
+                other => {
+                    let text = format!("attribute \"{name}\": components = {other} is not within 1 to 4");
+                    return Err(Failure::argument(text));
+                }
+            }
+        };
+        out.push(Attribute { name, components, values });
+    }
+    Ok(out)
+}
+
+/// Destroys a mesh; NULL is fine.
+///
+/// mesh: may be NULL.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mesh_destroy(mesh: *mut frz_mesh) {
+    // SAFETY: the mesh is NULL or was not destroyed.
+    guard(|| unsafe { destroy(mesh) });
+}
+
+/// Reports the properties of a mesh: the counts that frz_mesh_read needs room for, its box, area and volume.
+///
+/// info: receives it; its struct_size says how much of it the caller knows.
+///
+/// Any number of threads may read a mesh.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mesh_get_info(mesh: *const frz_mesh, info: *mut frz_mesh_info) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mesh = read(mesh)?;
+            let triangles = &mesh.triangles;
+            let (low, high) = triangles.bounds().unwrap_or_default();
+            let value = frz_mesh_info {
+                struct_size: 0,
+                closed: u32::from(triangles.is_closed()),
+                vertex_count: mesh.polygons.positions.len() as u64,
+                face_count: mesh.polygons.ends.len() as u64,
+                corner_count: mesh.polygons.corners.len() as u64,
+                triangle_count: triangles.triangles.len() as u64,
+                attribute_count: mesh.attributes.len() as u64,
+                box_min: low.into(),
+                box_max: high.into(),
+                area: triangles.area(),
+                volume: triangles.volume(),
+            };
+            fill(info, None, value)
+        }
+    })
+}
+
+/// # Safety
+/// The span must describe memory that can be written.
+unsafe fn triples(dst: &frz_span, triples: &[Vec3]) -> Outcome {
+    // SAFETY: the caller's promise.
+    unsafe { dst.fill("dst", &triples.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>()) }
+}
+
+/// Copies a part of a mesh into the caller's memory.
+///
+/// part: a frz_mesh_part.
+/// dst: room for as many elements as frz_mesh_get_info reports, of the type that the part has: FRZ_ERROR_CAPACITY when
+///     it is too small, and nothing is written.
+///
+/// Any number of threads may read a mesh.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mesh_read(mesh: *const frz_mesh, part: u32, dst: frz_span) -> frz_status {
+    use frz_mesh_part::*;
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mesh = read(mesh)?;
+            let known = [
+                FRZ_MESH_POSITIONS,
+                FRZ_MESH_FACE_COUNTS,
+                FRZ_MESH_INDICES,
+                FRZ_MESH_TRIANGLES,
+                FRZ_MESH_NORMALS,
+            ]
+            .map(|part| (part as u32, part));
+            match meaning("part", "frz_mesh_part", part, &known)? {
+                FRZ_MESH_POSITIONS => triples(&dst, &mesh.polygons.positions),
+                FRZ_MESH_NORMALS => triples(&dst, &mesh.triangles.normals()),
+                FRZ_MESH_FACE_COUNTS => {
+                    let counts: Vec<u32> = mesh.polygons.polygons().map(|face| face.len() as u32).collect();
+                    dst.fill("dst", &counts)
+                }
+                FRZ_MESH_INDICES => dst.fill("dst", &mesh.polygons.corners),
+                FRZ_MESH_TRIANGLES => dst.fill("dst", &mesh.triangles.triangles),
+            }
+        }
+    })
+}
+
+/// Copies an attribute of a mesh into the caller's memory.
+///
+/// name: its name. FRZ_ERROR_ARGUMENT, with a list of the names, when there is none of this name.
+/// dst: room for an element of so many floats for each vertex; with data NULL only the number of floats is reported.
+/// components: receives the floats of each vertex, 1 to 4; 0 after a failure. May be NULL.
+///
+/// Any number of threads may read a mesh.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mesh_attribute(
+    mesh: *const frz_mesh,
+    name: *const c_char,
+    dst: frz_span,
+    components: *mut u32,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let tell = |count: usize| {
+                if !components.is_null() {
+                    components.write(count as u32);
+                }
+            };
+            tell(0);
+            let mesh = read(mesh)?;
+            let name = text(name, "name")?.ok_or_else(|| Failure::argument("name is NULL"))?;
+            let found = mesh.attributes.iter().find(|attribute| attribute.name == name);
+            let attribute = found.ok_or_else(|| {
+                let names: Vec<&str> = mesh.attributes.iter().map(|other| other.name.as_str()).collect();
+                let there = if names.is_empty() {
+                    "it has none".into()
+                } else {
+                    format!("it has {}", names.join(", "))
+                };
+                Failure::argument(format!("the mesh has no attribute \"{name}\": {there}"))
+            })?;
+            if !dst.data.is_null() {
+                let values = &attribute.values;
+                match attribute.components {
+                    1 => dst.fill("dst", values)?,
+                    2 => dst.fill("dst", values.as_chunks::<2>().0)?,
+                    3 => dst.fill("dst", values.as_chunks::<3>().0)?,
+                    _ => dst.fill("dst", values.as_chunks::<4>().0)?,
+                }
+            }
+            tell(attribute.components);
+            Ok(())
+        }
+    })
+}

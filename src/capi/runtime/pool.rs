@@ -1,0 +1,84 @@
+//! Threads.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use crate::capi::ffi::guard::{Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{Noun, clear, destroy, give};
+use crate::context::Pool;
+
+/// Worker threads, shared by any number of contexts.
+pub struct frz_pool {
+    _opaque: [u8; 0],
+}
+
+/// A pool's threads, as long as the pool or one of its contexts exists.
+pub(in crate::capi) struct Threads(pub Arc<Pool>, #[allow(dead_code, reason = "counts itself")] Arc<Alive>);
+
+/// Counts the pools that are alive: after the last one no thread of ours is left.
+pub(in crate::capi) struct Alive;
+
+static ALIVE: AtomicUsize = AtomicUsize::new(0);
+
+impl Threads {
+    fn start(threads: u32) -> Outcome<Self> {
+        let pool = Pool::new(threads as usize)?;
+        ALIVE.fetch_add(1, Ordering::AcqRel);
+        Ok(Self(pool, Arc::new(Alive)))
+    }
+
+    /// The same threads, for a context.
+    pub(in crate::capi) fn share(&self) -> Self {
+        Self(self.0.clone(), self.1.clone())
+    }
+}
+
+impl Drop for Alive {
+    fn drop(&mut self) {
+        if ALIVE.fetch_sub(1, Ordering::AcqRel) == 1 {
+            #[cfg(feature = "vdb")]
+            crate::vdb::end_workers();
+        }
+    }
+}
+
+impl Noun for frz_pool {
+    type Value = Threads;
+    const NAME: &'static str = "pool";
+    const TAG: u32 = 0x6672_7a01;
+}
+
+/// Starts worker threads.
+///
+/// Work of any number of contexts may share a pool. Results do not depend on the number of threads.
+///
+/// threads: number of workers, 0 to 1024. 0: there are none, all work is done by the thread that calls; polls then
+///     fall between pieces of work, with no interval promised.
+/// out: receives the pool, to be destroyed with frz_pool_destroy; NULL after a failure.
+///
+/// Any thread.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_pool_create(threads: u32, out: *mut *mut frz_pool) -> frz_status {
+    guard(|| {
+        // SAFETY: `out` is NULL or the caller's.
+        unsafe {
+            clear(out);
+            crate::capi::ffi::handle::required(out, "out")?;
+            give(out, Threads::start(threads)?)
+        }
+    })
+}
+
+/// Gives a pool back; NULL is fine.
+///
+/// Its threads end, and are joined, when the contexts that were made on it are destroyed too. At the end of the last
+/// pool OpenVDB's threads end as well, unless the host works with TBB itself: they are then left to the host.
+///
+/// pool: may be NULL. Not within a poll or log function.
+///
+/// Any thread.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_pool_destroy(pool: *mut frz_pool) {
+    // SAFETY: the pool is NULL or was not destroyed.
+    guard(|| unsafe { destroy(pool) });
+}

@@ -1,0 +1,297 @@
+//! Shallow liquid in the air: its drops, and a mesh of them.
+
+use super::liquid::{Spill, frz_shallow};
+use super::snapshot::{Taken, frz_shallow_snapshot};
+use super::surface::{
+    Buffer, NO_SPAN, check_buffers, check_room, frz_shallow_layout, frz_shallow_size, layout,
+};
+use crate::capi::ffi::guard::{Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{change, read, required};
+use crate::capi::ffi::views::{Plain, Sized32, fill, frz_span, sized};
+use crate::capi::runtime::context::{enter_light, frz_context};
+use crate::shallow::free_fall::Droplet;
+use crate::shallow::free_fall::mesh::{Balls, Target, bound};
+use crate::shallow::surface::{Counts, Indices, Layout};
+
+/// Liquid in the air.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_shallow_drop {
+    /// Its place (m).
+    pub position: [f64; 3],
+    /// Its velocity (m/s).
+    pub velocity: [f64; 3],
+    /// How much it is (m3).
+    pub volume: f64,
+    /// Radius of a ball of its volume (m).
+    pub radius: f64,
+    /// Seconds since it left the edge that it falls from.
+    pub age: f64,
+    /// That edge: the same number for all that come from one side of one column.
+    pub source: u64,
+    /// One more than that of the drop that left the same edge before it, if nothing interrupted the flow there.
+    pub number: u64,
+    /// Concentrations of the scalars that frz_shallow_set_scalars has set; 0 behind them.
+    pub concentrations: [f32; 4],
+}
+
+// SAFETY: numbers, without padding.
+unsafe impl Plain for frz_shallow_drop {}
+
+impl From<Droplet> for frz_shallow_drop {
+    fn from(drop: Droplet) -> Self {
+        let Droplet { position, velocity, volume, radius, age, source, number, concentrations, lip: _ } =
+            drop;
+        Self { position, velocity, volume, radius, age, source, number, concentrations }
+    }
+}
+
+/// Lists drops, or only counts them.
+///
+/// # Safety
+/// The span must describe memory that can be written, and `count` be NULL or the caller's.
+unsafe fn list(drops: impl ExactSizeIterator<Item = Droplet>, dst: &frz_span, count: *mut usize) -> Outcome {
+    // SAFETY: the caller's promise.
+    unsafe {
+        required(count, "count")?.write_unaligned(drops.len());
+        if dst.data.is_null() { Ok(()) } else { dst.put("dst", drops.map(frz_shallow_drop::from)) }
+    }
+}
+
+/// Lists the liquid in the air, in the order in which it left its edges, in real time (frz_shallow).
+///
+/// dst: room for a frz_shallow_drop for each, at most frz_shallow_params.falls_most. NULL: count receives their number, and nothing is written.
+///     FRZ_ERROR_CAPACITY when it is too little.
+/// count: receives their number; 0 after other failures.
+///
+/// Any number of threads may read a shallow liquid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_drops(
+    shallow: *const frz_shallow,
+    dst: frz_span,
+    count: *mut usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            required(count, "count")?.write_unaligned(0);
+            list(read(shallow)?.shallow.drops(), &dst, count)
+        }
+    })
+}
+
+/// Lists the liquid that was in the air when a snapshot was taken, as frz_shallow_drops does, in real time (frz_shallow).
+///
+/// dst: as there.
+/// count: as there.
+///
+/// Any number of threads may read a snapshot.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_snapshot_drops(
+    snapshot: *const frz_shallow_snapshot,
+    dst: frz_span,
+    count: *mut usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            required(count, "count")?.write_unaligned(0);
+            list(read(snapshot)?.snapshot.drops().iter().copied(), &dst, count)
+        }
+    })
+}
+
+/// Buffers that a mesh of drops is written into, as those of frz_shallow_target. It begins zeroed, and then struct_size.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_shallow_drops_target {
+    /// sizeof(frz_shallow_drops_target).
+    pub struct_size: u32,
+    /// Bits of an index: 16, for at most 65536 vertices, or 32. 0 without indices.
+    pub index_bits: u32,
+    /// float[3] a vertex: where it is (m x scale).
+    pub positions: frz_span,
+    /// float[3] a vertex: a unit vector.
+    pub normals: frz_span,
+    /// float[3] a vertex: velocity of its drop (m/s x scale).
+    pub velocities: frz_span,
+    /// uint32_t a vertex: its drop in the list of frz_shallow_drops.
+    pub drops: frz_span,
+    /// uint16_t or uint32_t for each corner of each triangle: a vertex. Triangles face outward.
+    pub indices: frz_span,
+}
+
+// SAFETY: numbers and pointers.
+unsafe impl Sized32 for frz_shallow_drops_target {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_shallow_drops_target";
+}
+
+impl frz_shallow_drops_target {
+    const NONE: Self = Self {
+        struct_size: 0,
+        index_bits: 0,
+        positions: NO_SPAN,
+        normals: NO_SPAN,
+        velocities: NO_SPAN,
+        drops: NO_SPAN,
+        indices: NO_SPAN,
+    };
+
+    fn buffers(&self) -> [Buffer<'_>; 5] {
+        [
+            ("positions", &self.positions, 12, true),
+            ("normals", &self.normals, 12, true),
+            ("velocities", &self.velocities, 12, true),
+            ("drops", &self.drops, 4, true),
+            ("indices", &self.indices, self.index_bits as usize / 8, false),
+        ]
+    }
+
+    /// The library's own buffers.
+    ///
+    /// # Safety
+    /// The spans must describe memory that can be written and that nothing else uses, for `'a`.
+    unsafe fn target<'a>(&self) -> Outcome<Target<'a>> {
+        check_buffers(&self.buffers(), self.index_bits)?;
+        // SAFETY: the caller's promise, and they do not overlap.
+        unsafe {
+            let indices = match self.index_bits {
+                16 => self.indices.numbers("indices", 1)?.map_or(Indices::None, Indices::U16),
+                _ => self.indices.numbers("indices", 1)?.map_or(Indices::None, Indices::U32),
+            };
+            Ok(Target {
+                positions: self.positions.numbers("positions", 3)?,
+                normals: self.normals.numbers("normals", 3)?,
+                velocities: self.velocities.numbers("velocities", 3)?,
+                drops: self.drops.numbers("drops", 1)?,
+                indices,
+            })
+        }
+    }
+}
+
+/// What a mesh of drops is made into.
+struct Wanted {
+    layout: Layout,
+    given: frz_shallow_drops_target,
+    size: *mut frz_shallow_size,
+}
+
+impl Wanted {
+    /// What a host wants.
+    ///
+    /// # Safety
+    /// The pointers must be NULL or the caller's.
+    unsafe fn new(
+        given: *const frz_shallow_layout,
+        target: *const frz_shallow_drops_target,
+        size: *mut frz_shallow_size,
+    ) -> Outcome<Self> {
+        // SAFETY: the caller's promise.
+        unsafe {
+            if !size.is_null() {
+                fill(size, None, Counts::default().into())?;
+            }
+            let (layout, _) = layout(given)?;
+            Ok(Self { layout, given: sized(target, frz_shallow_drops_target::NONE)?, size })
+        }
+    }
+
+    /// Writes the mesh and its size.
+    ///
+    /// # Safety
+    /// As in [`Wanted::new`], and the spans must describe memory that can be written.
+    unsafe fn write(&self, balls: &mut Balls, drops: &[Droplet]) -> Outcome {
+        // SAFETY: the caller's promise.
+        unsafe {
+            let mut target = self.given.target()?;
+            let counts = balls.count(drops);
+            if !self.size.is_null() {
+                fill(self.size, None, counts.into())?;
+            }
+            check_room(&self.given.buffers(), &counts)?;
+            balls.build(drops, &self.layout, &mut target)?;
+            Ok(())
+        }
+    }
+}
+
+/// Reports the most that the mesh of the liquid in the air can have, so that buffers are made once.
+///
+/// size: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+///
+/// Any number of threads may read a shallow liquid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_drops_bound(
+    shallow: *const frz_shallow,
+    size: *mut frz_shallow_size,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            fill(size, None, Counts::default().into())?;
+            let most = read(shallow)?.shallow.params().falls.map_or(0, |falls| falls.most);
+            fill(size, None, bound(most).into())
+        }
+    })
+}
+
+/// Writes the liquid in the air as triangles, in real time (frz_shallow): a ball for each drop, and strands between drops that follow each other from one
+/// edge. The balls' vertices come first, in the order of their drops.
+///
+/// layout: NULL for the usual one; its depths and FRZ_SHALLOW_LIFTED are not looked at.
+/// target: the buffers. FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed. With all data
+///     NULL it is the size only that is asked for.
+/// size: receives the size of the mesh, all zeroes after other failures; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_drops_mesh(
+    context: *mut frz_context,
+    shallow: *mut frz_shallow,
+    layout: *const frz_shallow_layout,
+    target: *const frz_shallow_drops_target,
+    size: *mut frz_shallow_size,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's; so is what the spans describe.
+        unsafe {
+            let wanted = Wanted::new(layout, target, size)?;
+            let _call = enter_light(context)?;
+            let mut spill = change(shallow)?;
+            let Spill { shallow, balls, drops, .. } = &mut *spill;
+            drops.clear();
+            drops.extend(shallow.drops());
+            wanted.write(balls, drops)
+        }
+    })
+}
+
+/// Writes the liquid that was in the air when a snapshot was taken, as frz_shallow_drops_mesh does, in real time (frz_shallow).
+///
+/// context: another one than that of the thread that computes.
+/// layout: NULL for the usual one.
+/// target: the buffers, as there.
+/// size: receives the size of the mesh, as there; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_snapshot_drops_mesh(
+    context: *mut frz_context,
+    snapshot: *mut frz_shallow_snapshot,
+    layout: *const frz_shallow_layout,
+    target: *const frz_shallow_drops_target,
+    size: *mut frz_shallow_size,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's; so is what the spans describe.
+        unsafe {
+            let wanted = Wanted::new(layout, target, size)?;
+            let _call = enter_light(context)?;
+            let mut taken = change(snapshot)?;
+            let Taken { snapshot, balls, .. } = &mut *taken;
+            wanted.write(balls, snapshot.drops())
+        }
+    })
+}

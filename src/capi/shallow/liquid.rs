@@ -1,0 +1,380 @@
+//! Small amounts of liquid on a terrain, in real time.
+
+use super::flows::Attached;
+use super::ledges::Ledged;
+use super::lifts::Lifted;
+use super::params::{domain, frz_shallow_domain, frz_shallow_params, params};
+use super::terrain::Terrain;
+use crate::capi::ffi::guard::{Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{Noun, change, destroy, read, required};
+use crate::capi::ffi::views::{Sized32, fill, frz_span, frz_view, within};
+#[cfg(feature = "vdb")]
+use crate::capi::grid::sparse::frz_grid;
+use crate::capi::mesh::triangles::frz_mesh;
+use crate::capi::runtime::context::{creates, enter_light, frz_context};
+use crate::context::Context;
+use crate::shallow::free_fall::Droplet;
+use crate::shallow::free_fall::mesh::Balls;
+use crate::shallow::scalars::MOST;
+use crate::shallow::surface::Surface;
+use crate::shallow::terrain::Solids;
+use crate::shallow::terrain::shapes::Shape;
+use crate::shallow::time_step::MOST_STEPS;
+use crate::shallow::{Load, Params, Report, Shallow};
+
+/// A small amount of liquid on a ground: blood, coffee or paint in a fraction of a frame.
+///
+/// In real time: what a host calls in each frame keeps to stricter manners than all other calls. These are frz_shallow_step, _replay,
+/// _update_terrain, _update_heights, _set_bodies, _loads, _save, _restore, _surface, _find_lifts, _find_ledges, _drops, _drops_mesh, _read_scalar and _probe,
+/// frz_shallow_stains_update, _read and _soaked, and frz_shallow_snapshot_take, _surface, _drops, _drops_mesh and _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
+/// system call but that for the thread's clock where a step has a budget. Only where there is more than ever before, more columns because
+/// a body uncovers another layer, say, memory grows; so may what fails.
+///
+/// A cancel is looked at at the beginning of such a call, and in the course of a frame that may take long: one of exact steps, of over some two million columns
+/// times steps, or with many full columns. Such a frame begins with a copy of what it changes, and is as if it had not begun when it is cancelled. None of these calls
+/// has phases, which all other work has: frz_context_progress and
+/// frz_context_timings do not see them. Phases take locks and memory, and a poll between them may take longer than the few milliseconds
+/// that a frame has.
+pub struct frz_shallow {
+    _opaque: [u8; 0],
+}
+
+/// What a frame did.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_shallow_report {
+    /// sizeof(frz_shallow_report), set by the caller.
+    pub struct_size: u32,
+    /// Count of steps that the frame was divided into.
+    pub steps: u32,
+    /// Simulated time (s): dt, or less where the budget ran out.
+    pub seconds: f64,
+    /// Time that the budget left out (s): dt less seconds. No liquid is lost with it.
+    pub dropped: f64,
+    /// Greatest depth (m), or somewhat over it.
+    pub deepest: f64,
+    /// Rows of cells, summed over steps, in which columns would have given more liquid than they had, and gave what they had.
+    pub emptied: u64,
+    /// Rows of cells, summed over steps, in which columns would have taken more than they had room for, and took what fitted.
+    pub filled: u64,
+    /// Rows of cells, summed over steps, in which films on slopes would have been too fast for steps of this length, and were held back: shorter steps let
+    /// them go.
+    pub slowed: u64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_shallow_report {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_shallow_report";
+}
+
+impl frz_shallow_report {
+    pub(in crate::capi) fn of(done: &Report, dt: f64) -> Self {
+        Self {
+            struct_size: 0,
+            steps: done.steps,
+            seconds: done.seconds,
+            dropped: (dt - done.seconds).max(0.0),
+            deepest: done.deepest,
+            emptied: done.emptied,
+            filled: done.filled,
+            slowed: done.slowed,
+        }
+    }
+}
+
+/// The value of a liquid's handle.
+pub(in crate::capi) struct Spill {
+    /// The liquid.
+    pub shallow: Shallow,
+    /// What it flows over.
+    pub terrain: Terrain,
+    /// Flow points of the host, in its order.
+    pub flows: Vec<Attached>,
+    /// Obstacles of the last call.
+    pub shapes: Vec<Shape>,
+    /// Makes surfaces.
+    pub surface: Surface,
+    /// Minimum heights, once they were found.
+    pub lifted: Lifted,
+    /// Ledges, once they were found.
+    pub ledged: Ledged,
+    /// Mean velocities of all column indices (m/s), when a surface wants them.
+    pub velocities: Vec<[f32; 2]>,
+    /// Concentrations of scalars by column index, when a surface wants them.
+    pub concentrations: [Vec<f32>; MOST],
+    /// Makes meshes of what is in the air, and that.
+    pub balls: Balls,
+    /// Drops of the last such mesh.
+    pub drops: Vec<Droplet>,
+    /// Velocities of the bodies (m/s), and what the liquid did to them, as last asked for.
+    pub velocities_of_bodies: Vec<[f64; 3]>,
+    pub loads: Vec<Load>,
+    /// Steps of a replay (s).
+    steps: Vec<f64>,
+}
+
+impl Noun for frz_shallow {
+    type Value = Spill;
+    const NAME: &'static str = "shallow liquid";
+    const TAG: u32 = 0x6672_7a09;
+}
+
+impl Spill {
+    /// Dry ground.
+    fn new(ctx: &Context, params: Params, terrain: Terrain, solids: &Solids) -> Outcome<Self> {
+        let shallow = ctx.phase("columns", || Shallow::new(ctx, solids, params))?;
+        let mut surface = Surface::default();
+        surface.reserve(shallow.columns());
+        let most = shallow.params().falls.map_or(0, |falls| falls.most);
+        let mut balls = Balls::default();
+        balls.reserve(most);
+        Ok(Self {
+            shallow,
+            terrain,
+            flows: Vec::new(),
+            shapes: Vec::new(),
+            surface,
+            lifted: Lifted::default(),
+            ledged: Ledged::default(),
+            velocities: Vec::new(),
+            concentrations: Default::default(),
+            balls,
+            drops: Vec::with_capacity(most),
+            velocities_of_bodies: Vec::new(),
+            loads: Vec::new(),
+            steps: Vec::with_capacity(1024),
+        })
+    }
+}
+
+/// Makes a liquid on a mesh: dry at first.
+///
+/// The vertical line through the middle of a cell is solid where it is inside of the mesh: closed parts that overlap are one
+/// solid. Where the mesh is open, all below a face that faces up is solid, and a face that faces down is nothing; a warning says
+/// that it is open. Liquid stands on each solid of a cell, up to the underside of the next one.
+///
+/// params: NULL for the usual ones.
+/// domain: where liquid can be.
+/// mesh: it is copied. FRZ_ERROR_ARGUMENT where no face of it within the domain faces up.
+/// out: receives the liquid, to be destroyed with frz_shallow_destroy; NULL after a failure.
+///
+/// Any number of threads may read a mesh; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_create(
+    context: *mut frz_context,
+    params: *const frz_shallow_params,
+    domain: *const frz_shallow_domain,
+    mesh: *const frz_mesh,
+    out: *mut *mut frz_shallow,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
+            let params = self::params(params)?;
+            let (grid, heights) = self::domain(ctx, domain)?;
+            let mesh = read(mesh)?;
+            let (terrain, solids) = Terrain::of_mesh(ctx, &mesh.triangles, grid, heights)?;
+            Spill::new(ctx, params, terrain, &solids)
+        })
+    }
+}
+
+/// Makes a liquid on a height field: dry at first.
+///
+/// params: NULL for the usual ones.
+/// domain: where liquid can be.
+/// heights: float for each cell (m), finite: the height of the ground in its middle, row by row along x from the least z. Heights
+///     beyond those of the domain become its ends.
+/// out: receives the liquid, to be destroyed with frz_shallow_destroy; NULL after a failure.
+///
+/// One thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_create_heights(
+    context: *mut frz_context,
+    params: *const frz_shallow_params,
+    domain: *const frz_shallow_domain,
+    heights: frz_view,
+    out: *mut *mut frz_shallow,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
+            let params = self::params(params)?;
+            let (grid, range) = self::domain(ctx, domain)?;
+            let tops = heights.in_place::<f32>("heights")?;
+            let (terrain, solids) = Terrain::of_heights(tops, grid, range)?;
+            Spill::new(ctx, params, terrain, &solids)
+        })
+    }
+}
+
+/// Makes a liquid on a level set: dry at first.
+///
+/// params: NULL for the usual ones.
+/// domain: where liquid can be.
+/// level_set: a grid of distances (m), negative inside; it is sampled at each voxel of the height of the domain. What is solid at
+///     the least height is so for ever below. The ground cannot move afterwards.
+/// out: receives the liquid, to be destroyed with frz_shallow_destroy; NULL after a failure.
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[cfg(feature = "vdb")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_create_grid(
+    context: *mut frz_context,
+    params: *const frz_shallow_params,
+    domain: *const frz_shallow_domain,
+    level_set: *const frz_grid,
+    out: *mut *mut frz_shallow,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
+            let params = self::params(params)?;
+            let (grid, heights) = self::domain(ctx, domain)?;
+            let held = read(level_set)?;
+            let (terrain, solids) = Terrain::of_level_set(ctx, held.floats()?, grid, heights)?;
+            Spill::new(ctx, params, terrain, &solids)
+        })
+    }
+}
+
+/// Destroys a liquid; NULL is fine. Its snapshots stay.
+///
+/// shallow: may be NULL. Not while a call uses it: it then stays.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_destroy(shallow: *mut frz_shallow) {
+    // SAFETY: the liquid is NULL or was not destroyed.
+    guard(|| unsafe { destroy(shallow) });
+}
+
+/// Sets what flows, and how, from the next frame on. The border, falls and friction must stay.
+///
+/// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_set_params(
+    shallow: *mut frz_shallow,
+    params: *const frz_shallow_params,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mut spill = change(shallow)?;
+            required(params.cast_mut(), frz_shallow_params::NAME)?;
+            Ok(spill.shallow.set_params(self::params(params)?)?)
+        }
+    })
+}
+
+/// Computes a frame, in real time (frz_shallow). It is divided into steps as frz_shallow_params.pace says.
+///
+/// dt: length of the frame (s), 1e-12 to 1e6. FRZ_ERROR_ARGUMENT, too, where it would take over a million steps: the liquid is then as it was.
+/// budget_seconds: CPU time of this thread (s), or time where several threads work, after which no step begins, 0 to 1e6; 0: as much as
+///     it takes. The rest of the frame is then left out (frz_shallow_report.dropped), never any liquid. At least one step is made. With
+///     frz_shallow_last_steps and frz_shallow_replay such a frame can be made again.
+/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_step(
+    context: *mut frz_context,
+    shallow: *mut frz_shallow,
+    dt: f64,
+    budget_seconds: f64,
+    report: *mut frz_shallow_report,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            computes(context, shallow, report, |ctx, spill| {
+                within("budget_seconds", budget_seconds, 0.0..=1e6, " s")?;
+                let done = match budget_seconds {
+                    0.0 => spill.shallow.step(ctx, dt),
+                    budget => spill.shallow.step_within(ctx, dt, budget),
+                };
+                Ok((done?, dt))
+            })
+        }
+    })
+}
+
+/// Computes a frame of given steps, in real time (frz_shallow): from the same state, with the same parameters, flow points and
+/// bodies it becomes the same bytes as the frame that they were reported of.
+///
+/// steps: double for each step, its length (s), 1e-12 to 1e6, as frz_shallow_last_steps has listed them: 1 to 1000000, together up to 1e6 s.
+/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_replay(
+    context: *mut frz_context,
+    shallow: *mut frz_shallow,
+    steps: frz_view,
+    report: *mut frz_shallow_report,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            computes(context, shallow, report, |ctx, spill| {
+                let Spill { shallow, steps: own, .. } = spill;
+                let given = steps.in_place::<f64>("steps")?;
+                within("the count of steps", given.len() as f64, 1.0..=f64::from(MOST_STEPS), "")?;
+                own.clear();
+                own.extend(given);
+                let dt = own.iter().sum();
+                Ok((shallow.replay(ctx, own)?, dt))
+            })
+        }
+    })
+}
+
+/// A call that computes a frame and reports it.
+///
+/// # Safety
+/// The pointers must be NULL or the caller's.
+unsafe fn computes(
+    context: *mut frz_context,
+    shallow: *mut frz_shallow,
+    report: *mut frz_shallow_report,
+    compute: impl FnOnce(&Context, &mut Spill) -> Outcome<(Report, f64)>,
+) -> Outcome {
+    // SAFETY: the caller's promise.
+    unsafe {
+        if !report.is_null() {
+            fill(report, None, frz_shallow_report::of(&Report::default(), 0.0))?;
+        }
+        let call = enter_light(context)?;
+        let (done, dt) = compute(call.ctx(), &mut *change(shallow)?)?;
+        if report.is_null() { Ok(()) } else { fill(report, None, frz_shallow_report::of(&done, dt)) }
+    }
+}
+
+/// Lists the steps of the last frame: with them frz_shallow_replay makes it again.
+///
+/// dst: room for a double for each step, its length (s). NULL: count receives their number, and nothing is written.
+///     FRZ_ERROR_CAPACITY when it is too little.
+/// count: receives their number; 0 after other failures.
+///
+/// Any number of threads may read a shallow liquid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_last_steps(
+    shallow: *const frz_shallow,
+    dst: frz_span,
+    count: *mut usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let count = required(count, "count")?;
+            count.write_unaligned(0);
+            let spill = read(shallow)?;
+            let steps = spill.shallow.last_steps();
+            count.write_unaligned(steps.len());
+            if dst.data.is_null() { Ok(()) } else { dst.fill("dst", steps) }
+        }
+    })
+}

@@ -1,0 +1,43 @@
+//! Lists of structs that a host describes something with.
+
+use crate::capi::ffi::guard::{Failure, Outcome};
+use crate::capi::ffi::views::{Sized32, check_size, frz_view, sized};
+
+/// Hands over the structs of a host that lie one after another, all of one version; `nouns` name one and all of them in an error. Fields
+/// that the host's header does not have are the `usual` ones. Nothing is allocated, unless it fails.
+///
+/// # Safety
+/// `list` must be NULL or point to so many structs.
+pub(in crate::capi) unsafe fn each_sized<T: Sized32>(
+    list: *const T,
+    count: usize,
+    nouns: [&str; 2],
+    usual: T,
+    mut take: impl FnMut(T) -> Outcome,
+) -> Outcome {
+    let [noun, all] = nouns;
+    if count == 0 {
+        return Ok(());
+    }
+    if list.is_null() {
+        return Err(Failure::argument(format!("{all}: the data is NULL, but the count is {count}")));
+    }
+    // SAFETY: the caller's promise: the size of one is there.
+    let stride = unsafe { list.cast::<u32>().read_unaligned() } as usize;
+    let named =
+        |at: usize, failure: Failure| Failure { text: format!("{noun} {at}: {}", failure.text), ..failure };
+    // Checked before it is used: it is the stride.
+    check_size::<T>(stride).map_err(|failure| named(0, failure))?;
+    let sizes = frz_view { data: list.cast(), count, stride };
+    // SAFETY: as above; the sizes must be the same for the structs to lie one after another.
+    let mut sizes = unsafe { sizes.in_place::<u32>(all) }?;
+    if sizes.any(|size| size as usize != stride) {
+        return Err(Failure::argument(format!("{all}: their struct_size differs")));
+    }
+    for at in 0..count {
+        // SAFETY: as above.
+        let one = unsafe { sized(list.byte_add(at * stride), usual) };
+        one.and_then(&mut take).map_err(|failure| named(at, failure))?;
+    }
+    Ok(())
+}

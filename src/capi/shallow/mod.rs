@@ -1,0 +1,32 @@
+//! Small amounts of liquid on a terrain.
+
+// In the header's order.
+pub mod params;
+
+pub mod liquid;
+
+pub mod flows;
+
+pub mod terrain;
+
+pub mod read;
+
+pub mod state;
+
+pub mod surface;
+
+pub mod ledges;
+
+pub mod lifts;
+
+pub mod scalars;
+
+pub mod drops;
+
+pub mod loads;
+
+pub mod stains;
+
+pub mod snapshot;
+
+pub(in crate::capi) mod lists;

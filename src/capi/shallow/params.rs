@@ -1,0 +1,362 @@
+//! What flows, how, and where, in C's terms.
+
+use crate::capi::ffi::guard::{Outcome, frz_status, guard};
+use crate::capi::ffi::views::{Sized32, fill, meaning, sized, within};
+use crate::capi::mesh::triangles::no_flags;
+use crate::context::Context;
+use crate::shallow::free_fall::Falls;
+use crate::shallow::grid::{Grid, Heights};
+use crate::shallow::material::{Carreau, Liquid};
+use crate::shallow::params::{Friction, Pace, Section};
+use crate::shallow::pipes::Border;
+use crate::shallow::{Params, Thickening};
+
+/// Liquids that frz_shallow_params_liquid knows.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_liquid {
+    /// Water at 20 C: 1e-6 m2/s.
+    FRZ_LIQUID_WATER = 0,
+    /// Blood that does not thin: 4e-6 m2/s.
+    FRZ_LIQUID_BLOOD = 1,
+    /// Paint: 4e-5 m2/s.
+    FRZ_LIQUID_PAINT = 2,
+    /// Honey at 20 C: 7e-3 m2/s.
+    FRZ_LIQUID_HONEY = 3,
+    /// Blood that thins under shear: from 5.28e-5 m2/s at rest to 3.25e-6 m2/s.
+    FRZ_LIQUID_THINNING_BLOOD = 4,
+}
+
+/// How a frame is divided into steps.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_shallow_pace {
+    /// Steps of at most frz_shallow_params.longest_step: where liquid is too deep for that, its waves slow down, and films on slopes that are too
+    /// fast are held back.
+    FRZ_SHALLOW_REALTIME = 0,
+    /// As many steps as stability needs.
+    FRZ_SHALLOW_EXACT = 1,
+}
+
+/// What lies beyond the border of the domain.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_shallow_border {
+    /// A wall.
+    FRZ_SHALLOW_CLOSED = 0,
+    /// Nothing: liquid flows off as the ground near the border leads it, and is lost.
+    FRZ_SHALLOW_OPEN = 1,
+    /// Liquid at rest, at the level that it has at the border at first: waves leave, and do not come back.
+    FRZ_SHALLOW_ABSORBING = 2,
+}
+
+/// The section of a pipe between two columns.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_shallow_section {
+    /// What is wet of it: films flow as fast as theory says.
+    FRZ_SHALLOW_WETTED = 0,
+    /// The whole cell, as in the thesis: for comparison.
+    FRZ_SHALLOW_WHOLE = 1,
+}
+
+/// Where viscosity holds the liquid back.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_shallow_friction {
+    /// At the ground: right where the liquid is far wider than deep.
+    FRZ_SHALLOW_GROUND = 0,
+    /// Also at walls and ceilings, and between liquids that flow beside each other: ducts and channels carry what theory says. It takes longer.
+    FRZ_SHALLOW_WALLS = 1,
+}
+
+/// No scalar, where one may be named.
+pub const FRZ_SHALLOW_NO_SCALAR: u32 = 0xFFFF_FFFF;
+
+use frz_liquid::*;
+use frz_shallow_border::*;
+use frz_shallow_friction::*;
+use frz_shallow_pace::*;
+use frz_shallow_section::*;
+
+const LIQUIDS: [(u32, Liquid); 5] = [
+    (FRZ_LIQUID_WATER as u32, Liquid::WATER),
+    (FRZ_LIQUID_BLOOD as u32, Liquid::BLOOD),
+    (FRZ_LIQUID_PAINT as u32, Liquid::PAINT),
+    (FRZ_LIQUID_HONEY as u32, Liquid::HONEY),
+    (FRZ_LIQUID_THINNING_BLOOD as u32, Liquid::THINNING_BLOOD),
+];
+
+const PACES: [(u32, frz_shallow_pace); 2] =
+    [(FRZ_SHALLOW_REALTIME as u32, FRZ_SHALLOW_REALTIME), (FRZ_SHALLOW_EXACT as u32, FRZ_SHALLOW_EXACT)];
+
+const BORDERS: [(u32, Border); 3] = [
+    (FRZ_SHALLOW_CLOSED as u32, Border::Closed),
+    (FRZ_SHALLOW_OPEN as u32, Border::Open),
+    (FRZ_SHALLOW_ABSORBING as u32, Border::Absorbing),
+];
+
+const SECTIONS: [(u32, Section); 2] =
+    [(FRZ_SHALLOW_WETTED as u32, Section::Wetted), (FRZ_SHALLOW_WHOLE as u32, Section::Whole)];
+
+const FRICTIONS: [(u32, Friction); 2] =
+    [(FRZ_SHALLOW_GROUND as u32, Friction::Ground), (FRZ_SHALLOW_WALLS as u32, Friction::Walls)];
+
+/// What flows, and how. All of it but the border, falls and friction may change between frames.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_shallow_params {
+    /// sizeof(frz_shallow_params).
+    pub struct_size: u32,
+    /// 0.
+    pub flags: u32,
+    /// Kinematic viscosity (m2/s), 0 to 1e6; of a liquid that thins, at rest. That of blood, 4e-6, is usual: see
+    /// frz_shallow_params_liquid.
+    pub viscosity: f64,
+    /// Viscosity under strong shear (m2/s), 0 to viscosity, by Carreau's law; only with a thinning_time.
+    pub thinnest: f64,
+    /// Time of Carreau's law (s), 1e-9 to 1e9; 0, as is usual: the liquid does not thin.
+    pub thinning_time: f64,
+    /// Power of Carreau's law, 0 to 1; only with a thinning_time.
+    pub thinning_power: f64,
+    /// Gravity (m/s2), which may turn from frame to frame: it points down by 0.001 to 1000, and leans by at most 45 degrees.
+    /// (0, -9.81, 0) is usual.
+    pub gravity: [f64; 3],
+    /// Share of the flow that is kept in a second, 0 to 1; 0.5 is usual. At 1 nothing is lost but by viscosity.
+    pub kept: f64,
+    /// Longest step (s), 1e-6 to 1; only with FRZ_SHALLOW_REALTIME. 0.003 is usual.
+    pub longest_step: f64,
+    /// A frz_shallow_pace; FRZ_SHALLOW_REALTIME is usual.
+    pub pace: u32,
+    /// A frz_shallow_border, which cannot change; FRZ_SHALLOW_CLOSED is usual.
+    pub border: u32,
+    /// A frz_shallow_section; FRZ_SHALLOW_WETTED is usual.
+    pub section: u32,
+    /// 0.
+    pub reserved: u32,
+    /// Height (m) from which on liquid falls freely over an edge, 0 or more, an edge of a cell at least; 0.01 is usual. This and what follows,
+    /// which cannot change, is for falls_most over 0 only.
+    pub falls_height: f64,
+    /// Time between the drops that leave one place (s), 0.0001 to 1; 1/120 is usual.
+    pub falls_interval: f64,
+    /// Volume of a drop (m3), 0 or more; 6.5e-11, a ball of half a millimetre, is usual. Where it takes longer than 8 intervals liquid drips.
+    pub falls_drop: f64,
+    /// Most drops in the air, up to 1048576, for which there is room from the beginning; 8192 will do. 0, as is usual: nothing falls freely, and
+    /// what goes over an edge is below at once.
+    pub falls_most: u32,
+    /// 0.
+    pub reserved2: u32,
+    /// Velocity (m/s) below which liquid whose surface is level comes to rest, and then takes no time, 0 to 0.01; 0 is usual: never. 1e-6
+    /// does well.
+    pub rest: f64,
+    /// A frz_shallow_friction, which cannot change; FRZ_SHALLOW_GROUND is usual.
+    pub friction: u32,
+    /// The scalar that viscosity depends on (frz_shallow_set_scalars), counted from 0: of blood that clots its age. It must be there when a frame
+    /// begins. FRZ_SHALLOW_NO_SCALAR is usual, and what follows is then not looked at.
+    pub thickening_scalar: u32,
+    /// Concentration up to which viscosity is the liquid's own, finite.
+    pub thickening_from: f64,
+    /// Concentration from which on it is thickening_times that, and linear between them; finite, not thickening_from, and it may be the lesser one.
+    pub thickening_to: f64,
+    /// 1e-6 to 1e9.
+    pub thickening_times: f64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_shallow_params {
+    const SIZES: &'static [usize] =
+        &[std::mem::offset_of!(frz_shallow_params, falls_height), size_of::<Self>()];
+    const NAME: &'static str = "frz_shallow_params";
+}
+
+impl frz_shallow_params {
+    pub(in crate::capi) fn usual() -> Self {
+        let usual = Params::default();
+        let falls = Falls::default();
+        let longest_step = if let Pace::Realtime(longest) = usual.pace { longest } else { 0.0 };
+        let mut params = Self {
+            struct_size: 0,
+            flags: 0,
+            viscosity: 0.0,
+            thinnest: 0.0,
+            thinning_time: 0.0,
+            thinning_power: 0.0,
+            gravity: usual.gravity,
+            kept: usual.kept,
+            longest_step,
+            pace: FRZ_SHALLOW_REALTIME as u32,
+            border: FRZ_SHALLOW_CLOSED as u32,
+            section: FRZ_SHALLOW_WETTED as u32,
+            reserved: 0,
+            falls_height: falls.height,
+            falls_interval: falls.interval,
+            falls_drop: falls.drop,
+            falls_most: 0,
+            reserved2: 0,
+            rest: usual.rest,
+            friction: FRZ_SHALLOW_GROUND as u32,
+            thickening_scalar: FRZ_SHALLOW_NO_SCALAR,
+            thickening_from: 0.0,
+            thickening_to: 0.0,
+            thickening_times: 1.0,
+        };
+        params.set_liquid(&usual.liquid);
+        params
+    }
+
+    fn set_liquid(&mut self, liquid: &Liquid) {
+        let law = liquid.thinning.unwrap_or(Carreau { thinnest: 0.0, time: 0.0, power: 0.0 });
+        self.viscosity = liquid.viscosity;
+        self.thinnest = law.thinnest;
+        self.thinning_time = law.time;
+        self.thinning_power = law.power;
+    }
+
+    /// The library's own parameters; what is out of range is named.
+    pub(in crate::capi) fn params(&self) -> Outcome<Params> {
+        no_flags(self.flags, 0)?;
+        within("reserved", f64::from(self.reserved), 0.0..=0.0, "")?;
+        within("reserved2", f64::from(self.reserved2), 0.0..=0.0, "")?;
+        let falls = Falls {
+            height: self.falls_height,
+            interval: self.falls_interval,
+            drop: self.falls_drop,
+            most: self.falls_most as usize,
+        };
+        let pace = match meaning("pace", "frz_shallow_pace", self.pace, &PACES)? {
+            FRZ_SHALLOW_EXACT => Pace::Exact,
+            FRZ_SHALLOW_REALTIME => {
+                within("longest_step", self.longest_step, 1e-6..=1.0, " s")?;
+                Pace::Realtime(self.longest_step)
+            }
+        };
+        let thickening = Thickening {
+            scalar: self.thickening_scalar as usize,
+            from: self.thickening_from,
+            to: self.thickening_to,
+            times: self.thickening_times,
+        };
+        let law = Carreau { thinnest: self.thinnest, time: self.thinning_time, power: self.thinning_power };
+        let params = Params {
+            liquid: Liquid {
+                viscosity: self.viscosity,
+                thinning: (self.thinning_time != 0.0).then_some(law),
+            },
+            gravity: self.gravity,
+            kept: self.kept,
+            pace,
+            border: meaning("border", "frz_shallow_border", self.border, &BORDERS)?,
+            section: meaning("section", "frz_shallow_section", self.section, &SECTIONS)?,
+            friction: meaning("friction", "frz_shallow_friction", self.friction, &FRICTIONS)?,
+            thickening: (self.thickening_scalar != FRZ_SHALLOW_NO_SCALAR).then_some(thickening),
+            falls: (self.falls_most > 0).then_some(falls),
+            rest: self.rest,
+        };
+        params.validate()?;
+        Ok(params)
+    }
+}
+
+/// The library's own parameters from a host's; the usual ones for NULL.
+///
+/// # Safety
+/// As [`sized`].
+pub(in crate::capi) unsafe fn params(pointer: *const frz_shallow_params) -> Outcome<Params> {
+    if pointer.is_null() {
+        return Ok(Params::default());
+    }
+    // SAFETY: the caller's promise.
+    unsafe { sized(pointer, frz_shallow_params::usual()) }?.params()
+}
+
+/// Fills parameters with the usual values: blood, in real time.
+///
+/// params: receives them.
+/// size: sizeof(frz_shallow_params).
+///
+/// Any thread.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_params_init(params: *mut frz_shallow_params, size: usize) -> frz_status {
+    // SAFETY: the parameters are NULL or have so many bytes.
+    guard(|| unsafe { fill(params, Some(size), frz_shallow_params::usual()) })
+}
+
+/// Sets the viscosity of parameters, and how it thins, to those of a known liquid; the rest stays.
+///
+/// params: filled before, by frz_shallow_params_init for instance.
+/// liquid: a frz_liquid.
+///
+/// Any thread.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_params_liquid(
+    params: *mut frz_shallow_params,
+    liquid: u32,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the parameters are NULL or have as many bytes as they say.
+        unsafe {
+            let mut changed = sized(params.cast_const(), frz_shallow_params::usual())?;
+            changed.set_liquid(&meaning("liquid", "frz_liquid", liquid, &LIQUIDS)?);
+            fill(params, None, changed)
+        }
+    })
+}
+
+/// Where liquid can be: square cells on the ground, and a range of heights. Heights and depths are integers in it, of a unit
+/// that is 2^-30 of the range.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_shallow_domain {
+    /// sizeof(frz_shallow_domain).
+    pub struct_size: u32,
+    /// 0.
+    pub flags: u32,
+    /// Edge of a cell (m), 1e-9 to 1e9.
+    pub cell: f64,
+    /// The corner with the least x and z (m).
+    pub origin: [f64; 2],
+    /// Count of cells along x and along z, 1 to 65536 each.
+    pub cells: [u32; 2],
+    /// The least height (m): ground below is taken to lie there.
+    pub low: f64,
+    /// The greatest height (m), above low; no liquid stands higher.
+    pub high: f64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_shallow_domain {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_shallow_domain";
+}
+
+/// Bytes of a cell with one solid while a terrain is made: solids and crossings, then columns, pipes and the surface.
+const CELL_BYTES: u64 = 160;
+
+/// The cells and heights of a host's domain, and whether the context allows them.
+///
+/// # Safety
+/// As [`sized`].
+pub(in crate::capi) unsafe fn domain(
+    ctx: &Context,
+    pointer: *const frz_shallow_domain,
+) -> Outcome<(Grid, Heights)> {
+    let none = frz_shallow_domain {
+        struct_size: 0,
+        flags: 0,
+        cell: 0.0,
+        origin: [0.0; 2],
+        cells: [0; 2],
+        low: 0.0,
+        high: 0.0,
+    };
+    // SAFETY: the caller's promise.
+    let given = unsafe { sized(pointer, none) }?;
+    no_flags(given.flags, 0)?;
+    let grid = Grid { cell: given.cell, origin: given.origin, size: given.cells.map(|count| count as usize) };
+    grid.validate()?;
+    let heights = Heights::between(given.low, given.high)?;
+    let [nx, nz] = given.cells;
+    let what = format!("a domain of {nx} x {nz} cells of {} m", given.cell);
+    ctx.allow(&what, u64::from(nx) * u64::from(nz) * CELL_BYTES)?;
+    Ok((grid, heights))
+}

@@ -1,0 +1,315 @@
+//! What shallow liquid carries: dyes, ages, and what decays.
+
+use std::ffi::c_char;
+
+use super::liquid::frz_shallow;
+use super::lists::each_sized;
+use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{change, read};
+use crate::capi::ffi::views::{Sized32, fill, frz_span, frz_view, meaning, required_text};
+use crate::shallow::{Law, Scalar, ScalarBalance, Shallow};
+
+/// Most scalars that a liquid carries.
+pub const FRZ_SHALLOW_MOST_SCALARS: u32 = 4;
+
+const _: () = assert!(FRZ_SHALLOW_MOST_SCALARS as usize == crate::shallow::scalars::MOST);
+
+/// What becomes of a scalar but for being carried.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_shallow_law {
+    /// Nothing: dye, salt, heat.
+    FRZ_SHALLOW_DYE = 0,
+    /// Half of it goes in each frz_shallow_scalar.half_life.
+    FRZ_SHALLOW_DECAYS = 1,
+    /// It is the time (s) since the liquid came in, in the mean over a column, up to frz_shallow_scalar.range.
+    FRZ_SHALLOW_AGES = 2,
+}
+
+use frz_shallow_law::*;
+
+const LAWS: [(u32, frz_shallow_law); 3] = [
+    (FRZ_SHALLOW_DYE as u32, FRZ_SHALLOW_DYE),
+    (FRZ_SHALLOW_DECAYS as u32, FRZ_SHALLOW_DECAYS),
+    (FRZ_SHALLOW_AGES as u32, FRZ_SHALLOW_AGES),
+];
+
+/// Something that the liquid carries. It begins zeroed, and then struct_size.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_shallow_scalar {
+    /// sizeof(frz_shallow_scalar), the same in all scalars of a call.
+    pub struct_size: u32,
+    /// A frz_shallow_law.
+    pub law: u32,
+    /// Its name in messages, not empty, and not that of another one; it is copied.
+    pub name: *const c_char,
+    /// Concentrations are within -range to range, in the scalar's own measure, and are kept to a 2^20th of it: 1e-9 to 1e9. Of a dye 1, of an
+    /// age 3600 (s).
+    pub range: f64,
+    /// Of one that decays: 1e-6 to 1e12 (s); of others it is not looked at.
+    pub half_life: f64,
+}
+
+// SAFETY: numbers and a pointer.
+unsafe impl Sized32 for frz_shallow_scalar {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_shallow_scalar";
+}
+
+impl frz_shallow_scalar {
+    const NONE: Self = Self { struct_size: 0, law: 0, name: std::ptr::null(), range: 0.0, half_life: 0.0 };
+
+    /// # Safety
+    /// The name must be NULL or a text that ends with a zero.
+    unsafe fn scalar(&self) -> Outcome<Scalar> {
+        let law = match meaning("law", "frz_shallow_law", self.law, &LAWS)? {
+            FRZ_SHALLOW_DYE => Law::Dye,
+            FRZ_SHALLOW_DECAYS => Law::Decays(self.half_life),
+            FRZ_SHALLOW_AGES => Law::Ages,
+        };
+        // SAFETY: the caller's promise.
+        let name = unsafe { required_text(self.name, "name") }?.to_string();
+        let scalar = Scalar { name, law, range: self.range };
+        scalar.validate()?;
+        Ok(scalar)
+    }
+}
+
+/// Reads the scalars of a host.
+///
+/// # Safety
+/// As [`each_sized`]; names must be NULL or texts that end with a zero.
+pub(in crate::capi) unsafe fn read_scalars(
+    scalars: *const frz_shallow_scalar,
+    count: usize,
+) -> Outcome<Vec<Scalar>> {
+    if count > FRZ_SHALLOW_MOST_SCALARS as usize {
+        let text = format!("{count} scalars are more than {FRZ_SHALLOW_MOST_SCALARS}");
+        return Err(Failure::argument(text));
+    }
+    let mut given = Vec::with_capacity(count);
+    // SAFETY: the caller's promise.
+    unsafe {
+        each_sized(scalars, count, ["scalar", "scalars"], frz_shallow_scalar::NONE, |scalar| {
+            given.push(scalar.scalar()?);
+            Ok(())
+        })?;
+    }
+    Ok(given)
+}
+
+/// Sets what the liquid carries, in place of what it carried before. Of each scalar there is nothing yet, and what is poured and what comes through
+/// sources has none until frz_shallow_set_poured and _set_sourced. The frame after it may allocate.
+///
+/// scalars: count scalars; NULL with a count of 0: there is none. FRZ_ERROR_ARGUMENT names one that is out of range, counted from 0; the old ones
+///     then stay.
+/// count: number of scalars, up to FRZ_SHALLOW_MOST_SCALARS.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_set_scalars(
+    shallow: *mut frz_shallow,
+    scalars: *const frz_shallow_scalar,
+    count: usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mut spill = change(shallow)?;
+            let given = read_scalars(scalars, count)?;
+            Ok(spill.shallow.set_scalars(&given)?)
+        }
+    })
+}
+
+/// Sets the concentrations of scalars in what frz_shallow_pour, _fill and _set_depths add from now on; 0 at first.
+///
+/// concentrations: double for each scalar, in their order, within its range.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_set_poured(
+    shallow: *mut frz_shallow,
+    concentrations: frz_view,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the liquid is NULL or was not destroyed; the view is the caller's.
+        unsafe {
+            let mut spill = change(shallow)?;
+            let given = of_scalars(spill.shallow.scalars().len(), &concentrations)?;
+            Ok(spill.shallow.set_poured(&given[..concentrations.count])?)
+        }
+    })
+}
+
+/// Sets the concentrations of scalars in what comes through a source; 0 after frz_shallow_set_flows.
+///
+/// flow: which flow point, counted from 0.
+/// concentrations: double for each scalar, in their order, within its range.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_set_sourced(
+    shallow: *mut frz_shallow,
+    flow: usize,
+    concentrations: frz_view,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the liquid is NULL or was not destroyed; the view is the caller's.
+        unsafe {
+            let mut spill = change(shallow)?;
+            let given = of_scalars(spill.shallow.scalars().len(), &concentrations)?;
+            Ok(spill.shallow.set_sourced(flow, &given[..concentrations.count])?)
+        }
+    })
+}
+
+/// A number for each scalar.
+///
+/// # Safety
+/// The view must describe memory that can be read.
+pub(in crate::capi) unsafe fn of_scalars(
+    count: usize,
+    numbers: &frz_view,
+) -> Outcome<[f64; FRZ_SHALLOW_MOST_SCALARS as usize]> {
+    // SAFETY: the caller's promise.
+    let given = unsafe { numbers.in_place::<f64>("concentrations") }?;
+    if given.len() != count {
+        let text = format!("concentrations: {} elements, but there are {count} scalars", given.len());
+        return Err(Failure::argument(text));
+    }
+    let mut out = [0.0; FRZ_SHALLOW_MOST_SCALARS as usize];
+    out.iter_mut().zip(given).for_each(|(out, number)| *out = number);
+    Ok(out)
+}
+
+/// Copies the concentrations of a scalar, in real time (frz_shallow); 0 where it is dry.
+///
+/// scalar: which, counted from 0.
+/// columns: uint32_t for each column that is wanted, its index; data NULL with a count of 0: all indices, in order.
+/// dst: room for a float for each; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+///
+/// Any number of threads may read a shallow liquid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_read_scalar(
+    shallow: *const frz_shallow,
+    scalar: u32,
+    columns: frz_view,
+    dst: frz_span,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the liquid is NULL or was not destroyed; view and span are the caller's.
+        unsafe {
+            let spill = read(shallow)?;
+            let (own, scalar) = (&spill.shallow, check_scalar(&spill.shallow, scalar)?);
+            let count = own.columns().len();
+            let value = |index: usize| own.concentration(scalar, index);
+            if columns.data.is_null() && columns.count == 0 {
+                return dst.put("dst", (0..count).map(value));
+            }
+            let indices = columns.in_place::<u32>("columns")?;
+            dst.check_room("dst", indices.len())?;
+            if let Some((at, index)) = indices.clone().enumerate().find(|(_, index)| *index as usize >= count)
+            {
+                let text = format!("columns: element {at}, {index}, is none of the {count} column indices");
+                return Err(Failure::argument(text));
+            }
+            dst.put("dst", indices.map(|index| value(index as usize)))
+        }
+    })
+}
+
+/// A scalar's number, if there is such a scalar.
+pub(in crate::capi) fn check_scalar(shallow: &Shallow, scalar: u32) -> Outcome<usize> {
+    let count = shallow.scalars().len();
+    match (scalar as usize) < count {
+        true => Ok(scalar as usize),
+        false => Err(Failure::argument(format!("scalar = {scalar} is none of the {count} that were set"))),
+    }
+}
+
+/// Where all of a scalar is, and came from: concentration x volume (its own measure x m3). inside + held + falling = poured + sourced + gained + grown
+/// - drained - absorbed - lost - dried.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_shallow_scalar_balance {
+    /// sizeof(frz_shallow_scalar_balance), set by the caller.
+    pub struct_size: u32,
+    /// Nothing.
+    pub reserved: u32,
+    /// In the columns.
+    pub inside: f64,
+    /// Poured in so far, less what was taken.
+    pub poured: f64,
+    /// Came in through sources.
+    pub sourced: f64,
+    /// Went out through drains.
+    pub drained: f64,
+    /// Went into absorbers.
+    pub absorbed: f64,
+    /// Went over the border, or fell where there is no ground.
+    pub lost: f64,
+    /// Came in over a border that absorbs waves.
+    pub gained: f64,
+    /// Waits for room, where ground or a body has swallowed it.
+    pub held: f64,
+    /// In the air.
+    pub falling: f64,
+    /// Added by its law; negative: taken.
+    pub grown: f64,
+    /// Left by rounding in columns that ran dry.
+    pub dried: f64,
+    /// The smallest amounts that the sum above is off: 0, as all are integers.
+    pub error: i64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_shallow_scalar_balance {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_shallow_scalar_balance";
+}
+
+impl From<ScalarBalance> for frz_shallow_scalar_balance {
+    fn from(sum: ScalarBalance) -> Self {
+        Self {
+            struct_size: 0,
+            reserved: 0,
+            inside: sum.inside,
+            poured: sum.poured,
+            sourced: sum.sourced,
+            drained: sum.drained,
+            absorbed: sum.absorbed,
+            lost: sum.lost,
+            gained: sum.gained,
+            held: sum.held,
+            falling: sum.falling,
+            grown: sum.grown,
+            dried: sum.dried,
+            error: sum.error.clamp(i64::MIN.into(), i64::MAX.into()) as i64,
+        }
+    }
+}
+
+/// Reports where all of a scalar is.
+///
+/// scalar: which, counted from 0.
+/// balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+///
+/// Any number of threads may read a shallow liquid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_get_scalar_balance(
+    shallow: *const frz_shallow,
+    scalar: u32,
+    balance: *mut frz_shallow_scalar_balance,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            fill(balance, None, ScalarBalance::default().into())?;
+            let spill = read(shallow)?;
+            let scalar = check_scalar(&spill.shallow, scalar)?;
+            fill(balance, None, spill.shallow.scalar_balance(scalar)?.into())
+        }
+    })
+}

@@ -1,0 +1,180 @@
+//! Shallow liquid as it was after a frame, for another thread.
+
+use super::ledges::Ledged;
+use super::lifts::no_lifts;
+use super::liquid::{Spill, frz_shallow};
+use super::read::probe;
+use super::surface::{Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target};
+use crate::capi::ffi::guard::{frz_status, guard};
+use crate::capi::ffi::handle::{Noun, change, destroy, read};
+use crate::capi::ffi::views::{frz_span, frz_view};
+use crate::capi::runtime::context::{creates, enter_light, frz_context};
+use crate::shallow::Snapshot;
+use crate::shallow::free_fall::mesh::Balls;
+use crate::shallow::surface::{Depths, Surface};
+
+/// A liquid as it was after a frame, copied: another thread may draw it while the next frame is computed. A host has two of them: one
+/// that is taken, and one that is drawn.
+pub struct frz_shallow_snapshot {
+    _opaque: [u8; 0],
+}
+
+/// The value of a snapshot's handle.
+pub(in crate::capi) struct Taken {
+    pub snapshot: Snapshot,
+    surface: Surface,
+    /// Makes meshes of what is in the air.
+    pub balls: Balls,
+    /// Minimum heights, where there were some.
+    least: Vec<i32>,
+    sunk: Vec<i32>,
+    /// Ledges, where there were some.
+    ledged: Ledged,
+}
+
+impl Taken {
+    /// Takes the minimum heights and the ledges of a liquid, if they are of its ground as it is.
+    fn fit(&mut self, spill: &Spill) {
+        self.ledged.copy_from(&spill.ledged);
+        let (least, sunk) = spill.lifted.known().unwrap_or_default();
+        self.least.clear();
+        self.least.extend_from_slice(least);
+        self.sunk.clear();
+        self.sunk.extend_from_slice(sunk);
+    }
+}
+
+impl Noun for frz_shallow_snapshot {
+    type Value = Taken;
+    const NAME: &'static str = "snapshot";
+    const TAG: u32 = 0x6672_7a0a;
+}
+
+/// Makes a snapshot of a liquid as it is now.
+///
+/// out: receives the snapshot, to be destroyed with frz_shallow_snapshot_destroy; NULL after a failure. It does not need the liquid.
+///
+/// Any number of threads may read a shallow liquid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_snapshot_create(
+    context: *mut frz_context,
+    shallow: *const frz_shallow,
+    out: *mut *mut frz_shallow_snapshot,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
+            let spill = read(shallow)?;
+            ctx.allow("the snapshot", spill.shallow.columns().len() as u64 * BYTES)?;
+            let snapshot = Snapshot::new(&spill.shallow);
+            let mut surface = Surface::default();
+            surface.reserve(snapshot.columns());
+            let mut balls = Balls::default();
+            balls.reserve(spill.shallow.params().falls.map_or(0, |falls| falls.most));
+            let mut taken = Taken {
+                snapshot,
+                surface,
+                balls,
+                least: Vec::new(),
+                sunk: Vec::new(),
+                ledged: Ledged::default(),
+            };
+            taken.fit(&spill);
+            Ok(taken)
+        })
+    }
+}
+
+/// Bytes of a snapshot for each column index: bases, ceilings, undersides, depth, velocity, scalars, minimum heights, and for a surface.
+const BYTES: u64 = 72;
+
+/// Takes a liquid as it is now in place of what a snapshot had, in real time (frz_shallow).
+///
+/// snapshot: of this liquid or any other. While another thread draws it: FRZ_ERROR_BUSY.
+///
+/// One thread at a time; any number may read a shallow liquid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_snapshot_take(
+    snapshot: *mut frz_shallow_snapshot,
+    shallow: *const frz_shallow,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mut taken = change(snapshot)?;
+            let spill = read(shallow)?;
+            taken.snapshot.take(&spill.shallow);
+            taken.fit(&spill);
+            Ok(())
+        }
+    })
+}
+
+/// Destroys a snapshot; NULL is fine.
+///
+/// snapshot: may be NULL. Not while a call uses it: it then stays.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_snapshot_destroy(snapshot: *mut frz_shallow_snapshot) {
+    // SAFETY: the snapshot is NULL or was not destroyed.
+    guard(|| unsafe { destroy(snapshot) });
+}
+
+/// Writes the surface that the liquid had when the snapshot was taken, as frz_shallow_surface does, in real time (frz_shallow).
+///
+/// context: another one than that of the thread that computes.
+/// layout: NULL for the usual one.
+/// target: the buffers, as those of frz_shallow_surface; their bound is that of the liquid at that time.
+/// size: receives the size of the surface, as there; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_snapshot_surface(
+    context: *mut frz_context,
+    snapshot: *mut frz_shallow_snapshot,
+    layout: *const frz_shallow_layout,
+    target: *const frz_shallow_target,
+    size: *mut frz_shallow_size,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's; so is what the spans describe.
+        unsafe {
+            let wanted = Wanted::new(layout, target, size)?;
+            let _call = enter_light(context)?;
+            let mut taken = change(snapshot)?;
+            let Taken { snapshot, surface, least, sunk, ledged, .. } = &mut *taken;
+            if wanted.is_lifted && least.is_empty() {
+                return Err(no_lifts("when the snapshot was taken"));
+            }
+            let ledges = ledged.wanted(wanted.is_skirted, "when the snapshot was taken")?;
+            let lifts: [&[i32]; 2] = if wanted.is_lifted { [least, sunk] } else { [&[]; 2] };
+            let depths = Depths {
+                depth: snapshot.depths(),
+                velocity: snapshot.velocities(),
+                active: Some(snapshot.active()),
+                least: lifts[0],
+                sunk: lifts[1],
+                carried: std::array::from_fn(|scalar| snapshot.concentrations(scalar)),
+                ledges,
+            };
+            wanted.write(surface, snapshot.columns(), &depths)
+        }
+    })
+}
+
+/// Reads the liquid at points as it was when the snapshot was taken, as frz_shallow_probe does, in real time (frz_shallow).
+///
+/// points: double[3] for each (m).
+/// dst: room for a frz_shallow_sample for each; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+///
+/// Any number of threads may read a snapshot.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_snapshot_probe(
+    snapshot: *const frz_shallow_snapshot,
+    points: frz_view,
+    dst: frz_span,
+) -> frz_status {
+    // SAFETY: the snapshot is NULL or was not destroyed; view and span are the caller's.
+    guard(|| unsafe { probe(&read(snapshot)?.snapshot.view(), &points, &dst) })
+}

@@ -1,0 +1,101 @@
+//! States of shallow liquid that a host saves, and brings back in place.
+
+use std::ffi::c_void;
+
+use super::liquid::frz_shallow;
+use crate::capi::ffi::guard::frz_status::FRZ_ERROR_CAPACITY;
+use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{change, clear, read, required};
+use crate::capi::ffi::views::{frz_span, frz_view};
+use crate::capi::runtime::context::{enter_light, frz_context};
+
+/// Writes all that the next frame depends on, besides the ground, the parameters, the flow points and the bodies, in real time
+/// (frz_shallow): for a replay, an undo, a host's own cache. The bytes are the same on any number of threads.
+///
+/// dst: room for capacity bytes. NULL: size receives how many are needed now, and nothing is written. A state has more of them the more
+///     of the ground is wet.
+/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+/// size: receives the bytes that were written, or are needed; 0 after other failures.
+///
+/// One thread at a time for each context; any number may read a shallow liquid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_save(
+    context: *mut frz_context,
+    shallow: *const frz_shallow,
+    dst: *mut c_void,
+    capacity: usize,
+    size: *mut usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's; so is the room at dst.
+        unsafe {
+            clear(size);
+            let size = required(size, "size")?;
+            let _call = enter_light(context)?;
+            let spill = read(shallow)?;
+            put_state(dst, capacity, size, spill.shallow.save_size(), |room| spill.shallow.save_to(room))
+        }
+    })
+}
+
+/// Puts a saved state in place of the liquid's, in real time (frz_shallow): from there it flows as the saved one did, to the same
+/// bytes, with the same parameters, flow points and bodies, which are set before. What flow points have moved comes back with it.
+///
+/// state: bytes bytes of frz_shallow_save. FRZ_ERROR_FILE, and the liquid is as it was, where they are damaged, of another version, of
+///     another ground or border, or of other kinds of flow points.
+/// bytes: their number.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_restore(
+    context: *mut frz_context,
+    shallow: *mut frz_shallow,
+    state: *const c_void,
+    bytes: usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's; so are the bytes.
+        unsafe {
+            let _call = enter_light(context)?;
+            let mut spill = change(shallow)?;
+            let state = taken_state(state, bytes)?;
+            Ok(spill.shallow.restore(state)?)
+        }
+    })
+}
+
+/// Writes a state of so many bytes to a host's room, if it gives any.
+///
+/// # Safety
+/// There must be room for `capacity` bytes at `dst`, unless it is NULL.
+pub(in crate::capi) unsafe fn put_state(
+    dst: *mut c_void,
+    capacity: usize,
+    size: *mut usize,
+    needed: usize,
+    save_to: impl FnOnce(&mut [u8]) -> crate::Result<usize>,
+) -> Outcome {
+    let room = frz_span { data: dst, count: capacity, stride: 0 };
+    // SAFETY: the caller's promise.
+    let room = unsafe {
+        size.write_unaligned(needed);
+        room.numbers::<u8>("dst", 1)?
+    };
+    let Some(room) = room else { return Ok(()) };
+    if room.len() < needed {
+        let text = format!("there is room for {capacity} bytes, {needed} are needed");
+        return Err(Failure::new(FRZ_ERROR_CAPACITY, text));
+    }
+    save_to(room)?;
+    Ok(())
+}
+
+/// The bytes of a host's state.
+///
+/// # Safety
+/// The pointer must be NULL or point to so many bytes, for `'a`.
+pub(in crate::capi) unsafe fn taken_state<'a>(state: *const c_void, bytes: usize) -> Outcome<&'a [u8]> {
+    required(state.cast_mut(), "state")?;
+    // SAFETY: the caller's promise.
+    unsafe { frz_view { data: state, count: bytes, stride: 0 }.bytes("state") }
+}

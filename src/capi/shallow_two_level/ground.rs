@@ -1,0 +1,284 @@
+//! Shallow liquid in cells of two sizes: its ground, its surface, its states.
+
+use std::cell::RefCell;
+use std::ffi::c_void;
+
+use super::liquid::{Spread, frz_shallow_detail};
+use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{change, clear, read, required};
+use crate::capi::ffi::views::{fill, frz_view};
+use crate::capi::runtime::context::{enter_light, frz_context};
+use crate::capi::shallow::state::{put_state, taken_state};
+use crate::capi::shallow::surface::{Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target};
+use crate::capi::shallow::terrain::{
+    Terrain, frz_shallow_body, frz_shallow_moved, read_bodies, read_heights,
+};
+use crate::shallow::Moved;
+use crate::shallow::surface::{Counts, Depths};
+use crate::shallow::terrain::Solids;
+use crate::shallow::two_level::surface;
+
+/// A call that changes the ground and reports what that did.
+///
+/// # Safety
+/// The pointers must be NULL or the caller's.
+unsafe fn moves(
+    context: *mut frz_context,
+    detail: *mut frz_shallow_detail,
+    moved: *mut frz_shallow_moved,
+    make: impl FnOnce(&mut Spread) -> Outcome<Moved>,
+) -> Outcome {
+    // SAFETY: the caller's promise.
+    unsafe {
+        if !moved.is_null() {
+            fill(moved, None, Moved::default().into())?;
+        }
+        let _call = enter_light(context)?;
+        let mut spread = change(detail)?;
+        let done = make(&mut spread)?;
+        if moved.is_null() { Ok(()) } else { fill(moved, None, done.into()) }
+    }
+}
+
+/// Moves the vertices of the mesh that the liquid was made with, as frz_shallow_update_terrain does, everywhere. After a failure all is as it was.
+///
+/// positions: float[3] for each vertex (m), finite, in the mesh's order.
+/// moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_update_terrain(
+    context: *mut frz_context,
+    detail: *mut frz_shallow_detail,
+    positions: frz_view,
+    moved: *mut frz_shallow_moved,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's; so is what the view describes.
+        unsafe {
+            moves(context, detail, moved, |spread| {
+                let Spread { detail, terrain, flows, .. } = spread;
+                let columns = detail.fine().columns();
+                let Terrain::Mesh(mesh) = terrain else {
+                    return Err(Failure::argument("the liquid was not made with a mesh that could move"));
+                };
+                mesh.take(&positions)?;
+                let solids = mesh.cast(columns.grid, columns.heights)?;
+                let moved = detail.update_terrain(&solids)?;
+                mesh.come();
+                for (index, flow) in flows.iter_mut().enumerate() {
+                    if let Some(on) = &flow.on {
+                        flow.point.at = terrain.place(on)?;
+                        detail.move_flow(index, flow.point.at);
+                    }
+                }
+                Ok(moved)
+            })
+        }
+    })
+}
+
+/// Changes the heights of the height field that the liquid was made on, as frz_shallow_update_heights does, everywhere. After a failure all is as it was.
+///
+/// heights: float for each cell of the domain (m), finite, as in frz_shallow_create_heights.
+/// moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_update_heights(
+    context: *mut frz_context,
+    detail: *mut frz_shallow_detail,
+    heights: frz_view,
+    moved: *mut frz_shallow_moved,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's; so is what the view describes.
+        unsafe {
+            moves(context, detail, moved, |spread| {
+                let Spread { detail, terrain, .. } = spread;
+                let (grid, range) = (detail.fine().columns().grid, detail.fine().columns().heights);
+                let Terrain::Heights(own) = terrain else {
+                    return Err(Failure::argument(
+                        "the liquid was not made on a height field that could change",
+                    ));
+                };
+                read_heights(&heights, &grid, &range, [0, 1].map(|axis| 0..grid.size[axis]), own)?;
+                let mut solids = Solids::empty(grid, range);
+                own.iter().for_each(|solid| solids.push(solid));
+                Ok(detail.update_terrain(&solids)?)
+            })
+        }
+    })
+}
+
+/// Sets the solids that move over the ground, as frz_shallow_set_bodies does, in real time (frz_shallow_detail). They may cross the edge of the box. After a
+/// failure all is as it was.
+///
+/// bodies: count bodies; NULL with a count of 0: there is none.
+/// count: number of bodies.
+/// moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_set_bodies(
+    context: *mut frz_context,
+    detail: *mut frz_shallow_detail,
+    bodies: *const frz_shallow_body,
+    count: usize,
+    moved: *mut frz_shallow_moved,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            moves(context, detail, moved, |spread| {
+                let Spread { detail, shapes, .. } = spread;
+                read_bodies(bodies, count, shapes)?;
+                Ok(detail.set_bodies(shapes)?)
+            })
+        }
+    })
+}
+
+/// Reports the most that the surface of any liquid can have, as frz_shallow_surface_bound does. It holds until the ground, a body or the box of small
+/// cells moves.
+///
+/// size: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+///
+/// Any number of threads may read a shallow liquid in cells of two sizes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_surface_bound(
+    detail: *const frz_shallow_detail,
+    size: *mut frz_shallow_size,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            fill(size, None, Counts::default().into())?;
+            fill(size, None, surface::bound(&read(detail)?.detail).into())
+        }
+    })
+}
+
+/// Writes the surface of all liquid as triangles, in real time (frz_shallow_detail): one mesh, without a crack between small and large cells. It ends at the
+/// middles of the outermost cells. The first one after the box of small cells has moved may allocate.
+///
+/// layout: NULL for the usual one. Without FRZ_SHALLOW_LIFTED and FRZ_SHALLOW_SKIRTED.
+/// target: the buffers, as in frz_shallow_surface. In frz_shallow_target.columns those of large cells follow those of small ones.
+///     FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed.
+/// size: receives the size of the surface, all zeroes after other failures; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_surface(
+    context: *mut frz_context,
+    detail: *mut frz_shallow_detail,
+    layout: *const frz_shallow_layout,
+    target: *const frz_shallow_target,
+    size: *mut frz_shallow_size,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's; so is what the spans describe.
+        unsafe {
+            let wanted = Wanted::new(layout, target, size)?;
+            let _call = enter_light(context)?;
+            let mut spread = change(detail)?;
+            let Spread { detail, surface, velocities, concentrations, is_reserved, .. } = &mut *spread;
+            for (is_wanted, name) in
+                [(wanted.is_lifted, "FRZ_SHALLOW_LIFTED"), (wanted.is_skirted, "FRZ_SHALLOW_SKIRTED")]
+            {
+                if is_wanted {
+                    return Err(Failure::argument(format!("{name} is not for liquid in cells of two sizes")));
+                }
+            }
+            if !*is_reserved {
+                surface.reserve(detail);
+                *is_reserved = true;
+            }
+            let liquids = [detail.fine(), detail.coarse()];
+            for (velocities, liquid) in velocities.iter_mut().zip(liquids) {
+                let len = if wanted.velocities() { liquid.columns().len() } else { 0 };
+                velocities.resize(len, [0.0; 2]);
+                if len > 0 {
+                    liquid.velocities(velocities)?;
+                }
+            }
+            for (concentrations, liquid) in concentrations.iter_mut().zip(liquids) {
+                for (scalar, numbers) in concentrations.iter_mut().enumerate() {
+                    let len = if wanted.scalar(scalar) { liquid.columns().len() } else { 0 };
+                    numbers.resize(len, 0.0);
+                    if wanted.scalar(scalar) {
+                        liquid.concentrations(scalar, numbers)?;
+                    }
+                }
+            }
+            let depths = [0, 1].map(|at| Depths {
+                depth: liquids[at].depths(),
+                velocity: &velocities[at],
+                active: Some(liquids[at].active()),
+                carried: concentrations[at].each_ref().map(|numbers| &numbers[..]),
+                ..Depths::default()
+            });
+            let depths = depths.each_ref();
+            let both = RefCell::new(surface);
+            wanted.write_with(
+                |layout, target| both.borrow_mut().build(detail, depths, layout, target),
+                || both.borrow_mut().count(detail, depths),
+            )
+        }
+    })
+}
+
+/// Writes all that the next frame depends on, as frz_shallow_save does, in real time (frz_shallow_detail). The box of small cells is part of it.
+///
+/// dst: room for capacity bytes. NULL: size receives how many are needed now, and nothing is written.
+/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+/// size: receives the bytes that were written, or are needed; 0 after other failures.
+///
+/// One thread at a time for each context; any number may read a shallow liquid in cells of two sizes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_save(
+    context: *mut frz_context,
+    detail: *const frz_shallow_detail,
+    dst: *mut c_void,
+    capacity: usize,
+    size: *mut usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's; so is the room at dst.
+        unsafe {
+            clear(size);
+            let size = required(size, "size")?;
+            let _call = enter_light(context)?;
+            let spread = read(detail)?;
+            put_state(dst, capacity, size, spread.detail.save_size(), |room| spread.detail.save_to(room))
+        }
+    })
+}
+
+/// Puts a saved state in place of the liquid's, as frz_shallow_restore does, and moves the box of small cells to where it was.
+///
+/// state: bytes bytes of frz_shallow_detail_save. FRZ_ERROR_FILE, and the liquid is as it was, where they are damaged, of another version, of
+///     another ground or border, or of other kinds of flow points.
+/// bytes: their number.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_restore(
+    context: *mut frz_context,
+    detail: *mut frz_shallow_detail,
+    state: *const c_void,
+    bytes: usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's; so are the bytes.
+        unsafe {
+            let _call = enter_light(context)?;
+            let mut spread = change(detail)?;
+            let state = taken_state(state, bytes)?;
+            let near = spread.detail.near().clone();
+            spread.detail.restore(state)?;
+            spread.is_reserved &= near == *spread.detail.near();
+            Ok(())
+        }
+    })
+}

@@ -1,0 +1,398 @@
+//! Shallow liquid in cells of two sizes: small near what matters.
+
+use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{Noun, change, clear, destroy, read, required};
+use crate::capi::ffi::views::{Sized32, fill, finite, frz_view};
+use crate::capi::mesh::triangles::frz_mesh;
+use crate::capi::runtime::context::{creates, enter_light, frz_context};
+use crate::capi::shallow::flows::{Attached, frz_shallow_balance, frz_shallow_flow};
+use crate::capi::shallow::liquid::frz_shallow_report;
+use crate::capi::shallow::params::{domain, frz_shallow_domain, frz_shallow_params, params};
+use crate::capi::shallow::terrain::Terrain;
+use crate::context::Context;
+use crate::shallow::scalars::MOST;
+use crate::shallow::sources::FlowPoint;
+use crate::shallow::terrain::Solids;
+use crate::shallow::terrain::shapes::Shape;
+use crate::shallow::two_level::cells_around;
+use crate::shallow::two_level::surface::Surface;
+use crate::shallow::{Balance, Detail, Params, Report};
+
+/// Shallow liquid in cells of two sizes: those of its domain in a box that may move, around an instrument or a player, and of twice the length everywhere
+/// else, where a frame takes a quarter of the time. No liquid is lost between them.
+///
+/// It has no falls and no thickening. In real time, as frz_shallow says, are frz_shallow_detail_step, _surface, _save and _set_bodies;
+/// _set_near, _update_terrain and _update_heights may allocate, and so may _restore where it moves the box.
+pub struct frz_shallow_detail {
+    _opaque: [u8; 0],
+}
+
+/// The value of a handle.
+pub(in crate::capi) struct Spread {
+    pub detail: Detail,
+    /// What it flows over.
+    pub terrain: Terrain,
+    /// Flow points of the host, in its order.
+    pub flows: Vec<Attached>,
+    /// Obstacles of the last call.
+    pub shapes: Vec<Shape>,
+    /// Makes surfaces; whether it has room for what the columns are now.
+    pub surface: Surface,
+    pub is_reserved: bool,
+    /// Mean velocities of all column indices of both sizes (m/s), when a surface wants them.
+    pub velocities: [Vec<[f32; 2]>; 2],
+    /// Concentrations of scalars by column index of both, when a surface wants them.
+    pub concentrations: [[Vec<f32>; MOST]; 2],
+}
+
+impl Noun for frz_shallow_detail {
+    type Value = Spread;
+    const NAME: &'static str = "shallow liquid in cells of two sizes";
+    const TAG: u32 = 0x6672_7a0c;
+}
+
+impl Spread {
+    /// Dry ground, with a box of small cells.
+    ///
+    /// # Safety
+    /// The pointer must be NULL or point to four numbers.
+    unsafe fn new(
+        ctx: &Context,
+        params: Params,
+        terrain: Terrain,
+        solids: &Solids,
+        near: *const f64,
+    ) -> Outcome<Self> {
+        // SAFETY: the caller's promise.
+        let near = cells_around(&solids.grid, unsafe { bounds(near) }?)?;
+        let detail = ctx.phase("columns", || Detail::new(ctx, solids, params, near))?;
+        let mut surface = Surface::default();
+        surface.reserve(&detail);
+        Ok(Self {
+            detail,
+            terrain,
+            flows: Vec::new(),
+            shapes: Vec::new(),
+            surface,
+            is_reserved: true,
+            velocities: Default::default(),
+            concentrations: Default::default(),
+        })
+    }
+}
+
+/// A box of a host.
+///
+/// # Safety
+/// The pointer must be NULL or point to four numbers.
+unsafe fn bounds(near: *const f64) -> Outcome<[f64; 4]> {
+    let near = required(near.cast_mut(), "near")?;
+    // SAFETY: the caller's promise.
+    Ok(unsafe { near.cast::<[f64; 4]>().read_unaligned() })
+}
+
+/// Makes a liquid in cells of two sizes on a mesh, as frz_shallow_create does: dry at first.
+///
+/// params: NULL for the usual ones. Without falls and thickening.
+/// domain: where liquid can be. Its counts of cells are even.
+/// mesh: it is copied.
+/// near: double[4], least x, least z, greatest x and greatest z (m): the small cells are those of the smallest box of pairs of cells that has
+///     it, as far as the domain goes; all of them may be small. FRZ_ERROR_ARGUMENT where it lies outside.
+/// out: receives the liquid, to be destroyed with frz_shallow_detail_destroy; NULL after a failure.
+///
+/// Any number of threads may read a mesh; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_create(
+    context: *mut frz_context,
+    params: *const frz_shallow_params,
+    domain: *const frz_shallow_domain,
+    mesh: *const frz_mesh,
+    near: *const f64,
+    out: *mut *mut frz_shallow_detail,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
+            let params = self::params(params)?;
+            let (grid, heights) = self::domain(ctx, domain)?;
+            let mesh = read(mesh)?;
+            let (terrain, solids) = Terrain::of_mesh(ctx, &mesh.triangles, grid, heights)?;
+            Spread::new(ctx, params, terrain, &solids, near)
+        })
+    }
+}
+
+/// Makes a liquid in cells of two sizes on a height field, as frz_shallow_create_heights does: dry at first.
+///
+/// params: as in frz_shallow_detail_create.
+/// domain: as in frz_shallow_detail_create.
+/// heights: float for each cell of the domain (m), as in frz_shallow_create_heights.
+/// near: as in frz_shallow_detail_create.
+/// out: receives the liquid, to be destroyed with frz_shallow_detail_destroy; NULL after a failure.
+///
+/// One thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_create_heights(
+    context: *mut frz_context,
+    params: *const frz_shallow_params,
+    domain: *const frz_shallow_domain,
+    heights: frz_view,
+    near: *const f64,
+    out: *mut *mut frz_shallow_detail,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
+            let params = self::params(params)?;
+            let (grid, range) = self::domain(ctx, domain)?;
+            let tops = heights.in_place::<f32>("heights")?;
+            let (terrain, solids) = Terrain::of_heights(tops, grid, range)?;
+            Spread::new(ctx, params, terrain, &solids, near)
+        })
+    }
+}
+
+/// Destroys a liquid in cells of two sizes; NULL is fine.
+///
+/// detail: may be NULL. Not while a call uses it: it then stays.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_destroy(detail: *mut frz_shallow_detail) {
+    // SAFETY: the liquid is NULL or was not destroyed.
+    guard(|| unsafe { destroy(detail) });
+}
+
+/// Sets what flows, and how, as frz_shallow_set_params does.
+///
+/// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_set_params(
+    detail: *mut frz_shallow_detail,
+    params: *const frz_shallow_params,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mut spread = change(detail)?;
+            required(params.cast_mut(), frz_shallow_params::NAME)?;
+            Ok(spread.detail.set_params(self::params(params)?)?)
+        }
+    })
+}
+
+/// Moves the box of small cells. Liquid keeps its volume and what flows, and its surface stays level where it was. A box of the same cells costs
+/// nothing, and so a host may call it in each frame.
+///
+/// near: double[4], as in frz_shallow_detail_create. After a failure all is as it was.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_set_near(
+    detail: *mut frz_shallow_detail,
+    near: *const f64,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mut spread = change(detail)?;
+            let cells = cells_around(&spread.detail.fine().columns().grid, bounds(near)?)?;
+            if cells != *spread.detail.near() {
+                spread.is_reserved = false;
+            }
+            Ok(spread.detail.set_near(cells)?)
+        }
+    })
+}
+
+/// Reports the box of small cells.
+///
+/// near: receives double[4]: least x, least z, greatest x and greatest z (m); all zeroes after a failure.
+///
+/// Any number of threads may read a shallow liquid in cells of two sizes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_get_near(
+    detail: *const frz_shallow_detail,
+    near: *mut f64,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let near = near.cast::<[f64; 4]>();
+            clear(near);
+            let near = required(near, "near")?;
+            let spread = read(detail)?;
+            let ([x, z], grid) = (spread.detail.near(), spread.detail.fine().columns().grid);
+            let at = |axis: usize, cell: usize| grid.origin[axis] + cell as f64 * grid.cell;
+            near.write_unaligned([at(0, x.start), at(1, z.start), at(0, x.end), at(1, z.end)]);
+            Ok(())
+        }
+    })
+}
+
+/// Computes a frame, in real time (frz_shallow_detail), as frz_shallow_step does without a budget.
+///
+/// dt: as there.
+/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_step(
+    context: *mut frz_context,
+    detail: *mut frz_shallow_detail,
+    dt: f64,
+    report: *mut frz_shallow_report,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            if !report.is_null() {
+                fill(report, None, frz_shallow_report::of(&Report::default(), 0.0))?;
+            }
+            let call = enter_light(context)?;
+            let done = change(detail)?.detail.step(call.ctx(), dt)?;
+            if report.is_null() { Ok(()) } else { fill(report, None, frz_shallow_report::of(&done, dt)) }
+        }
+    })
+}
+
+/// Sets sources, drains and absorbers, as frz_shallow_set_flows does. Each acts on the cells of the size that its centre lies in.
+///
+/// flows: count flow points; NULL with a count of 0: there is none. After a failure the old ones stay.
+/// count: number of flow points.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_set_flows(
+    detail: *mut frz_shallow_detail,
+    flows: *const frz_shallow_flow,
+    count: usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mut spread = change(detail)?;
+            let attached = Attached::all(flows, count, &spread.terrain)?;
+            let points: Vec<FlowPoint> = attached.iter().map(|flow| flow.point.clone()).collect();
+            spread.detail.set_flows(&points, |at| format!("flow {at}"))?;
+            spread.flows = attached;
+            Ok(())
+        }
+    })
+}
+
+/// Gives a flow point another rate: a valve. What it has moved stays.
+///
+/// flow: which, counted from 0.
+/// rate: volume in a second (m3/s), 0 or more.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_set_rate(
+    detail: *mut frz_shallow_detail,
+    flow: usize,
+    rate: f64,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the liquid is NULL or was not destroyed.
+        let mut spread = unsafe { change(detail) }?;
+        Ok(spread.detail.set_rate(flow, rate)?)
+    })
+}
+
+/// Reports how much a flow point has moved since it was set: what came in, or went out.
+///
+/// flow: which, counted from 0.
+/// volume: receives it (m3); 0 after a failure.
+///
+/// Any number of threads may read a shallow liquid in cells of two sizes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_flow_moved(
+    detail: *const frz_shallow_detail,
+    flow: usize,
+    volume: *mut f64,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(volume);
+            let volume = required(volume, "volume")?;
+            let spread = read(detail)?;
+            let count = spread.flows.len();
+            if flow >= count {
+                return Err(Failure::argument(format!("flow = {flow} is none of the {count} that were set")));
+            }
+            volume.write_unaligned(spread.detail.moved(flow));
+            Ok(())
+        }
+    })
+}
+
+/// Pours a volume at a place, as frz_shallow_pour does, into the cells of the size that it lies in.
+///
+/// at: double[3], the place (m).
+/// radius: as in frz_shallow_flow (m).
+/// volume: what to pour (m3); negative: what to take.
+/// poured: receives what came in (m3), or went out (negative); 0 after a failure. May be NULL.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_pour(
+    detail: *mut frz_shallow_detail,
+    at: *const f64,
+    radius: f64,
+    volume: f64,
+    poured: *mut f64,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(poured);
+            let mut spread = change(detail)?;
+            let at = required(at.cast_mut(), "at")?.cast::<[f64; 3]>().read_unaligned();
+            finite("volume", volume)?;
+            let moved = spread.detail.pour_at(at, radius, volume)?;
+            if !poured.is_null() {
+                poured.write_unaligned(moved);
+            }
+            Ok(())
+        }
+    })
+}
+
+/// Fills all columns up to a height, as frz_shallow_fill does.
+///
+/// height: where the surface is to be (m).
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_fill(detail: *mut frz_shallow_detail, height: f64) -> frz_status {
+    guard(|| {
+        // SAFETY: the liquid is NULL or was not destroyed.
+        let mut spread = unsafe { change(detail) }?;
+        finite("height", height)?;
+        spread.detail.fill(height);
+        Ok(())
+    })
+}
+
+/// Reports where all liquid is. Less than a cell's share of four units waits for the rest of a unit of large cells: it is part of held.
+///
+/// balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+///
+/// Any number of threads may read a shallow liquid in cells of two sizes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_detail_get_balance(
+    detail: *const frz_shallow_detail,
+    balance: *mut frz_shallow_balance,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            fill(balance, None, Balance::default().into())?;
+            fill(balance, None, read(detail)?.detail.balance().into())
+        }
+    })
+}

@@ -1,0 +1,433 @@
+//! The base layer: the first of the objects that step. Those that follow have the same shape.
+
+use std::ffi::c_void;
+use std::ptr::NonNull;
+
+use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{Noun, change, clear, destroy_whole, free, give, read, required};
+use crate::capi::ffi::views::{Sized32, fill, finite, frz_view, sized, write_bytes};
+use crate::capi::grid::sparse::{Grid, frz_grid};
+use crate::capi::level_set::body::{Role, Shapes, bodies, frz_body};
+use crate::capi::level_set::tools::frz_noise;
+use crate::capi::mesh::triangles::no_flags;
+use crate::capi::runtime::context::{creates, enter, frz_context};
+use crate::numeric::blocks::Origin;
+use crate::snow::base_layer::{BaseLayer, Params};
+use crate::sweep::{Body, TOLERANCE};
+use crate::vdb::FloatGrid;
+
+/// A layer of snow that bodies press into.
+pub struct frz_base {
+    _opaque: [u8; 0],
+}
+
+/// How bodies press into the snow. All of it may change between steps.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_base_params {
+    /// sizeof(frz_base_params).
+    pub struct_size: u32,
+    /// 0.
+    pub flags: u32,
+    /// Largest error of the swept volume (voxels), 0.001 to 1.
+    pub tolerance: f64,
+    /// Ragged edges of imprints.
+    pub noise: frz_noise,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_base_params {
+    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_base_params, noise), size_of::<Self>()];
+    const NAME: &'static str = "frz_base_params";
+}
+
+impl frz_base_params {
+    const USUAL: Self = Self { struct_size: 0, flags: 0, tolerance: TOLERANCE, noise: frz_noise::USUAL };
+
+    /// Refuses unknown flags, and values that are not finite.
+    fn check(&self) -> Outcome {
+        no_flags(self.flags, 0)?;
+        finite("tolerance", self.tolerance)?;
+        self.noise.check()
+    }
+
+    /// The library's own parameters for voxels of a size (m).
+    fn params(&self, cell: f64) -> Params {
+        Params { noise: self.noise.params(cell), tolerance: self.tolerance }
+    }
+}
+
+/// What a step did.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_base_report {
+    /// sizeof(frz_base_report), set by the caller.
+    pub struct_size: u32,
+    /// Nothing.
+    pub reserved: u32,
+    /// Snow removed in this step (m3).
+    pub removed_volume: f64,
+    /// Snow left (m3).
+    pub base_volume: f64,
+    /// Blocks of 8 x 8 x 8 voxels in which the snow changed.
+    pub touched_blocks: u64,
+    /// Triangles of the swept volume's boundary near the snow.
+    pub sweep_faces: u64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_base_report {
+    const SIZES: &'static [usize] =
+        &[std::mem::offset_of!(frz_base_report, touched_blocks), size_of::<Self>()];
+    const NAME: &'static str = "frz_base_report";
+}
+
+/// Grids that a base layer lends: snow, removed, compression, touched.
+const LENT: usize = 4;
+
+/// The value of a base layer's handle.
+pub(in crate::capi) struct Layer {
+    pub layer: Box<BaseLayer>,
+    shapes: Shapes,
+    lent: [*mut frz_grid; LENT],
+    dirty: Vec<Origin>,
+}
+
+impl Noun for frz_base {
+    type Value = Layer;
+    const NAME: &'static str = "base layer";
+    const TAG: u32 = 0x6672_7a05;
+}
+
+impl Layer {
+    fn new(layer: BaseLayer) -> Outcome<Self> {
+        let mut state = Self {
+            layer: Box::new(layer),
+            shapes: Shapes::new(),
+            lent: [std::ptr::null_mut(); LENT],
+            dirty: Vec::new(),
+        };
+        for index in 0..LENT {
+            let grid = NonNull::from(state.grids()[index]);
+            // SAFETY: the place is a pointer's.
+            unsafe { give(&raw mut state.lent[index], Grid::Lent(grid)) }?;
+        }
+        Ok(state)
+    }
+
+    fn grids(&self) -> [&FloatGrid; LENT] {
+        [self.layer.surface(), self.layer.removed(), self.layer.compression(), self.layer.touched()]
+    }
+
+    /// Runs `work` while the grids are not in use, and lends them again.
+    fn alone<T>(&mut self, work: impl FnOnce(&mut Self) -> Outcome<T>) -> Outcome<T> {
+        // SAFETY: the handles live as long as this.
+        let mut held = self.lent.map(|grid| unsafe { change(grid) });
+        if let Some(Err(_)) = held.iter().find(|held| held.is_err()) {
+            let text = "a grid of the base layer is in use by another call";
+            return Err(Failure::new(frz_status::FRZ_ERROR_BUSY, text));
+        }
+        let value = work(self);
+        for (held, grid) in held.iter_mut().flatten().zip(self.grids()) {
+            **held = Grid::Lent(NonNull::from(grid));
+        }
+        value
+    }
+}
+
+impl Drop for Layer {
+    fn drop(&mut self) {
+        for grid in self.lent {
+            // SAFETY: made in `new`; the layer is destroyed only when they are not in use.
+            unsafe { free(grid) };
+        }
+    }
+}
+
+/// Fills parameters with the usual values, those of the thesis' look.
+///
+/// params: receives them.
+/// size: sizeof(frz_base_params).
+///
+/// Any thread.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_base_params_init(params: *mut frz_base_params, size: usize) -> frz_status {
+    // SAFETY: the parameters are NULL or have so many bytes.
+    guard(|| unsafe { fill(params, Some(size), frz_base_params::USUAL) })
+}
+
+/// Makes a base layer: untouched, or in a state that frz_base_save wrote.
+///
+/// params: NULL for the usual ones.
+/// snow: a level set with voxels fixed in the world, for instance from frz_snow_layer or frz_grid_load; it is copied.
+/// restart: restart_bytes bytes of frz_base_save of a layer made from the same snow: its grids come back bit for
+///     bit, on any number of threads. NULL: untouched. Bytes that are damaged, of another version or of other snow are
+///     FRZ_ERROR_FILE.
+/// restart_bytes: 0 without a restart.
+/// out: receives the layer, to be destroyed with frz_base_destroy; NULL after a failure.
+///
+/// Any number of threads may read a grid; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_base_create(
+    context: *mut frz_context,
+    params: *const frz_base_params,
+    snow: *const frz_grid,
+    restart: *const c_void,
+    restart_bytes: usize,
+    out: *mut *mut frz_base,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
+            let held = read(snow)?;
+            let snow = held.floats()?;
+            let params = if params.is_null() {
+                frz_base_params::USUAL
+            } else {
+                sized(params, frz_base_params::USUAL)?
+            };
+            params.check()?;
+            let params = params.params(snow.voxel_size());
+            let state =
+                frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
+            ctx.allow("the base layer", snow.memory_bytes().saturating_add(state.len() as u64))?;
+            let untouched = restart.is_null();
+            let layer = ctx.polled(|| match untouched {
+                true => BaseLayer::new(ctx, snow.deep_copy()?, params),
+                false => BaseLayer::restore(ctx, snow.deep_copy()?, params, &state),
+            })?;
+            Layer::new(layer)
+        })
+    }
+}
+
+/// Destroys a base layer, and the grids that it lent; NULL is fine.
+///
+/// base: may be NULL. Not while a call uses it or one of its grids: it then stays, with all of them.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_base_destroy(base: *mut frz_base) {
+    // SAFETY: the layer is NULL or was not destroyed.
+    guard(|| unsafe { destroy_whole(base, |layer: &Layer| layer.lent.to_vec()) });
+}
+
+/// Sets how bodies press from the next step on. All parameters may change between steps; what cannot change, the
+/// voxels and the snow itself, is none of them.
+///
+/// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_base_set_params(
+    base: *mut frz_base,
+    params: *const frz_base_params,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mut base = change(base)?;
+            let params = sized(params, frz_base_params::USUAL)?;
+            params.check()?;
+            let params = params.params(base.layer.surface().voxel_size());
+            Ok(base.layer.set_params(params)?)
+        }
+    })
+}
+
+/// Removes from the snow what bodies pass through in a step.
+///
+/// The work is done aside and put in place at the end: after a failure or a cancel the layer is as it was before.
+///
+/// bodies: count bodies; NULL with a count of 0. A vertex farther than 131072 voxels from the middle of the snow is out of
+///     reach: FRZ_ERROR_ARGUMENT names its body, counted from 0, and nothing is changed.
+/// count: number of bodies.
+/// dt: length of the step (s). 0: the bodies are cut out where they are at its beginning, as the first frame of a
+///     shot wants it.
+/// frame: the number that frz_base_touched gets where the snow changes, from -16777216 to 16777216.
+/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time; the layer's grids must not be in use meanwhile (FRZ_ERROR_BUSY).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_base_step(
+    context: *mut frz_context,
+    base: *mut frz_base,
+    bodies: *const frz_body,
+    count: usize,
+    dt: f64,
+    frame: i32,
+    report: *mut frz_base_report,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mut told = frz_base_report {
+                struct_size: 0,
+                reserved: 0,
+                removed_volume: 0.0,
+                base_volume: 0.0,
+                touched_blocks: 0,
+                sweep_faces: 0,
+            };
+            if !report.is_null() {
+                fill(report, None, told)?;
+            }
+            let call = enter(context)?;
+            let ctx = call.ctx();
+            let mut base = change(base)?;
+            if frame.unsigned_abs() > 1 << 24 {
+                return Err(Failure::argument(format!(
+                    "frame = {frame} is not within -16777216 to 16777216"
+                )));
+            }
+            let done = base.alone(|state| {
+                let mut shapes = std::mem::take(&mut state.shapes);
+                let bodies = self::bodies(ctx, bodies, count, dt, Role::Sweep, &mut shapes);
+                state.shapes = shapes;
+                let bodies: Vec<Body> = bodies?.into_iter().map(|(body, _)| body).collect();
+                let done = state.layer.step(ctx, &bodies, 0.0, dt, frame)?;
+                state.dirty = state.layer.dirty().collect();
+                Ok(done)
+            })?;
+            told.removed_volume = done.removed_volume;
+            told.base_volume = done.base_volume;
+            told.touched_blocks = done.touched_blocks as u64;
+            told.sweep_faces = done.sweep_faces as u64;
+            if report.is_null() { Ok(()) } else { fill(report, None, told) }
+        }
+    })
+}
+
+/// Writes what the next step depends on, besides the snow that the layer was made from: for a host's own cache.
+///
+/// Only blocks that ever changed are kept, packed; the bytes are the same on any number of threads. What the last
+/// step removed, and which blocks it changed, is not part of it.
+///
+/// dst: room for capacity bytes. NULL: size receives a number that certainly suffices, and nothing is written.
+/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+/// size: receives the bytes that were written, or are needed; 0 after other failures.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_base_save(
+    context: *mut frz_context,
+    base: *const frz_base,
+    dst: *mut c_void,
+    capacity: usize,
+    size: *mut usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(size);
+            let call = enter(context)?;
+            let ctx = call.ctx();
+            let base = read(base)?;
+            let bound = || base.layer.save_bound();
+            write_bytes(dst, capacity, size, bound, || Ok(base.layer.save(ctx)?))
+        }
+    })
+}
+
+fn lent(base: *const frz_base, index: usize) -> *const frz_grid {
+    crate::capi::ffi::guard::guard_value(std::ptr::null(), || {
+        // SAFETY: the layer is NULL or was not destroyed.
+        Ok(unsafe { read(base) }?.lent[index].cast_const())
+    })
+}
+
+/// Lends the snow: a level set (m), negative inside.
+///
+/// The grid is the layer's: the pointer is valid until the layer is destroyed, its contents until the next step. NULL
+/// after a failure.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_base_grid(base: *const frz_base) -> *const frz_grid {
+    lent(base, 0)
+}
+
+/// Lends what the last step removed: a level set (m), empty before the first step and after a restart.
+///
+/// The grid is the layer's, as that of frz_base_grid.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_base_removed(base: *const frz_base) -> *const frz_grid {
+    lent(base, 1)
+}
+
+/// Lends how far the snow is pressed: the part of its column's height that was removed, 0 to 1, at touched voxels
+/// of the surface.
+///
+/// The grid is the layer's, as that of frz_base_grid.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_base_compression(base: *const frz_base) -> *const frz_grid {
+    lent(base, 2)
+}
+
+/// Lends when the snow was last touched: the frame that frz_base_step was given, at touched voxels of the surface.
+///
+/// The grid is the layer's, as that of frz_base_grid.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_base_touched(base: *const frz_base) -> *const frz_grid {
+    lent(base, 3)
+}
+
+/// Reports the box that the snow lies in: no step makes it larger.
+///
+/// min: receives double[3], its least corner (m); zeroes after a failure.
+/// max: receives double[3], its greatest corner (m); zeroes after a failure.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_base_bounds(base: *const frz_base, min: *mut f64, max: *mut f64) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let [min, max] = [min.cast::<[f64; 3]>(), max.cast::<[f64; 3]>()];
+            clear(min);
+            clear(max);
+            let [min, max] = [required(min, "min")?, required(max, "max")?];
+            let (low, high) = read(base)?.layer.bounds();
+            min.write_unaligned(low.into());
+            max.write_unaligned(high.into());
+            Ok(())
+        }
+    })
+}
+
+/// Lends the origins of the blocks that the last step changed in any of the layer's grids, ascending: with
+/// frz_grid_probe a host brings its own copy up to date.
+///
+/// origins: receives a pointer to count times int32_t[3], voxels of least corners; it is the layer's and stays until
+///     the next step. NULL when there is none, or after a failure.
+/// count: receives their number; 0 after a failure. There is none before the first step and after a restart.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_base_dirty(
+    base: *const frz_base,
+    origins: *mut *const i32,
+    count: *mut usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(origins);
+            clear(count);
+            let count = required(count, "count")?;
+            let origins = required(origins, "origins")?;
+            let base = read(base)?;
+            if !base.dirty.is_empty() {
+                origins.write(base.dirty.as_flattened().as_ptr());
+                count.write(base.dirty.len());
+            }
+            Ok(())
+        }
+    })
+}

@@ -1,0 +1,368 @@
+//! Grains: snow that is pushed, piled and thrown.
+
+use std::ffi::c_void;
+
+use super::base_layer::frz_base;
+use super::grains_params::{FRZ_GRAINS_FLOOR, frz_grains_params};
+use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{Noun, change, destroy, read};
+use crate::capi::ffi::saved::{Saved, resumed};
+use crate::capi::ffi::views::{Sized32, fill, frz_view, sized, within};
+use crate::capi::grid::sparse::frz_grid;
+use crate::capi::level_set::body::{Role, Shapes, bodies, frz_body};
+use crate::capi::runtime::context::{creates, enter, frz_context};
+use crate::context::Context;
+use crate::numeric::digits;
+use crate::snow::grains::{Base, Grains, Surroundings, memory};
+use crate::vdb::{FloatGrid, GridClass};
+
+/// Grains of snow, all of one size.
+pub struct frz_grains {
+    _opaque: [u8; 0],
+}
+
+impl frz_grains_params {
+    fn ground(&self) -> Ground {
+        let floor = Some(self.floor).filter(|_| self.flags & FRZ_GRAINS_FLOOR != 0);
+        Ground { floor, lowest: self.lowest }
+    }
+}
+
+/// What a step did.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_grains_report {
+    /// sizeof(frz_grains_report), set by the caller.
+    pub struct_size: u32,
+    /// Sub-steps that the step was divided into.
+    pub sub_steps: u32,
+    /// Grains now.
+    pub count: u64,
+    /// Those that rest: nothing moves them until something wakes them.
+    pub resting: u64,
+    /// Grains that were born of removed snow.
+    pub born: u64,
+    /// Grains that fell below the lowest height, left the box or the range of coordinates.
+    pub dropped: u64,
+    /// Grains that were as old as their lifetime.
+    pub expired: u64,
+    /// Grains that are pressed where they have no room: the attribute FRZ_GRAINS_TRAPPED.
+    pub trapped: u64,
+    /// Snow that the base layer lost (m3).
+    pub removed_volume: f64,
+    /// Grains that removed snow has paid for and that are not born yet: fractions, and what had no place.
+    pub owed: f64,
+    /// Largest speed (m/s).
+    pub fastest: f64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_grains_report {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_grains_report";
+}
+
+impl frz_grains_report {
+    const NOTHING: Self = Self {
+        struct_size: 0,
+        sub_steps: 0,
+        count: 0,
+        resting: 0,
+        born: 0,
+        dropped: 0,
+        expired: 0,
+        trapped: 0,
+        removed_volume: 0.0,
+        owed: 0.0,
+        fastest: 0.0,
+    };
+}
+
+/// What lies below.
+#[derive(Clone, Copy)]
+struct Ground {
+    floor: Option<f64>,
+    lowest: f64,
+}
+
+/// The value of a handle of grains.
+pub(in crate::capi) struct Heap {
+    pub grains: Grains,
+    ground: Ground,
+    shapes: Shapes,
+    pub saved: Saved,
+}
+
+impl Noun for frz_grains {
+    type Value = Heap;
+    const NAME: &'static str = "grains handle";
+    const TAG: u32 = 0x6672_7a06;
+}
+
+impl Heap {
+    /// Moves the grains through a step.
+    ///
+    /// # Safety
+    /// The bodies must describe memory that can be read.
+    unsafe fn step(
+        &mut self,
+        ctx: &Context,
+        base: Base<'_>,
+        (list, count): (*const frz_body, usize),
+        dt: f64,
+        frame: i32,
+    ) -> Outcome<frz_grains_report> {
+        within("dt", dt, 0.0..=LONGEST, " s")?;
+        if dt > 0.0 && dt < SHORTEST {
+            return Err(Failure::argument(format!("dt = {dt} is not 0, and less than {SHORTEST} s")));
+        }
+        if let Some(snow) = base.after() {
+            check_size(self.grains.params().radius, snow.voxel_size())?;
+        }
+        ctx.allow("the grains", memory(self.grains.count()))?;
+        let mut shapes = std::mem::take(&mut self.shapes);
+        // SAFETY: the caller's promise.
+        let bodies = unsafe { bodies(ctx, list, count, dt, Role::Push, &mut shapes) };
+        self.shapes = shapes;
+        let bodies = bodies?;
+        if dt == 0.0 {
+            let (count, resting) = (self.grains.count() as u64, self.grains.resting() as u64);
+            return Ok(frz_grains_report { count, resting, ..frz_grains_report::NOTHING });
+        }
+        let objects: Vec<_> = bodies.iter().map(|(body, surface)| surface.of(body)).collect();
+        let Ground { floor, lowest } = self.ground;
+        let around = Surroundings { base, objects: &objects, statics: &[], ground: &[], floor, lowest };
+        let done = self.grains.step(ctx, &around, [0.0, dt], frame)?;
+        self.saved.take();
+        Ok(frz_grains_report {
+            struct_size: 0,
+            sub_steps: done.sub_steps as u32,
+            count: done.count as u64,
+            resting: done.resting as u64,
+            born: done.born as u64,
+            dropped: done.dropped as u64,
+            expired: done.expired as u64,
+            trapped: done.trapped as u64,
+            // An empty sum is -0.
+            removed_volume: done.removed_volume + 0.0,
+            owed: done.owed + 0.0,
+            fastest: f64::from(done.fastest),
+        })
+    }
+}
+
+/// Shortest and longest step (s), besides 0.
+const SHORTEST: f64 = 1.0e-6;
+/// As above.
+const LONGEST: f64 = 3600.0;
+/// Least and greatest radius of a grain in voxels of the base layer.
+const RADII: [f64; 2] = [0.02, 0.5];
+
+/// Refuses grains that are too small or too large for a base layer's voxels (m).
+fn check_size(radius: f64, voxel: f64) -> Outcome {
+    let [low, high] = RADII.map(|part| part * voxel);
+    if radius < low || radius > high {
+        let [radius, voxel] = [radius, voxel].map(digits::given);
+        let [low, high] = [low, high].map(digits::end);
+        let text = format!(
+            "radius = {radius} is not within {low} to {high} m, as the base layer's voxels of {voxel} m want it"
+        );
+        return Err(Failure::argument(text));
+    }
+    Ok(())
+}
+
+/// Refuses a grid that cannot be the snow of a base layer.
+pub(in crate::capi) fn check_snow(name: &str, grid: &FloatGrid) -> Outcome {
+    if grid.class() != GridClass::LevelSet {
+        return Err(Failure::argument(format!("{name}: the grid is not a level set")));
+    }
+    if !grid.is_world_fixed() {
+        let text = format!("{name}: the grid is rotated or shifted against the world's axes");
+        return Err(Failure::argument(text));
+    }
+    Ok(())
+}
+
+/// Makes grains: none yet, or those of a state that frz_grains_save wrote.
+///
+/// params: NULL for the usual ones.
+/// restart: restart_bytes bytes of frz_grains_save of grains of the same radius: they come back bit for bit, on any number
+///     of threads. NULL: none. Bytes that are damaged, of another version or of another radius are FRZ_ERROR_FILE.
+/// restart_bytes: 0 without a restart.
+/// out: receives the grains, to be destroyed with frz_grains_destroy; NULL after a failure.
+///
+/// One thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grains_create(
+    context: *mut frz_context,
+    params: *const frz_grains_params,
+    restart: *const c_void,
+    restart_bytes: usize,
+    out: *mut *mut frz_grains,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
+            let usual = frz_grains_params::usual();
+            let params = if params.is_null() { usual } else { sized(params, usual)? };
+            let own = params.params()?;
+            let state =
+                frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
+            let grains = match restart.is_null() {
+                true => Grains::new(own)?,
+                false => resumed(ctx, "grains", Grains::unpacked(&state), || Grains::resume(own, &state))?,
+            };
+            let ground = params.ground();
+            Ok(Heap { grains, ground, shapes: Shapes::new(), saved: Saved::default() })
+        })
+    }
+}
+
+/// Destroys grains; NULL is fine.
+///
+/// grains: may be NULL. Not while a call uses them: they then stay.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grains_destroy(grains: *mut frz_grains) {
+    // SAFETY: the grains are NULL or were not destroyed.
+    guard(|| unsafe { destroy(grains) });
+}
+
+/// Sets how grains behave from the next step on. All parameters but the radius may change between steps.
+///
+/// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grains_set_params(
+    grains: *mut frz_grains,
+    params: *const frz_grains_params,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mut grains = change(grains)?;
+            let params = sized(params, frz_grains_params::usual())?;
+            grains.grains.set_params(params.params()?)?;
+            grains.ground = params.ground();
+            Ok(())
+        }
+    })
+}
+
+/// Moves grains through a step, with those that are born of what the base layer's last step removed.
+///
+/// Call it once after each frz_base_step, with the same bodies, dt and frame. The layer has kept the blocks that its step
+/// changed, as they were: nothing else of it is compared or copied. After a failure or a cancel the grains are as they were
+/// before.
+///
+/// base: the layer after its step; it is only read. Its voxels must suit the radius: FRZ_ERROR_ARGUMENT. A layer that has not
+///     stepped since it was made or restored removed nothing. NULL: there is none.
+/// bodies: count bodies that push the grains, each with its friction; NULL with a count of 0. Those that do not move have
+///     no positions_end. Holes of less than a tenth of a mesh's area are closed; of a mesh that is open wider both sides collide.
+///     A warning says so. A body with a vertex that moves at over 100 m/s is taken to jump: it stands at positions_end for the whole
+///     step and carries no grains along, with a warning. A vertex farther than 1e6 m from the origin along an axis is
+///     FRZ_ERROR_ARGUMENT.
+/// count: number of bodies.
+/// dt: length of the step (s), 1e-6 to 3600. 0: nothing is born and nothing moves, as the first frame of a shot wants it:
+///     what bodies cut out there was gone before.
+/// frame: becomes the source frame of the grains that are born.
+/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time; any number may read a base layer, but none may step it meanwhile (FRZ_ERROR_BUSY).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grains_step(
+    context: *mut frz_context,
+    grains: *mut frz_grains,
+    base: *const frz_base,
+    bodies: *const frz_body,
+    count: usize,
+    dt: f64,
+    frame: i32,
+    report: *mut frz_grains_report,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        stepped(context, grains, report, |ctx, grains| {
+            if base.is_null() {
+                return grains.step(ctx, Base::Missing, (bodies, count), dt, frame);
+            }
+            let base = read(base)?;
+            let base = Base::Changed(base.layer.surface(), base.layer.before());
+            grains.step(ctx, base, (bodies, count), dt, frame)
+        })
+    }
+}
+
+/// Moves grains through a step, with those that are born of the snow that lies in one grid and no more in another: as
+/// frz_grains_step, for a host whose base layer is its own, or that has its states only. The grains are the same, bit for
+/// bit, but all blocks of both grids are compared.
+///
+/// before: the snow before the base layer's step, a level set with voxels fixed in the world; NULL: nothing was removed.
+/// after: the snow after it, with which grains collide; a level set with voxels of the same size.
+/// bodies: as for frz_grains_step.
+/// count: as for frz_grains_step.
+/// dt: as for frz_grains_step.
+/// frame: as for frz_grains_step.
+/// report: as for frz_grains_step.
+///
+/// One thread at a time; any number may read a grid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grains_step_grids(
+    context: *mut frz_context,
+    grains: *mut frz_grains,
+    before: *const frz_grid,
+    after: *const frz_grid,
+    bodies: *const frz_body,
+    count: usize,
+    dt: f64,
+    frame: i32,
+    report: *mut frz_grains_report,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        stepped(context, grains, report, |ctx, grains| {
+            let after = read(after)?;
+            let after = after.floats()?;
+            check_snow("after", after)?;
+            if before.is_null() {
+                return grains.step(ctx, Base::Changed(after, &[]), (bodies, count), dt, frame);
+            }
+            let before = read(before)?;
+            let before = before.floats()?;
+            check_snow("before", before)?;
+            let voxels = [before, after].map(FloatGrid::voxel_size);
+            if voxels[0] != voxels[1] {
+                let text = format!("before has voxels of {} m, but after of {} m", voxels[0], voxels[1]);
+                return Err(Failure::argument(text));
+            }
+            grains.step(ctx, Base::Whole([before, after]), (bodies, count), dt, frame)
+        })
+    }
+}
+
+/// A step with its report, which is zero after a failure.
+///
+/// # Safety
+/// The pointers must be NULL or the caller's.
+unsafe fn stepped(
+    context: *mut frz_context,
+    grains: *mut frz_grains,
+    report: *mut frz_grains_report,
+    step: impl FnOnce(&Context, &mut Heap) -> Outcome<frz_grains_report>,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the caller's promise.
+        unsafe {
+            if !report.is_null() {
+                fill(report, None, frz_grains_report::NOTHING)?;
+            }
+            let call = enter(context)?;
+            let mut grains = change(grains)?;
+            let told = step(call.ctx(), &mut grains)?;
+            if report.is_null() { Ok(()) } else { fill(report, None, told) }
+        }
+    })
+}

@@ -1,0 +1,190 @@
+//! How grains behave, in C's terms.
+
+use crate::capi::ffi::guard::{Outcome, frz_status, guard};
+use crate::capi::ffi::handle::required;
+use crate::capi::ffi::views::{Sized32, fill, finite, sized, within};
+use crate::capi::mesh::triangles::no_flags;
+use crate::geometry::DVec3;
+use crate::snow::grains::Params;
+use crate::snow::{grain_cohesion, grain_friction};
+
+/// Flag of parameters of grains: a level ground lies at frz_grains_params.floor.
+pub const FRZ_GRAINS_FLOOR: u32 = 1;
+
+/// Flag of parameters of grains: they never come to rest.
+pub const FRZ_GRAINS_RESTLESS: u32 = 2;
+
+/// Flag of parameters of grains: those outside of frz_grains_params.keep_low and keep_high are taken away.
+pub const FRZ_GRAINS_BOX: u32 = 4;
+
+/// Flag of parameters of grains: those among others feel less of the air than those of a thin spray.
+pub const FRZ_GRAINS_AIR_BY_DENSITY: u32 = 8;
+
+/// How snow becomes grains and how they behave. All of it but the radius may change between steps.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_grains_params {
+    /// sizeof(frz_grains_params).
+    pub struct_size: u32,
+    /// 0, or some of FRZ_GRAINS_FLOOR, FRZ_GRAINS_RESTLESS, FRZ_GRAINS_BOX and FRZ_GRAINS_AIR_BY_DENSITY.
+    pub flags: u32,
+    /// Radius of a grain (m), 1e-5 to 1; at a base layer from 0.02 to 0.5 of its voxel. A third of the voxel gives the
+    /// thesis' look, and is usual for voxels of 1 cm.
+    pub radius: f64,
+    /// Share of the removed snow that is pressed together and becomes no grains, 0 to 1; 0.75 is usual.
+    pub compression: f64,
+    /// Friction between grains, 0 to 1; as they do not turn, 0.14, the usual one, already holds a slope of 32 degrees. Where
+    /// they attract each other, 0.26 does. On the base layer they lie up to the same slope.
+    pub friction: f64,
+    /// With which grains that all but touch hold each other (weights of a grain), 0 to 1000; 0 is usual.
+    pub attraction: f64,
+    /// Share of their speed with which grains bounce off, 0 to 1; 0 is usual.
+    pub restitution: f64,
+    /// Share of its velocity that a grain keeps in a second, 0 to 1; 0.5 is usual.
+    pub air: f64,
+    /// Gravity along y (m/s2), -1000 to 1000; -9.81 is usual.
+    pub gravity: f64,
+    /// Height of a level ground (m), -1e6 to 1e6; only with FRZ_GRAINS_FLOOR. 0 is usual.
+    pub floor: f64,
+    /// Grains below this height (m) are dropped at the end of a step; -1e6 is usual, and far below all that grains reach.
+    pub lowest: f64,
+    /// Least and greatest place (m) of a box outside of which grains are dropped; only with FRZ_GRAINS_BOX. 0 is usual.
+    pub keep_low: [f64; 3],
+    /// See keep_low.
+    pub keep_high: [f64; 3],
+    /// Seconds after which a grain is taken away, counted by the frames of its birth and of the step; 0, as is usual: it stays.
+    pub lifetime: f64,
+    /// Most grains, 1 to 60000000: a step or an emission that would make more fails. 20000000 is usual.
+    pub max_grains: u64,
+    /// Another one scatters the grains of removed snow otherwise; 0 is usual.
+    pub seed: u64,
+    /// Sub-steps of a step, 1 to 1000; 0, as is usual: as many as sizes, times and speeds need.
+    pub sub_steps: u32,
+    /// 0.
+    pub reserved: u32,
+    /// Distance (m) from objects and fast grains beyond which slow grains rest at once, 1e-5 to 1e5; 0, as is usual: they lie still
+    /// first, wherever they are. It has no effect with FRZ_GRAINS_RESTLESS.
+    pub active_distance: f64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_grains_params {
+    const SIZES: &'static [usize] =
+        &[std::mem::offset_of!(frz_grains_params, active_distance), size_of::<Self>()];
+    const NAME: &'static str = "frz_grains_params";
+}
+
+/// Farthest from 0 (m) of the ground.
+pub(in crate::capi) const FARTHEST: f64 = 1.0e6;
+
+impl frz_grains_params {
+    /// Those of the library, for voxels of 1 cm.
+    pub(in crate::capi) fn usual() -> Self {
+        let usual = Params::for_cell(0.01);
+        Self {
+            struct_size: 0,
+            flags: 0,
+            radius: usual.radius,
+            compression: usual.compression,
+            friction: usual.friction,
+            attraction: usual.attraction,
+            restitution: usual.restitution,
+            air: usual.air,
+            gravity: usual.gravity,
+            floor: 0.0,
+            lowest: -FARTHEST,
+            keep_low: [0.0; 3],
+            keep_high: [0.0; 3],
+            lifetime: 0.0,
+            max_grains: usual.most as u64,
+            seed: usual.seed,
+            sub_steps: 0,
+            reserved: 0,
+            active_distance: 0.0,
+        }
+    }
+
+    /// The library's own parameters; what is out of range is named.
+    pub(in crate::capi) fn params(&self) -> Outcome<Params> {
+        let known = FRZ_GRAINS_FLOOR | FRZ_GRAINS_RESTLESS | FRZ_GRAINS_BOX | FRZ_GRAINS_AIR_BY_DENSITY;
+        no_flags(self.flags, known)?;
+        let numbers = [
+            ("radius", self.radius),
+            ("compression", self.compression),
+            ("friction", self.friction),
+            ("attraction", self.attraction),
+            ("air", self.air),
+            ("gravity", self.gravity),
+            ("restitution", self.restitution),
+            ("lowest", self.lowest),
+        ];
+        numbers.into_iter().try_for_each(|(name, value)| finite(name, value))?;
+        within("floor", self.floor, -FARTHEST..=FARTHEST, " m")?;
+        within("active_distance", self.active_distance, 0.0..=1.0e5, " m")?;
+        within("lifetime", self.lifetime, 0.0..=1.0e9, " s")?;
+        let has_box = self.flags & FRZ_GRAINS_BOX != 0;
+        within("max_grains", self.max_grains as f64, 1.0..=6.0e7, "")?;
+        within("sub_steps", f64::from(self.sub_steps), 0.0..=1000.0, "")?;
+        within("reserved", f64::from(self.reserved), 0.0..=0.0, "")?;
+        let params = Params {
+            radius: self.radius,
+            compression: self.compression,
+            friction: self.friction,
+            attraction: self.attraction,
+            restitution: self.restitution,
+            air: self.air,
+            air_by_density: self.flags & FRZ_GRAINS_AIR_BY_DENSITY != 0,
+            gravity: self.gravity,
+            lifetime: Some(self.lifetime).filter(|&lifetime| lifetime > 0.0),
+            keep_box: has_box.then(|| [self.keep_low, self.keep_high].map(DVec3::from)),
+            rests: self.flags & FRZ_GRAINS_RESTLESS == 0,
+            active_distance: Some(self.active_distance).filter(|&distance| distance > 0.0),
+            sub_steps: Some(self.sub_steps).filter(|&count| count > 0),
+            most: self.max_grains as usize,
+            seed: self.seed,
+        };
+        params.validate()?;
+        Ok(params)
+    }
+}
+
+/// Fills parameters with the usual values, those of the thesis' look for voxels of 1 cm.
+///
+/// params: receives them.
+/// size: sizeof(frz_grains_params).
+///
+/// Any thread.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grains_params_init(params: *mut frz_grains_params, size: usize) -> frz_status {
+    // SAFETY: the parameters are NULL or have so many bytes.
+    guard(|| unsafe { fill(params, Some(size), frz_grains_params::usual()) })
+}
+
+/// Sets the friction and the attraction of parameters from what can be measured of snow.
+///
+/// params: friction and attraction are set, for grains of its radius.
+/// repose_angle_deg: slope at which a poured pile comes to rest (degrees), 0 to 42.
+/// stands: height of a wall of grains that just stands (m), 0 to 1000; up to 64 diameters it was measured. 0: no attraction.
+///
+/// Any thread.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grains_params_of_snow(
+    params: *mut frz_grains_params,
+    repose_angle_deg: f64,
+    stands: f64,
+) -> frz_status {
+    guard(|| {
+        within("repose_angle_deg", repose_angle_deg, 0.0..=grain_friction::STEEPEST, " degrees")?;
+        within("stands", stands, 0.0..=1000.0, " m")?;
+        let to = required(params, "params")?;
+        // SAFETY: the parameters are the caller's, checked for their size.
+        unsafe {
+            let mut now = sized(to.cast_const(), frz_grains_params::usual())?;
+            now.params()?;
+            now.attraction = grain_cohesion::of_wall(stands, 2.0 * now.radius, repose_angle_deg).min(1000.0);
+            now.friction = grain_friction::of_repose(repose_angle_deg, now.attraction > 0.0);
+            fill(to, None, now)?;
+        }
+        Ok(())
+    })
+}

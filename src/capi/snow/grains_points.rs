@@ -1,0 +1,184 @@
+//! What goes into grains and comes out of them: loose grains, attributes, saved states.
+
+use std::ffi::c_void;
+
+use super::grains::frz_grains;
+use crate::capi::ffi::guard::{frz_status, guard};
+use crate::capi::ffi::handle::{change, clear, read, required};
+use crate::capi::ffi::views::{frz_span, frz_view, meaning};
+use crate::capi::runtime::context::{enter, frz_context};
+use crate::geometry::DVec3;
+use crate::snow::grains::memory;
+
+/// What frz_grains_read reads of each grain; in brackets its usual name as an attribute.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_grains_attribute {
+    /// float[3]: its place (P, m).
+    FRZ_GRAINS_POSITION = 0,
+    /// double[3]: its place (m), as exactly as it is known: also far from the origin.
+    FRZ_GRAINS_POSITION_DOUBLE = 1,
+    /// float[3]: its velocity (v, m/s).
+    FRZ_GRAINS_VELOCITY = 2,
+    /// int64_t: its number (id), counted from 0 in the order of birth; it keeps it, and no other grain ever has it.
+    FRZ_GRAINS_ID = 3,
+    /// float: its radius (pscale, m).
+    FRZ_GRAINS_RADIUS = 4,
+    /// int32_t: the frame that frz_grains_step or frz_grains_emit was given when it was born (source_frame).
+    FRZ_GRAINS_SOURCE_FRAME = 5,
+    /// float[3]: its place when it was born (rest, m).
+    FRZ_GRAINS_REST = 6,
+    /// int32_t: 1 where it is awake, 0 where it rests (active).
+    FRZ_GRAINS_ACTIVE = 7,
+    /// int32_t: 1 where it is trapped: a surface that it is in and those around it leave it no room (trapped).
+    FRZ_GRAINS_TRAPPED = 8,
+}
+
+use frz_grains_attribute::*;
+
+const ATTRIBUTES: [(u32, frz_grains_attribute); 9] = [
+    (0, FRZ_GRAINS_POSITION),
+    (1, FRZ_GRAINS_POSITION_DOUBLE),
+    (2, FRZ_GRAINS_VELOCITY),
+    (3, FRZ_GRAINS_ID),
+    (4, FRZ_GRAINS_RADIUS),
+    (5, FRZ_GRAINS_SOURCE_FRAME),
+    (6, FRZ_GRAINS_REST),
+    (7, FRZ_GRAINS_ACTIVE),
+    (8, FRZ_GRAINS_TRAPPED),
+];
+
+/// Adds loose grains: debris, drift, snow that falls from a tree. They are there at once and move with the next step; those
+/// that overlap each other or an object are pushed apart.
+///
+/// positions: float[3] for each grain (m), finite, within 8388608 diameters of the origin along x and z and 65536 along y.
+/// velocities: float[3] for each grain (m/s), each component from -10000 to 10000; data NULL with a count of 0: at rest.
+/// frame: becomes their source frame.
+/// first: receives the id of the first new grain, the others follow it in the order of the positions; -1 where there are
+///     none, 0 after a failure; may be NULL.
+///
+/// After a failure no grain was added; the error names the first element at fault, counted from 0. One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grains_emit(
+    context: *mut frz_context,
+    grains: *mut frz_grains,
+    positions: frz_view,
+    velocities: frz_view,
+    frame: i32,
+    first: *mut i64,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(first);
+            let call = enter(context)?;
+            let ctx = call.ctx();
+            let mut grains = change(grains)?;
+            let all = grains.grains.count().saturating_add(positions.count);
+            ctx.allow("the grains", memory(all))?;
+            let places = positions.finite("positions")?;
+            let velocities = velocities.finite("velocities")?;
+            let places: Vec<DVec3> = places.into_iter().map(|place| place.map(f64::from).into()).collect();
+            let all = &mut grains.grains;
+            let id = ctx.phase_in_place("emit", || all.emit(&places, &velocities, frame))?;
+            grains.saved.take();
+            if !first.is_null() {
+                first.write_unaligned(if places.is_empty() { -1 } else { i64::from(id) });
+            }
+            Ok(())
+        }
+    })
+}
+
+/// Reports how many grains there are.
+///
+/// count: receives their number; 0 after a failure.
+///
+/// Any number of threads may read grains.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grains_count(grains: *const frz_grains, count: *mut usize) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(count);
+            let count = required(count, "count")?;
+            count.write_unaligned(read(grains)?.grains.count());
+            Ok(())
+        }
+    })
+}
+
+/// Copies an attribute of all grains, in an order that all attributes share and that changes from step to step: ids tell
+/// which is which.
+///
+/// attribute: a frz_grains_attribute; it says of what type the elements are.
+/// dst: room for as many elements as frz_grains_count reports; FRZ_ERROR_CAPACITY when it is too little, and nothing is
+///     written.
+///
+/// Any number of threads may read grains.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grains_read(
+    grains: *const frz_grains,
+    attribute: u32,
+    dst: frz_span,
+) -> frz_status {
+    guard(|| {
+        let attribute = meaning("attribute", "frz_grains_attribute", attribute, &ATTRIBUTES)?;
+        // SAFETY: the grains are NULL or were not destroyed; the span is the caller's.
+        unsafe {
+            let heap = read(grains)?;
+            let grains = &heap.grains;
+            match attribute {
+                FRZ_GRAINS_POSITION => {
+                    let places: Vec<[f32; 3]> =
+                        grains.places().map(|place| [0, 1, 2].map(|axis| place[axis] as f32)).collect();
+                    dst.fill("dst", &places)
+                }
+                FRZ_GRAINS_POSITION_DOUBLE => {
+                    dst.fill("dst", &grains.places().map(<[f64; 3]>::from).collect::<Vec<_>>())
+                }
+                FRZ_GRAINS_VELOCITY => dst.fill("dst", &grains.velocities().collect::<Vec<_>>()),
+                FRZ_GRAINS_ID => {
+                    dst.fill("dst", &grains.ids().iter().copied().map(i64::from).collect::<Vec<_>>())
+                }
+                FRZ_GRAINS_RADIUS => dst.fill("dst", &vec![grains.params().radius as f32; grains.count()]),
+                FRZ_GRAINS_SOURCE_FRAME => dst.fill("dst", &grains.source_frames().collect::<Vec<_>>()),
+                FRZ_GRAINS_ACTIVE => dst.fill("dst", &grains.awake().map(i32::from).collect::<Vec<_>>()),
+                FRZ_GRAINS_TRAPPED => {
+                    dst.fill("dst", &grains.trapped_each().map(i32::from).collect::<Vec<_>>())
+                }
+                FRZ_GRAINS_REST => dst.fill("dst", &grains.rests().collect::<Vec<_>>()),
+            }
+        }
+    })
+}
+
+/// Writes all that the next step depends on, besides the parameters, the base layer and the bodies: for a host's own cache.
+/// The bytes are the same on any number of threads.
+///
+/// dst: room for capacity bytes. NULL: size receives their number, and nothing is written.
+/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+/// size: receives the bytes that were written, or are needed; 0 after other failures.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_grains_save(
+    context: *mut frz_context,
+    grains: *const frz_grains,
+    dst: *mut c_void,
+    capacity: usize,
+    size: *mut usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(size);
+            required(size, "size")?;
+            let call = enter(context)?;
+            let heap = read(grains)?;
+            let grains = &heap.grains;
+            let save = || call.ctx().phase("save", || Ok(grains.save()));
+            heap.saved.write((dst, capacity, size), save)
+        }
+    })
+}

@@ -1,0 +1,139 @@
+//! Snow before anything moves.
+
+use crate::capi::ffi::guard::{Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{Reading, read};
+use crate::capi::ffi::views::{Plain, Sized32, fill, finite, frz_view, sized, within};
+use crate::capi::grid::sparse::{Grid, check_voxel, frz_grid};
+use crate::capi::mesh::triangles::{Mesh, frz_mesh, no_flags};
+use crate::capi::runtime::context::{creates, frz_context};
+use crate::geometry::TriMesh;
+use crate::snow::base_layer::initial::{Cover, Ground, layer};
+use crate::sweep::surface_bytes;
+
+/// Description of a layer of snow: the ground and the depth.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_snow_desc {
+    /// sizeof(frz_snow_desc).
+    pub struct_size: u32,
+    /// 0.
+    pub flags: u32,
+    /// Edge of a voxel (m), 1e-6 to 1000.
+    pub voxel_size: f64,
+    /// Half width of the band of distances on each side (voxels), 3 to 64.
+    pub half_width: f64,
+    /// Vertical depth above the ground and above static objects (m), above 0; not used with a top.
+    pub depth: f64,
+    /// The snow's top surface; the space between it and the ground is snow. NULL: the depth is used.
+    pub top: *const frz_mesh,
+    /// The ground, a surface or a solid; NULL: a horizontal rectangle.
+    pub ground: *const frz_mesh,
+    /// Height of the rectangle, its y (m).
+    pub ground_height: f64,
+    /// x0, z0, x1, z1 of the rectangle (m), x0 < x1, z0 < z1.
+    pub area: [f64; 4],
+    /// Objects that do not move and that snow lies on: pointers to solids; NULL for none.
+    pub statics: *const *const frz_mesh,
+    /// Number of static objects.
+    pub static_count: usize,
+}
+
+// SAFETY: numbers and pointers.
+unsafe impl Sized32 for frz_snow_desc {
+    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_snow_desc, statics), size_of::<Self>()];
+    const NAME: &'static str = "frz_snow_desc";
+}
+
+impl frz_snow_desc {
+    const USUAL: Self = Self {
+        struct_size: 0,
+        flags: 0,
+        voxel_size: 0.01,
+        half_width: 3.0,
+        depth: 0.3,
+        top: std::ptr::null(),
+        ground: std::ptr::null(),
+        ground_height: 0.0,
+        area: [-1.0, -1.0, 1.0, 1.0],
+        statics: std::ptr::null(),
+        static_count: 0,
+    };
+}
+
+#[derive(Clone, Copy)]
+#[repr(transparent)]
+struct Pointer(*const frz_mesh);
+
+// SAFETY: a pointer, which is followed only as a handle.
+unsafe impl Plain for Pointer {}
+
+/// Fills a description with the usual values: voxels of 1 cm, 0.3 m of snow on a square of 2 m at y = 0.
+///
+/// desc: receives them.
+/// size: sizeof(frz_snow_desc).
+///
+/// Any thread.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_snow_desc_init(desc: *mut frz_snow_desc, size: usize) -> frz_status {
+    // SAFETY: the description is NULL or has so many bytes.
+    guard(|| unsafe { fill(desc, Some(size), frz_snow_desc::USUAL) })
+}
+
+/// Makes a layer of snow as a level set named "surface", for frz_base_create.
+///
+/// desc: its ground and depth. Y is up.
+/// out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
+///
+/// Any number of threads may read a mesh; one thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_snow_layer(
+    context: *mut frz_context,
+    desc: *const frz_snow_desc,
+    out: *mut *mut frz_grid,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
+            let desc = sized(desc, frz_snow_desc::USUAL)?;
+            no_flags(desc.flags, 0)?;
+            check_voxel(desc.voxel_size)?;
+            within("half_width", desc.half_width, 3.0..=64.0, "")?;
+            finite("depth", desc.depth)?;
+            finite("ground_height", desc.ground_height)?;
+            for (at, &side) in desc.area.iter().enumerate() {
+                finite(&format!("area: element {at}"), side)?;
+            }
+            let list = frz_view { data: desc.statics.cast(), count: desc.static_count, stride: 0 };
+            let list = list.elements::<Pointer>("statics")?;
+            let statics: Vec<Reading<'_, Mesh>> =
+                list.iter().map(|mesh| read(mesh.0)).collect::<Outcome<_>>()?;
+            let statics: Vec<TriMesh> = statics.iter().map(|mesh| mesh.triangles.clone()).collect();
+            let ground = match desc.ground.is_null() {
+                true => Ground::Plane { height: desc.ground_height, area: desc.area },
+                false => Ground::Mesh(read(desc.ground)?.triangles.clone()),
+            };
+            let cover = match desc.top.is_null() {
+                true => Cover::Depth(desc.depth),
+                false => Cover::Top(read(desc.top)?.triangles.clone()),
+            };
+            let area = surfaces(&ground, &cover, &statics);
+            ctx.allow("the layer of snow", surface_bytes(area, desc.voxel_size))?;
+            let half_width = desc.half_width as f32;
+            let grid = ctx.polled(|| layer(ctx, &ground, &statics, &cover, desc.voxel_size, half_width))?;
+            Ok(Grid::from(grid))
+        })
+    }
+}
+
+/// Surface (m2) of the layer: its bottom and its top.
+fn surfaces(ground: &Ground, cover: &Cover, statics: &[TriMesh]) -> f64 {
+    let ground = match ground {
+        Ground::Plane { area: [x0, z0, x1, z1], .. } => ((x1 - x0) * (z1 - z0)).abs(),
+        Ground::Mesh(mesh) => mesh.area(),
+    };
+    let top = match cover {
+        Cover::Depth(_) => ground,
+        Cover::Top(mesh) => mesh.area(),
+    };
+    ground + top + 2.0 * statics.iter().map(TriMesh::area).sum::<f64>()
+}

@@ -1,0 +1,380 @@
+//! Mist: powder that fast grains raise into the air.
+
+use std::ffi::c_void;
+
+use super::base_layer::frz_base;
+use super::grains::frz_grains;
+use super::mist_params::frz_mist_params;
+use crate::capi::ffi::guard::{Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{Noun, change, clear, destroy, read, read_some, required};
+use crate::capi::ffi::saved::{Saved, resumed};
+use crate::capi::ffi::views::{Sized32, fill, frz_view, meaning, sized, within};
+use crate::capi::grid::sparse::{Grid, frz_grid};
+use crate::capi::level_set::body::{Role, Shapes, bodies, frz_body};
+use crate::capi::runtime::context::{creates, enter, frz_context};
+use crate::context::Context;
+use crate::flow::Tiles;
+use crate::geometry::DVec3;
+use crate::snow::base_layer::BaseLayer;
+use crate::snow::mist::{Around, Grids, Mist, Source, Start, Surroundings, Wind};
+use crate::sweep::Body;
+use crate::vdb::{AnyGrid, FloatGrid, VectorGrid};
+
+/// Powder in the air.
+pub struct frz_mist {
+    _opaque: [u8; 0],
+}
+
+/// What a step did.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_mist_report {
+    /// sizeof(frz_mist_report), set by the caller.
+    pub struct_size: u32,
+    /// Sub-steps that the step was divided into.
+    pub sub_steps: u32,
+    /// Cells of air now.
+    pub cells: u64,
+    /// Grains that raised mist.
+    pub sources: u64,
+    /// Iterations of all projections.
+    pub iterations: u64,
+    /// Sum of the density, times the volume of a cell (m3).
+    pub mass: f64,
+    /// Greatest divergence times the cell that a projection left, over the greatest speed before it.
+    pub divergence: f64,
+    /// Greatest speed of the air on any axis (m/s).
+    pub fastest: f64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_mist_report {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_mist_report";
+}
+
+impl frz_mist_report {
+    const NOTHING: Self = Self {
+        struct_size: 0,
+        sub_steps: 0,
+        cells: 0,
+        sources: 0,
+        iterations: 0,
+        mass: 0.0,
+        divergence: 0.0,
+        fastest: 0.0,
+    };
+}
+
+/// The value of a handle of mist.
+pub(in crate::capi) struct Air {
+    mist: Mist,
+    floor: Option<f64>,
+    shapes: Shapes,
+    saved: Saved,
+}
+
+impl Noun for frz_mist {
+    type Value = Air;
+    const NAME: &'static str = "mist handle";
+    const TAG: u32 = 0x6672_7a07;
+}
+
+/// Shortest and longest step (s).
+const SHORTEST: f64 = 1.0e-6;
+/// As above.
+const LONGEST: f64 = 3600.0;
+/// Farthest time from 0 (s).
+const LATEST: f64 = 1.0e9;
+
+/// What a step takes besides grains.
+pub(in crate::capi) struct Scene<'a> {
+    pub snow: Option<&'a FloatGrid>,
+    pub wind: Option<&'a VectorGrid>,
+    pub bodies: (*const frz_body, usize),
+    pub time: f64,
+    pub dt: f64,
+}
+
+impl Air {
+    /// Moves the mist through a step.
+    ///
+    /// # Safety
+    /// The bodies must describe memory that can be read.
+    pub(in crate::capi) unsafe fn step(
+        &mut self,
+        ctx: &Context,
+        sources: &[Source],
+        scene: &Scene<'_>,
+    ) -> Outcome<frz_mist_report> {
+        let Scene { snow, wind, bodies: (list, count), time, dt } = *scene;
+        within("dt", dt, SHORTEST..=LONGEST, " s")?;
+        within("time", time, -LATEST..=LATEST, " s")?;
+        let mut shapes = std::mem::take(&mut self.shapes);
+        // SAFETY: the caller's promise.
+        let bodies = unsafe { bodies(ctx, list, count, dt, Role::Bound, &mut shapes) };
+        self.shapes = shapes;
+        let bodies = bodies?;
+        let bodies: Vec<&Body> = bodies.iter().map(|(body, _)| body).collect();
+        let removing = vec![true; bodies.len()];
+        let surroundings =
+            Surroundings { base: snow, bodies: &bodies, removing: &removing, floor: self.floor };
+        let walls = surroundings.during([0.0, dt], self.mist.params().cell)?;
+        let boundary = |tiles: &Tiles, cell: f32, share: f64| walls.faces(ctx, tiles, cell, share);
+        let sample = |ctx: &Context, places: &[DVec3]| match wind {
+            Some(wind) => wind.sample(ctx, places, true),
+            None => Ok(vec![[0.0; 3]; places.len()]),
+        };
+        let wind = wind.map(|_| Wind(&sample));
+        let fastest = walls.fastest_near(&self.mist, sources);
+        let around = Around { sources, boundary: &boundary, fastest, wind: wind.as_ref() };
+        let done = self.mist.step(ctx, &around, [time, time + dt])?;
+        self.saved.take();
+        Ok(frz_mist_report {
+            struct_size: 0,
+            sub_steps: done.sub_steps as u32,
+            cells: done.cells as u64,
+            sources: done.sources as u64,
+            iterations: done.iterations as u64,
+            mass: done.mass,
+            divergence: f64::from(done.divergence),
+            fastest: f64::from(done.fastest),
+        })
+    }
+}
+
+/// Makes mist: none yet, or that of a state that frz_mist_save wrote.
+///
+/// params: NULL for the usual ones.
+/// restart: restart_bytes bytes of frz_mist_save of mist with the same cell and wind: it comes back bit for bit, on any
+///     number of threads. NULL: none. Bytes that are damaged, of another version, cell or wind are FRZ_ERROR_FILE.
+/// restart_bytes: 0 without a restart.
+/// out: receives the mist, to be destroyed with frz_mist_destroy; NULL after a failure.
+///
+/// One thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mist_create(
+    context: *mut frz_context,
+    params: *const frz_mist_params,
+    restart: *const c_void,
+    restart_bytes: usize,
+    out: *mut *mut frz_mist,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
+            let usual = frz_mist_params::usual();
+            let params = if params.is_null() { usual } else { sized(params, usual)? };
+            let own = params.params()?;
+            let state =
+                frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
+            let mist = match restart.is_null() {
+                true => Mist::new(own)?,
+                false => resumed(ctx, "mist", Mist::unpacked(&state), || Mist::resume(own, &state))?,
+            };
+            Ok(Air { mist, floor: params.ground(), shapes: Shapes::new(), saved: Saved::default() })
+        })
+    }
+}
+
+/// Destroys mist; NULL is fine.
+///
+/// mist: may be NULL. Not while a call uses it: it then stays.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mist_destroy(mist: *mut frz_mist) {
+    // SAFETY: the mist is NULL or was not destroyed.
+    guard(|| unsafe { destroy(mist) });
+}
+
+/// Sets how mist behaves from the next step on. All parameters but the cell and the wind may change between steps.
+///
+/// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mist_set_params(
+    mist: *mut frz_mist,
+    params: *const frz_mist_params,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mut air = change(mist)?;
+            let params = sized(params, frz_mist_params::usual())?;
+            air.mist.set_params(params.params()?)?;
+            air.floor = params.ground();
+            Ok(())
+        }
+    })
+}
+
+/// Moves mist through a step, with what fast grains raise along their paths in it.
+///
+/// Mist is raised along the paths of the grains from where their last step began, or where it created them: it is the same at every
+/// frame rate.
+///
+/// Call it once after each frz_grains_step, with the same base layer, bodies and dt, but not at the first frame of a shot, with a
+/// dt of 0: nothing moved before it. After a failure or a cancel the mist is as it was before.
+///
+/// grains: the grains after their step; they are only read. NULL: none raise mist.
+/// base: the layer after its step, around which the air flows; it is only read. NULL: there is none.
+/// wind: a grid of velocities (m/s) that the air where there is mist takes on, half of the difference in a tenth of a second;
+///     a component that is not within 1000 m/s of 0 where there is air is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
+/// bodies: count bodies that bound the air and carry it along; NULL with a count of 0. Those that do not move have no
+///     positions_end. Of a body that is open wider than a tenth of its area the air flows around both sides. One with a vertex that
+///     moves at over 100 m/s is taken to jump: it stands at positions_end for the whole step.
+/// count: number of bodies.
+/// time: of the step's beginning (s), -1e9 to 1e9: eddies change with it.
+/// dt: length of the step (s), 1e-6 to 3600.
+/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time; any number may read a base layer, grains and a grid, but none may change them meanwhile (FRZ_ERROR_BUSY).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mist_step(
+    context: *mut frz_context,
+    mist: *mut frz_mist,
+    grains: *const frz_grains,
+    base: *const frz_base,
+    wind: *const frz_grid,
+    bodies: *const frz_body,
+    count: usize,
+    time: f64,
+    dt: f64,
+    report: *mut frz_mist_report,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        stepped(context, mist, report, |ctx, air| {
+            let grains = read_some(grains)?;
+            let base = read_some(base)?;
+            let wind = read_some(wind)?;
+            let wind = wind.as_deref().map(Grid::vectors).transpose()?;
+            let sources = match &grains {
+                Some(heap) => {
+                    let radius = heap.grains.params().radius;
+                    let grains = heap.grains.places().zip(heap.grains.velocities()).zip(heap.grains.starts());
+                    let start = |(place, velocity)| Start { place, velocity };
+                    grains
+                        .map(|((place, velocity), from)| Source {
+                            place,
+                            velocity,
+                            radius,
+                            start: from.map(start),
+                        })
+                        .collect()
+                }
+                None => Vec::new(),
+            };
+            let snow = base.as_deref().map(|base| before(ctx, &base.layer)).transpose()?;
+            air.step(ctx, &sources, &Scene { snow: snow.as_ref(), wind, bodies: (bodies, count), time, dt })
+        })
+    }
+}
+
+/// The snow of a layer before its last step.
+fn before(ctx: &Context, layer: &BaseLayer) -> Outcome<FloatGrid> {
+    ctx.allow("the snow before the step", layer.surface().memory_bytes())?;
+    let copy = || {
+        let mut snow = layer.surface().deep_copy()?;
+        snow.replace_blocks(ctx, layer.before())?;
+        Ok(snow)
+    };
+    Ok(ctx.phase("snow", copy)?)
+}
+
+/// A step with its report, which is zero after a failure.
+///
+/// # Safety
+/// The pointers must be NULL or the caller's.
+pub(in crate::capi) unsafe fn stepped(
+    context: *mut frz_context,
+    mist: *mut frz_mist,
+    report: *mut frz_mist_report,
+    step: impl FnOnce(&Context, &mut Air) -> Outcome<frz_mist_report>,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the caller's promise.
+        unsafe {
+            if !report.is_null() {
+                fill(report, None, frz_mist_report::NOTHING)?;
+            }
+            let call = enter(context)?;
+            let mut air = change(mist)?;
+            let told = step(call.ctx(), &mut air)?;
+            if report.is_null() { Ok(()) } else { fill(report, None, told) }
+        }
+    })
+}
+
+/// What frz_mist_grid makes a grid of.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_mist_field {
+    /// Floats: the density of the mist, a fog; active where there is some. It is called "density".
+    FRZ_MIST_DENSITY = 0,
+    /// Vectors: the velocity of the air (m/s) at the cells' centres, where blocks hold mist. It is called "vel".
+    FRZ_MIST_VELOCITY = 1,
+}
+
+use frz_mist_field::*;
+
+const FIELDS: [(u32, frz_mist_field); 2] = [(0, FRZ_MIST_DENSITY), (1, FRZ_MIST_VELOCITY)];
+
+/// Makes a grid of the mist, whose voxels are its cells: the centre of voxel (0, 0, 0) lies at half a cell on each axis.
+///
+/// field: a frz_mist_field.
+/// out: receives the grid, the caller's own, to be destroyed with frz_grid_destroy; NULL after a failure.
+///
+/// One thread at a time for each context; any number may read mist.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mist_grid(
+    context: *mut frz_context,
+    mist: *const frz_mist,
+    field: u32,
+    out: *mut *mut frz_grid,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
+            let field = meaning("field", "frz_mist_field", field, &FIELDS)?;
+            let air = read(mist)?;
+            let Grids { density, velocity } = Grids::of(ctx, &air.mist)?;
+            Ok(Grid::Own(match field {
+                FRZ_MIST_DENSITY => AnyGrid::Floats(density),
+                FRZ_MIST_VELOCITY => AnyGrid::Vectors(velocity),
+            }))
+        })
+    }
+}
+
+/// Writes all that the next step depends on, besides the parameters and what is around: for a host's own cache. The bytes
+/// are the same on any number of threads.
+///
+/// dst: room for capacity bytes. NULL: size receives their number, and nothing is written.
+/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+/// size: receives the bytes that were written, or are needed; 0 after other failures.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mist_save(
+    context: *mut frz_context,
+    mist: *const frz_mist,
+    dst: *mut c_void,
+    capacity: usize,
+    size: *mut usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(size);
+            required(size, "size")?;
+            let call = enter(context)?;
+            let air = read(mist)?;
+            let mist = &air.mist;
+            let save = || call.ctx().phase("save", || Ok(mist.save()));
+            air.saved.write((dst, capacity, size), save)
+        }
+    })
+}

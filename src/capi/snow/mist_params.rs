@@ -1,0 +1,126 @@
+//! How mist behaves, in C's terms.
+
+use crate::capi::ffi::guard::{Outcome, frz_status, guard};
+use crate::capi::ffi::views::{Sized32, fill, finite, within};
+use crate::capi::mesh::triangles::no_flags;
+use crate::snow::mist::Params;
+
+/// Flag of parameters of mist: falling grains raise it too.
+pub const FRZ_MIST_FALLING: u32 = 1;
+
+/// Flag of parameters of mist: a level ground lies at frz_mist_params.floor.
+pub const FRZ_MIST_FLOOR: u32 = 2;
+
+/// How grains raise mist and how it behaves. All of it but the cell and the wind may change between steps.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_mist_params {
+    /// sizeof(frz_mist_params).
+    pub struct_size: u32,
+    /// 0, FRZ_MIST_FALLING, FRZ_MIST_FLOOR or both.
+    pub flags: u32,
+    /// Edge of a cell of air (m), 1e-5 to 100; 4/3 of the base layer's voxel gives the thesis' look.
+    pub cell: f64,
+    /// Speed (m/s) over which grains raise mist, 0 to 1000; 2 is usual.
+    pub from_speed: f64,
+    /// Of the air where there is mist, along y (m/s2), -1000 to 1000; -2 is usual.
+    pub gravity: f64,
+    /// Time (s) in which half of the mist dissipates, above 0; infinite: it stays. 1 is usual.
+    pub half_life: f64,
+    /// Velocity of the air (m/s), each component -1000 to 1000; 0 is usual.
+    pub wind: [f64; 3],
+    /// Acceleration by eddies (m/s2, root mean square), 0 to 1000; 0, as is usual: none.
+    pub turbulence: f64,
+    /// Size of the eddies (m), at least 8 cells; 24 cells are usual.
+    pub turbulence_size: f64,
+    /// Strength with which small eddies are kept alive (1/s), 0 to 100; 0, as is usual: not at all.
+    pub confinement: f64,
+    /// Share of the density of new mist that noise takes away at most, 0 to 1; 0.3 is usual.
+    pub noise: f64,
+    /// Size of that noise (m), at least a cell; 4 cells are usual.
+    pub noise_size: f64,
+    /// Height of a level ground (m), -1e6 to 1e6; only with FRZ_MIST_FLOOR. 0 is usual.
+    pub floor: f64,
+    /// Another one gives other noise and eddies; 0 is usual.
+    pub seed: i32,
+    /// Tiles of air, 8 cells wide, that are computed around the mist, 1 to 64; 1 is usual.
+    pub padding: u32,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_mist_params {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_mist_params";
+}
+
+/// Farthest from 0 (m) of the ground.
+const FARTHEST: f64 = 1.0e6;
+/// The usual cell (m): that for voxels of 1 cm.
+const USUAL: f64 = 0.01 * 4.0 / 3.0;
+
+impl frz_mist_params {
+    /// Those of the library, for voxels of 1 cm.
+    pub(in crate::capi) fn usual() -> Self {
+        let usual = Params::for_cell(USUAL);
+        Self {
+            struct_size: 0,
+            flags: 0,
+            cell: usual.cell,
+            from_speed: usual.from_speed,
+            gravity: usual.gravity,
+            half_life: usual.half_life,
+            wind: usual.wind,
+            turbulence: usual.turbulence,
+            turbulence_size: usual.turbulence_size,
+            confinement: usual.confinement,
+            noise: usual.noise,
+            noise_size: usual.noise_size,
+            floor: 0.0,
+            seed: usual.seed,
+            padding: usual.padding,
+        }
+    }
+
+    /// The library's own parameters; what is out of range is named.
+    pub(in crate::capi) fn params(&self) -> Outcome<Params> {
+        no_flags(self.flags, FRZ_MIST_FALLING | FRZ_MIST_FLOOR)?;
+        finite("cell", self.cell)?;
+        within("floor", self.floor, -FARTHEST..=FARTHEST, " m")?;
+        let params = Params {
+            cell: self.cell,
+            from_speed: self.from_speed,
+            falling: self.flags & FRZ_MIST_FALLING != 0,
+            gravity: self.gravity,
+            half_life: self.half_life,
+            wind: self.wind,
+            turbulence: self.turbulence,
+            turbulence_size: self.turbulence_size,
+            confinement: self.confinement,
+            noise: self.noise,
+            noise_size: self.noise_size,
+            seed: self.seed,
+            padding: self.padding,
+            ..Params::for_cell(self.cell)
+        };
+        params.validate()?;
+        Ok(params)
+    }
+
+    /// Height of the ground (m), where there is a level one.
+    pub(in crate::capi) fn ground(&self) -> Option<f64> {
+        Some(self.floor).filter(|_| self.flags & FRZ_MIST_FLOOR != 0)
+    }
+}
+
+/// Fills parameters with the usual values, those of the thesis' look for voxels of 1 cm. Another cell wants another
+/// turbulence_size and noise_size.
+///
+/// params: receives them.
+/// size: sizeof(frz_mist_params).
+///
+/// Any thread.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mist_params_init(params: *mut frz_mist_params, size: usize) -> frz_status {
+    // SAFETY: the parameters are NULL or have so many bytes.
+    guard(|| unsafe { fill(params, Some(size), frz_mist_params::usual()) })
+}

@@ -1,0 +1,162 @@
+//! Mist that points of a host raise.
+
+use super::grains::check_snow;
+use super::mist::{Scene, frz_mist, frz_mist_report, stepped};
+use crate::capi::ffi::guard::{Failure, Outcome, frz_status};
+use crate::capi::ffi::handle::read_some;
+use crate::capi::ffi::views::{frz_view, within};
+use crate::capi::grid::sparse::{Grid, frz_grid};
+use crate::capi::level_set::body::frz_body;
+use crate::capi::runtime::context::frz_context;
+use crate::snow::mist::{Source, Start};
+
+/// Moves mist through a step, with what points raise along their paths in it: as frz_mist_step, for a host whose grains or base
+/// layer are its own, or that has their files only.
+///
+/// Each point is taken to have moved at its velocity after the step for all of dt, also where it was hit or born in it: more mist is
+/// raised where points begin to fly, the more the longer steps are. A host that knows where points were calls frz_mist_step_paths.
+///
+/// positions: double[3] for each point at the step's end (m), finite, within 1e7 cells of the origin along each axis.
+/// velocities: float[3] for each point (m/s), finite.
+/// radius: of the points (m), above 0 and at most 64 cells.
+/// snow: a level set around which the air flows, with voxels fixed in the world, as it was before the layer's step, in which bodies
+///     move into it. NULL: there is none.
+/// wind: as for frz_mist_step.
+/// bodies: as for frz_mist_step.
+/// count: as for frz_mist_step.
+/// time: as for frz_mist_step.
+/// dt: as for frz_mist_step.
+/// report: as for frz_mist_step.
+///
+/// One thread at a time; any number may read a grid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mist_step_points(
+    context: *mut frz_context,
+    mist: *mut frz_mist,
+    positions: frz_view,
+    velocities: frz_view,
+    radius: f64,
+    snow: *const frz_grid,
+    wind: *const frz_grid,
+    bodies: *const frz_body,
+    count: usize,
+    time: f64,
+    dt: f64,
+    report: *mut frz_mist_report,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        let raised = || sources(&points(("positions", positions), ("velocities", velocities))?, None, radius);
+        step_along(context, mist, report, raised, [snow, wind], (bodies, count), [time, dt])
+    }
+}
+
+/// Moves mist through a step, with what points raise along their paths: as frz_mist_step_points, for a host that knows where points
+/// were before the step. The mist is that of frz_mist_step, bit for bit.
+///
+/// positions_before: double[3] for each point at the step's beginning (m), as positions; that of its birth where it was born in it.
+/// velocities_before: float[3] for each point then (m/s), finite; 0 where it was born in the step.
+/// positions: as for frz_mist_step_points, of the same points in the same order.
+/// velocities: as for frz_mist_step_points.
+/// radius: as for frz_mist_step_points.
+/// snow: as for frz_mist_step_points.
+/// wind: as for frz_mist_step.
+/// bodies: as for frz_mist_step.
+/// count: as for frz_mist_step.
+/// time: as for frz_mist_step.
+/// dt: as for frz_mist_step.
+/// report: as for frz_mist_step.
+///
+/// One thread at a time; any number may read a grid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_mist_step_paths(
+    context: *mut frz_context,
+    mist: *mut frz_mist,
+    positions_before: frz_view,
+    velocities_before: frz_view,
+    positions: frz_view,
+    velocities: frz_view,
+    radius: f64,
+    snow: *const frz_grid,
+    wind: *const frz_grid,
+    bodies: *const frz_body,
+    count: usize,
+    time: f64,
+    dt: f64,
+    report: *mut frz_mist_report,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        let raised = || {
+            let starts =
+                points(("positions_before", positions_before), ("velocities_before", velocities_before))?;
+            let ends = points(("positions", positions), ("velocities", velocities))?;
+            if starts.len() != ends.len() {
+                let (before, after) = (starts.len(), ends.len());
+                let text = format!("positions_before: {before} elements, but there are {after} positions");
+                return Err(Failure::argument(text));
+            }
+            sources(&ends, Some(&starts), radius)
+        };
+        step_along(context, mist, report, raised, [snow, wind], (bodies, count), [time, dt])
+    }
+}
+
+/// Moves mist through a step with what points raise.
+///
+/// # Safety
+/// As the functions above.
+unsafe fn step_along(
+    context: *mut frz_context,
+    mist: *mut frz_mist,
+    report: *mut frz_mist_report,
+    raised: impl FnOnce() -> Outcome<Vec<Source>>,
+    [snow, wind]: [*const frz_grid; 2],
+    bodies: (*const frz_body, usize),
+    [time, dt]: [f64; 2],
+) -> frz_status {
+    // SAFETY: the caller's promise.
+    unsafe {
+        stepped(context, mist, report, |ctx, air| {
+            let snow = read_some(snow)?;
+            let snow = snow.as_deref().map(Grid::floats).transpose()?;
+            snow.map_or(Ok(()), |snow| check_snow("snow", snow))?;
+            let wind = read_some(wind)?;
+            let wind = wind.as_deref().map(Grid::vectors).transpose()?;
+            air.step(ctx, &raised()?, &Scene { snow, wind, bodies, time, dt })
+        })
+    }
+}
+
+/// Positions (m) and velocities (m/s) of points, which are named in messages.
+///
+/// # Safety
+/// The views must describe memory that can be read.
+unsafe fn points(
+    (names, positions): (&str, frz_view),
+    (of_velocities, velocities): (&str, frz_view),
+) -> Outcome<Vec<Start>> {
+    // SAFETY: the caller's promise.
+    let (positions, velocities) =
+        unsafe { (positions.elements::<[f64; 3]>(names)?, velocities.elements::<[f32; 3]>(of_velocities)?) };
+    if velocities.len() != positions.len() {
+        let (velocities, positions) = (velocities.len(), positions.len());
+        let text = format!("{of_velocities}: {velocities} elements, but there are {positions} {names}");
+        return Err(Failure::argument(text));
+    }
+    let point =
+        |(place, velocity): (&[f64; 3], &[f32; 3])| Start { place: (*place).into(), velocity: *velocity };
+    Ok(positions.iter().zip(&*velocities).map(point).collect())
+}
+
+/// Points of a radius (m) after a step as sources of mist, and where they were before it.
+fn sources(ends: &[Start], starts: Option<&[Start]>, radius: f64) -> Outcome<Vec<Source>> {
+    within("radius", radius, f64::MIN_POSITIVE..=f64::MAX, " m")?;
+    let source = |(index, end): (usize, &Start)| Source {
+        place: end.place,
+        velocity: end.velocity,
+        radius,
+        start: starts.map(|starts| starts[index]),
+    };
+    Ok(ends.iter().enumerate().map(source).collect())
+}

@@ -1,0 +1,18 @@
+//! Snow: the layer, what presses into it, grains and mist.
+
+// In the header's order.
+pub mod layer;
+
+pub mod base_layer;
+
+pub mod grains_params;
+
+pub mod grains;
+
+pub mod grains_points;
+
+pub mod mist_params;
+
+pub mod mist;
+
+pub mod mist_points;

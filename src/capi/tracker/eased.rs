@@ -1,0 +1,80 @@
+//! The mesh of a tracker as it is shown before the liquid merges or splits.
+
+use super::mesh::{frz_particles, frz_tracker, particles};
+use crate::capi::ffi::guard::{Failure, frz_status, guard};
+use crate::capi::ffi::handle::change;
+use crate::capi::ffi::views::{finite, frz_span};
+use crate::capi::runtime::context::{enter, frz_context};
+use crate::surface::Particles;
+
+/// Most frames ahead.
+const MOST: usize = 100;
+
+/// Copies the places of the mesh's vertices as they are shown: in the steps before the liquid merges or splits, the vertices that will
+/// be taken away already go towards what will be made, so that it does not pop up. With frz_tracker_params.rebuild only; else, and
+/// far from all changes, they are those of frz_tracker_read.
+///
+/// The steps to come are made for it, and kept: frz_tracker_step with the same particles and dt then only takes over what is there, so
+/// that a step costs about as much as without. Each of them keeps its particles and a mesh, and where it changes that two more. The tracker itself stays as it is, and so do states that
+/// are saved.
+///
+/// now: the particles at the last step's end, or at which the tracker began.
+/// coming: count pointers, to the particles of the frames to come, in their order, each dt after the one before; NULL where count is 0.
+/// count: 0 to ahead; less than ahead where the shot ends.
+/// ahead: how many steps before a change vertices set out, 1 to 100; 4 is usual. The same in all frames.
+/// dt: time between frames (s), above 0.
+/// dst: room for as many double[3] as frz_tracker_count reports (m); FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_read_eased(
+    context: *mut frz_context,
+    tracker: *mut frz_tracker,
+    now: *const frz_particles,
+    coming: *const *const frz_particles,
+    count: usize,
+    ahead: u32,
+    dt: f64,
+    dst: frz_span,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let call = enter(context)?;
+            let mut follower = change(tracker)?;
+            call.ctx().check()?;
+            finite("dt", dt)?;
+            if dt <= 0.0 {
+                return Err(Failure::argument(format!("dt = {dt} s does not go on in time")));
+            }
+            if ahead == 0 || ahead as usize > MOST {
+                return Err(Failure::argument(format!("ahead = {ahead} is not within 1 to {MOST}")));
+            }
+            if count > ahead as usize {
+                return Err(Failure::argument(format!("count = {count} is more than ahead, {ahead}")));
+            }
+            if coming.is_null() && count > 0 {
+                return Err(Failure::argument("coming is NULL"));
+            }
+            let now = particles(now)?;
+            let coming: Vec<Particles> = frames(coming, count)?;
+            let follower = &mut *follower;
+            if !follower.tracker.params().rebuild {
+                let places = follower.tracker.vertices().iter();
+                return dst.fill("dst", &places.map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>());
+            }
+            follower.outlook.look(call.ctx(), &follower.tracker, now, coming, dt)?;
+            let places = follower.outlook.eased(call.ctx(), &follower.tracker, ahead as usize)?;
+            dst.fill("dst", &places.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())
+        }
+    })
+}
+
+/// The particles of several frames.
+///
+/// # Safety
+/// The pointer must be the caller's, to so many pointers to structures.
+unsafe fn frames(first: *const *const frz_particles, count: usize) -> Result<Vec<Particles>, Failure> {
+    // SAFETY: the caller's promise.
+    (0..count).map(|frame| unsafe { particles(first.add(frame).read_unaligned()) }).collect()
+}

@@ -1,0 +1,276 @@
+//! The mesh of a tracker as it is now, and what the last step made of the one before.
+
+use super::mesh::{Follower, frz_tracker};
+use crate::capi::ffi::guard::{frz_status, guard};
+use crate::capi::ffi::handle::{clear, read, required};
+use crate::capi::ffi::views::{frz_span, meaning};
+use crate::geometry::DVec3;
+use crate::surface::{Change, Source};
+
+/// What a step made of the mesh.
+pub(in crate::capi) struct Edits {
+    /// For each vertex the one that it was; none: it was made.
+    pub origins: Vec<Option<u32>>,
+    /// For each triangle where it comes from.
+    pub sources: Vec<Source>,
+    /// Places (m) to which the step took the vertices that there were.
+    pub before: Vec<DVec3>,
+}
+
+impl From<Change> for Edits {
+    fn from(change: Change) -> Self {
+        let Change { origins, sources, before, .. } = change;
+        Self { origins, sources, before }
+    }
+}
+
+/// What frz_tracker_read reads of each vertex: in the order of the mesh that the tracker was made with, until a step or frz_tracker_resculpt changes it.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_tracker_array {
+    /// float[3]: its place (m).
+    FRZ_TRACKER_POSITION = 0,
+    /// double[3]: its place (m), as exactly as it is known: also far from the origin. The next step's, less these, over dt are the
+    /// velocities for motion blur; where that step changes the mesh, FRZ_EDIT_BEFORE less these.
+    FRZ_TRACKER_POSITION_DOUBLE = 1,
+    /// float: the distance that it keeps from the particles' surface (m), negative inside; NaN: it was too far away to have one.
+    FRZ_TRACKER_DELTA = 2,
+    /// int32_t: 1 where the last step could not project it, or found surface beside it that the mesh does not cover; else 0.
+    FRZ_TRACKER_FLAGGED = 3,
+}
+
+use frz_tracker_array::*;
+
+const ARRAYS: [(u32, frz_tracker_array); 4] = [
+    (0, FRZ_TRACKER_POSITION),
+    (1, FRZ_TRACKER_POSITION_DOUBLE),
+    (2, FRZ_TRACKER_DELTA),
+    (3, FRZ_TRACKER_FLAGGED),
+];
+
+/// Reports how many vertices the mesh has: as many as the one that it was made with, until a step or frz_tracker_resculpt changes it
+/// (frz_tracker_params.rebuild).
+///
+/// count: receives their number; 0 after a failure.
+///
+/// Any number of threads may read a tracker.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_count(tracker: *const frz_tracker, count: *mut usize) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(count);
+            let count = required(count, "count")?;
+            count.write_unaligned(read(tracker)?.tracker.vertices().len());
+            Ok(())
+        }
+    })
+}
+
+/// Copies an array of the mesh's vertices.
+///
+/// array: a frz_tracker_array; it says of what type the elements are.
+/// dst: room for as many elements as frz_tracker_count reports; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+///
+/// Any number of threads may read a tracker.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_read(
+    tracker: *const frz_tracker,
+    array: u32,
+    dst: frz_span,
+) -> frz_status {
+    guard(|| {
+        let array = meaning("array", "frz_tracker_array", array, &ARRAYS)?;
+        // SAFETY: the tracker is NULL or was not destroyed; the span is the caller's.
+        unsafe {
+            let follower = read(tracker)?;
+            let tracker = &follower.tracker;
+            match array {
+                FRZ_TRACKER_POSITION => {
+                    let places = tracker.vertices().iter();
+                    dst.fill("dst", &places.map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect::<Vec<_>>())
+                }
+                FRZ_TRACKER_POSITION_DOUBLE => {
+                    dst.fill("dst", &tracker.vertices().iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())
+                }
+                FRZ_TRACKER_DELTA => dst.fill("dst", tracker.delta()),
+                FRZ_TRACKER_FLAGGED => {
+                    dst.fill("dst", &tracker.flags().iter().map(|flag| i32::from(*flag)).collect::<Vec<_>>())
+                }
+            }
+        }
+    })
+}
+
+/// Reports how many triangles the mesh has: those that the faces of the one that it was made with were cut into, until a step
+/// changes it.
+///
+/// count: receives their number; 0 after a failure.
+///
+/// Any number of threads may read a tracker.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_triangle_count(
+    tracker: *const frz_tracker,
+    count: *mut usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(count);
+            let count = required(count, "count")?;
+            count.write_unaligned(read(tracker)?.tracker.triangles().len());
+            Ok(())
+        }
+    })
+}
+
+/// Copies the mesh's triangles, counter-clockwise seen from outside. Until a step changes the mesh they are the FRZ_MESH_TRIANGLES of
+/// the one that it was made with; they have to be read anew where frz_tracker_report.changed is 1, and after frz_tracker_resculpt.
+///
+/// dst: room for as many uint32_t[3] as frz_tracker_triangle_count reports, the vertices of each; FRZ_ERROR_CAPACITY when it is too
+///     little, and nothing is written.
+///
+/// Any number of threads may read a tracker.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_read_triangles(
+    tracker: *const frz_tracker,
+    dst: frz_span,
+) -> frz_status {
+    // SAFETY: the tracker is NULL or was not destroyed; the span is the caller's.
+    guard(|| unsafe { dst.fill("dst", read(tracker)?.tracker.triangles()) })
+}
+
+/// Arrays that frz_tracker_read_edits reads.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_edit_array {
+    /// int64_t for each vertex (frz_tracker_count): the vertex that it was before the step, and no other was; -1: it was made.
+    FRZ_EDIT_ORIGIN = 0,
+    /// int64_t for each triangle (frz_tracker_triangle_count): the triangle that it was before the step, or is a part of; -1: neither.
+    FRZ_EDIT_SOURCE = 1,
+    /// uint32_t for each triangle: a frz_edit_kind.
+    FRZ_EDIT_KIND = 2,
+    /// double[3] for each vertex that there was before the step (frz_tracker_edits): the place (m) to which the step took it, before
+    /// the mesh was rebuilt. Those that are still there lie there.
+    FRZ_EDIT_BEFORE = 3,
+}
+
+/// What a triangle is.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_edit_kind {
+    /// One that there was, with the same vertices in the same direction.
+    FRZ_EDIT_WHOLE = 0,
+    /// A part of one that there was, which was cut or divided.
+    FRZ_EDIT_PART = 1,
+    /// A new one.
+    FRZ_EDIT_NEW = 2,
+}
+
+use frz_edit_array::*;
+use frz_edit_kind::*;
+
+const EDITS: [(u32, frz_edit_array); 4] =
+    [(0, FRZ_EDIT_ORIGIN), (1, FRZ_EDIT_SOURCE), (2, FRZ_EDIT_KIND), (3, FRZ_EDIT_BEFORE)];
+
+/// Reports whether the last step, or frz_tracker_resculpt since, changed the mesh's vertices and triangles. Neither did in a tracker that
+/// has just been made, or has just come back from a state.
+///
+/// changed: receives 1 where it did, else 0; 0 after a failure.
+/// before: receives how many vertices there were before the step; 0 after a failure. May be NULL.
+///
+/// Any number of threads may read a tracker.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_edits(
+    tracker: *const frz_tracker,
+    changed: *mut u32,
+    before: *mut usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(changed);
+            clear(before);
+            let changed = required(changed, "changed")?;
+            let follower = read(tracker)?;
+            changed.write_unaligned(u32::from(follower.edits.is_some()));
+            if !before.is_null() {
+                before.write_unaligned(follower.before().len());
+            }
+            Ok(())
+        }
+    })
+}
+
+/// Copies what the last step made of the mesh, for a host to take its own arrays along. Where it changed nothing every vertex and
+/// every triangle is what it was.
+///
+/// array: a frz_edit_array; it says of what type the elements are, and how many there are.
+/// dst: room for as many; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+///
+/// Any number of threads may read a tracker.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_read_edits(
+    tracker: *const frz_tracker,
+    array: u32,
+    dst: frz_span,
+) -> frz_status {
+    guard(|| {
+        let array = meaning("array", "frz_edit_array", array, &EDITS)?;
+        // SAFETY: the tracker is NULL or was not destroyed; the span is the caller's.
+        unsafe {
+            let follower = read(tracker)?;
+            match array {
+                FRZ_EDIT_ORIGIN => dst.fill("dst", &follower.origins()),
+                FRZ_EDIT_SOURCE => dst.fill("dst", &follower.sources()),
+                FRZ_EDIT_KIND => dst.fill("dst", &follower.kinds()),
+                FRZ_EDIT_BEFORE => {
+                    dst.fill("dst", &follower.before().iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())
+                }
+            }
+        }
+    })
+}
+
+impl Follower {
+    /// Places (m) of the vertices that there were before the last step, at its end.
+    fn before(&self) -> &[DVec3] {
+        match &self.edits {
+            Some(edits) => &edits.before,
+            None => self.tracker.vertices(),
+        }
+    }
+
+    /// For each vertex the one that it was; -1: it was made.
+    fn origins(&self) -> Vec<i64> {
+        match &self.edits {
+            Some(edits) => edits.origins.iter().map(|at| at.map_or(-1, i64::from)).collect(),
+            None => (0..self.tracker.vertices().len() as i64).collect(),
+        }
+    }
+
+    /// For each triangle the one that it was, or is a part of; -1: neither.
+    fn sources(&self) -> Vec<i64> {
+        let source = |source: &Source| match source {
+            Source::Whole(triangle) | Source::Part(triangle) => i64::from(*triangle),
+            Source::New => -1,
+        };
+        match &self.edits {
+            Some(edits) => edits.sources.iter().map(source).collect(),
+            None => (0..self.tracker.triangles().len() as i64).collect(),
+        }
+    }
+
+    /// For each triangle a [`frz_edit_kind`].
+    fn kinds(&self) -> Vec<u32> {
+        let kind = |source: &Source| match source {
+            Source::Whole(_) => FRZ_EDIT_WHOLE as u32,
+            Source::Part(_) => FRZ_EDIT_PART as u32,
+            Source::New => FRZ_EDIT_NEW as u32,
+        };
+        match &self.edits {
+            Some(edits) => edits.sources.iter().map(kind).collect(),
+            None => vec![FRZ_EDIT_WHOLE as u32; self.tracker.triangles().len()],
+        }
+    }
+}

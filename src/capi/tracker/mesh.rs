@@ -1,0 +1,412 @@
+//! A detailed mesh that follows the particles of a liquid.
+
+use std::ffi::c_void;
+
+use super::edits::Edits;
+pub use super::params::{frz_tracker_params, frz_tracker_params_init};
+use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{Noun, change, clear, destroy, read, required};
+use crate::capi::ffi::saved::{Saved, resumed};
+use crate::capi::ffi::views::{Sized32, fill, finite, frz_view, sized};
+use crate::capi::mesh::triangles::{frz_mesh, no_flags};
+use crate::capi::runtime::context::{creates, enter, frz_context};
+use crate::geometry::check::orientation::{Closing, Orientation};
+use crate::geometry::check::topology::Topology;
+use crate::surface::{Change, Outlook, Particles, Tracker, estimate_spacing};
+
+/// A detailed mesh that follows the particles of a liquid.
+pub struct frz_tracker {
+    _opaque: [u8; 0],
+}
+
+/// The particles of a liquid at one time. Their order does not matter.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_particles {
+    /// sizeof(frz_particles).
+    pub struct_size: u32,
+    /// 0.
+    pub flags: u32,
+    /// double[3] for each particle (m), finite.
+    pub positions: frz_view,
+    /// float[3] for each particle (m/s), finite; data NULL with a count of 0: not known.
+    pub velocities: frz_view,
+    /// int64_t for each particle, no two the same: a particle keeps its own from time to time; data NULL with a count of 0: not
+    /// known.
+    pub ids: frz_view,
+}
+
+// SAFETY: numbers and pointers.
+unsafe impl Sized32 for frz_particles {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_particles";
+}
+
+/// What a step did.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_tracker_report {
+    /// sizeof(frz_tracker_report), set by the caller.
+    pub struct_size: u32,
+    /// Parts into which the step was divided, for no particle to move farther than its spacing in one.
+    pub parts: u32,
+    /// Vertices whose projection jumped: the liquid merged or split there. They are flagged.
+    pub jumped: u64,
+    /// Vertices whose projection did not find the particles' surface. They are flagged.
+    pub lost: u64,
+    /// Particles that are new.
+    pub born: u64,
+    /// Particles that are gone.
+    pub died: u64,
+    /// Triangles of the particles' own surface.
+    pub triangles: u64,
+    /// Parts of that surface that the mesh does not cover: drops outside of it.
+    pub drops: u64,
+    /// The same: bubbles inside.
+    pub bubbles: u64,
+    /// Vertices beside which there is surface that the mesh does not cover: the liquid begins to merge or to split there. They are
+    /// flagged.
+    pub uncovered: u64,
+    /// 1 where the mesh has other vertices or triangles now (frz_tracker_read_edits); else 0, and so is all below.
+    pub changed: u32,
+    /// How much more was rebuilt than the cells in which the mesh no longer fitted, and what they need: 0 nothing, 1 a ring of cells
+    /// around them, 2 the whole parts of the mesh that pass through them, 3 everything.
+    pub rung: u32,
+    /// Cells in which the mesh no longer fitted.
+    pub changed_cells: u64,
+    /// Cells in which it was rebuilt; 0 where edges were only divided, turned, or went.
+    pub rebuilt_cells: u64,
+    /// Triangles that are new, or parts of others.
+    pub made_triangles: u64,
+    /// Parts of the mesh with some particles inside, but fewer than frz_tracker_params.min_drop, that were taken away.
+    pub specks: u64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_tracker_report {
+    const SIZES: &'static [usize] = &[
+        std::mem::offset_of!(frz_tracker_report, uncovered),
+        std::mem::offset_of!(frz_tracker_report, changed),
+        std::mem::offset_of!(frz_tracker_report, specks),
+        size_of::<Self>(),
+    ];
+    const NAME: &'static str = "frz_tracker_report";
+}
+
+impl frz_tracker_report {
+    const NOTHING: Self = Self {
+        struct_size: 0,
+        parts: 0,
+        jumped: 0,
+        lost: 0,
+        born: 0,
+        died: 0,
+        triangles: 0,
+        drops: 0,
+        bubbles: 0,
+        uncovered: 0,
+        changed: 0,
+        rung: 0,
+        changed_cells: 0,
+        rebuilt_cells: 0,
+        made_triangles: 0,
+        specks: 0,
+    };
+}
+
+/// The value of a tracker's handle.
+pub(in crate::capi) struct Follower {
+    /// The mesh.
+    pub tracker: Tracker,
+    /// What the last step made of it; none: it changed no triangle, or there was none yet.
+    pub edits: Option<Edits>,
+    /// Steps that were made ahead.
+    pub outlook: Outlook,
+    pub saved: Saved,
+    /// Whether a warning of the particles was logged.
+    pub has_warned: bool,
+}
+
+/// Refuses to rebuild a mesh of a state that is not closed, as [`Tracker::new`] does one at the first frame.
+fn check_closed(tracker: &Tracker) -> Outcome {
+    let triangles = tracker.triangles();
+    // Nothing is left where all of the liquid has gone.
+    if triangles.is_empty() || Topology::of(tracker.vertices().len(), triangles).is_watertight() {
+        return Ok(());
+    }
+    Err(Failure::argument("the mesh is not closed and 2-manifold by index, as it must be to be rebuilt"))
+}
+
+impl Noun for frz_tracker {
+    type Value = Follower;
+    const NAME: &'static str = "tracker";
+    const TAG: u32 = 0x6672_7a08;
+}
+
+/// Particles from a host's arrays, checked.
+///
+/// # Safety
+/// The pointer must be NULL or the caller's, and its views describe memory that can be read.
+pub(in crate::capi) unsafe fn particles(pointer: *const frz_particles) -> Outcome<Particles> {
+    let none = frz_view::NONE;
+    let usual = frz_particles { struct_size: 0, flags: 0, positions: none, velocities: none, ids: none };
+    // SAFETY: the caller's promise.
+    let (places, velocities, ids) = unsafe {
+        let given = sized(pointer, usual)?;
+        no_flags(given.flags, 0)?;
+        (
+            given.positions.elements::<[f64; 3]>("positions")?,
+            given.velocities.elements::<[f32; 3]>("velocities")?,
+            given.ids.elements::<i64>("ids")?,
+        )
+    };
+    let particles = Particles { places: places.into_iter().map(Into::into).collect(), velocities, ids };
+    particles.validate()?;
+    Ok(particles)
+}
+
+/// Estimates the initial distance between particles: from the median of the mean distances to the six nearest ones.
+///
+/// particles: as they are at the first frame.
+/// spacing: receives it (m); 0 where there are too few particles, or too many at one place, to tell, and after a failure.
+///
+/// One thread at a time for each context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_particles_spacing(
+    context: *mut frz_context,
+    particles: *const frz_particles,
+    spacing: *mut f64,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(spacing);
+            required(spacing, "spacing")?;
+            let call = enter(context)?;
+            let particles = self::particles(particles)?;
+            let estimate = call.ctx().phase("spacing", || Ok(estimate_spacing(&particles.places)))?;
+            spacing.write_unaligned(estimate.unwrap_or(0.0));
+            Ok(())
+        }
+    })
+}
+
+/// Makes a mesh that follows particles: as it is at the first frame, or in a state that frz_tracker_save wrote.
+///
+/// params: see frz_tracker_params.
+/// mesh: at the first frame, in the particles' space; also with a restart. It is copied, and may be open, cross itself and repeat
+///     vertices; with params.rebuild it must be closed, each edge with two triangles that agree about which side is out, each
+///     vertex with one fan of them: see frz_mesh_repair. FRZ_ERROR_ARGUMENT says where it is not, or is not where the particles
+///     are.
+/// particles: at the first frame; NULL with a restart.
+/// restart: restart_bytes bytes of frz_tracker_save of a tracker of the same mesh, spacing and cell: it comes back bit for bit, on
+///     any number of threads. NULL: none. Bytes that are damaged, of another version, mesh, spacing or cell are FRZ_ERROR_FILE.
+/// restart_bytes: 0 without a restart.
+/// out: receives the tracker, to be destroyed with frz_tracker_destroy; NULL after a failure.
+///
+/// One thread at a time for each context; any number may read a mesh.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_create(
+    context: *mut frz_context,
+    params: *const frz_tracker_params,
+    mesh: *const frz_mesh,
+    particles: *const frz_particles,
+    restart: *const c_void,
+    restart_bytes: usize,
+    out: *mut *mut frz_tracker,
+) -> frz_status {
+    // SAFETY: the pointers are NULL or the caller's.
+    unsafe {
+        creates(context, out, |ctx| {
+            let params = sized(params, frz_tracker_params::usual())?.params()?;
+            let mesh = read(mesh)?;
+            let triangles = &mesh.triangles;
+            let state =
+                frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
+            let mut tracker = match restart.is_null() {
+                true => {
+                    let particles = self::particles(particles)?;
+                    if params.rebuild && !Orientation::of_mesh(triangles, Closing::Caps).is_unchanged() {
+                        ctx.warn("the mesh: parts of it are inside out: reverse their faces");
+                    }
+                    Tracker::new(ctx, params, triangles, &particles)?
+                }
+                false => resumed(ctx, "a tracker", Tracker::unpacked(&state), || {
+                    Tracker::resume(params, triangles, &state)
+                })?,
+            };
+            if params.rebuild && !restart.is_null() {
+                check_closed(&tracker)?;
+            }
+            // A mesh that was rebuilt has it in its state.
+            if !tracker.is_rebuilt() {
+                tracker.set_lasting(mesh.attribute("detail", 1).unwrap_or_default().to_vec())?;
+            }
+            Ok(Follower {
+                tracker,
+                edits: None,
+                outlook: Outlook::default(),
+                saved: Saved::default(),
+                has_warned: false,
+            })
+        })
+    }
+}
+
+/// Destroys a tracker; NULL is fine.
+///
+/// tracker: may be NULL. Not while a call uses it: it then stays.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_destroy(tracker: *mut frz_tracker) {
+    // SAFETY: the tracker is NULL or was not destroyed.
+    guard(|| unsafe { destroy(tracker) });
+}
+
+/// Sets how a mesh follows from the next step on. The spacing, the cell and whether it is rebuilt must stay.
+///
+/// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_set_params(
+    tracker: *mut frz_tracker,
+    params: *const frz_tracker_params,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mut follower = change(tracker)?;
+            let params = sized(params, frz_tracker_params::usual())?.params()?;
+            follower.tracker.set_params(params)?;
+            follower.outlook = Outlook::default();
+            Ok(())
+        }
+    })
+}
+
+/// Hands over the particles to which the step after the coming one goes, early: with frz_tracker_params.rebuild their surface is made
+/// while the coming step rebuilds the mesh, on threads that have nothing to do. It makes no difference to what comes out; particles that
+/// then do not come cost time. Of no use with frz_tracker_read_eased, which makes the steps to come itself.
+///
+/// particles: as they will be; they are copied.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_ahead(
+    tracker: *mut frz_tracker,
+    particles: *const frz_particles,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            let mut follower = change(tracker)?;
+            let particles = self::particles(particles)?;
+            particles.validate()?;
+            follower.tracker.set_ahead(std::sync::Arc::new(particles));
+            Ok(())
+        }
+    })
+}
+
+/// Moves the mesh with its particles from one time to another. After a failure or a cancel it is as it was before. With
+/// frz_tracker_params.rebuild it may have other vertices and triangles afterwards.
+///
+/// Either of both may have no particles: the mesh then loses its vertices, and gets others from the particles' surface when there are some
+/// again; without rebuild it waits where it was. The context's log hears once of ids and velocities that contradict each other, and of
+/// steps in which over half of the mesh is lost or made anew.
+///
+/// from: the particles as they were at the last step's end.
+/// to: the particles at this step's end. Those of the same id are the same; where one of the two has no ids, from must have
+///     velocities.
+/// dt: time between them (s), above 0.
+/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_step(
+    context: *mut frz_context,
+    tracker: *mut frz_tracker,
+    from: *const frz_particles,
+    to: *const frz_particles,
+    dt: f64,
+    report: *mut frz_tracker_report,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            if !report.is_null() {
+                fill(report, None, frz_tracker_report::NOTHING)?;
+            }
+            let call = enter(context)?;
+            let mut follower = change(tracker)?;
+            finite("dt", dt)?;
+            let (from, to) = (particles(from)?, particles(to)?);
+            let follower = &mut *follower;
+            // A step that was made ahead looks for no cancel.
+            call.ctx().check()?;
+            let done = match follower.outlook.take(&from, &to, dt) {
+                Some((tracker, done)) => {
+                    follower.tracker = tracker;
+                    done
+                }
+                None => follower.tracker.step(call.ctx(), &from, &to, dt)?,
+            };
+            follower.saved.take();
+            done.new_warnings(&mut follower.has_warned).for_each(|warning| call.ctx().warn(warning));
+            let drops = done.apart.iter().filter(|apart| apart.volume >= 0.0).count();
+            let of_change = |count: fn(&Change) -> usize| done.change.as_ref().map_or(0, count);
+            let told = frz_tracker_report {
+                struct_size: 0,
+                parts: done.parts as u32,
+                jumped: done.jumped as u64,
+                lost: done.lost as u64,
+                born: done.born as u64,
+                died: done.died as u64,
+                triangles: done.triangles as u64,
+                drops: drops as u64,
+                bubbles: (done.apart.len() - drops) as u64,
+                uncovered: done.uncovered as u64,
+                changed: u32::from(done.change.is_some()),
+                rung: of_change(|change| change.rung) as u32,
+                changed_cells: of_change(|change| change.flagged_cells) as u64,
+                rebuilt_cells: of_change(|change| change.rebuilt_cells) as u64,
+                made_triangles: of_change(Change::made_triangles) as u64,
+                specks: of_change(|change| change.specks) as u64,
+            };
+            follower.edits = done.change.map(Edits::from);
+            if report.is_null() { Ok(()) } else { fill(report, None, told) }
+        }
+    })
+}
+
+/// Writes all that the next step depends on, besides the parameters, the mesh and the particles: for a host's own cache. The bytes
+/// are the same on any number of threads.
+///
+/// dst: room for capacity bytes. NULL: size receives their number, and nothing is written.
+/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
+/// size: receives the bytes that were written, or are needed; 0 after other failures.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_save(
+    context: *mut frz_context,
+    tracker: *const frz_tracker,
+    dst: *mut c_void,
+    capacity: usize,
+    size: *mut usize,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            clear(size);
+            required(size, "size")?;
+            let call = enter(context)?;
+            let follower = read(tracker)?;
+            let tracker = &follower.tracker;
+            let save = || call.ctx().phase("save", || Ok(tracker.save()));
+            follower.saved.write((dst, capacity, size), save)
+        }
+    })
+}

@@ -1,0 +1,14 @@
+//! A detailed mesh that follows the particles of a liquid.
+
+// In the header's order.
+pub mod params;
+
+pub mod mesh;
+
+pub mod eased;
+
+pub mod edits;
+
+pub mod rest_position;
+
+pub mod sculpt;

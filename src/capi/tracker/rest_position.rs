@@ -1,0 +1,45 @@
+//! Where the liquid at the vertices of a tracker's mesh was at the first frame.
+
+use super::mesh::{frz_particles, frz_tracker, particles};
+use crate::capi::ffi::guard::{Failure, frz_status, guard};
+use crate::capi::ffi::handle::read;
+use crate::capi::ffi::views::frz_span;
+use crate::capi::runtime::context::{enter, frz_context};
+use crate::surface::Rest;
+
+/// Copies for each vertex where the liquid there was at the first frame, by the particles around it that were there then: for a host to
+/// take textures and arrays of its own through merges and splits. What a step made (frz_tracker_read_edits) takes what the mesh of the
+/// first frame has at the nearest place to where its liquid was. Corners of a triangle may come from far apart, where liquids have come
+/// together: it should have all of its corners' numbers from near one of them.
+///
+/// first: the particles at the first frame, with ids.
+/// now: the particles at the time to which the last step led, with ids.
+/// dst: room for as many double[3] as frz_tracker_count reports (m); FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+///     NaN where it is not known: no particle near a vertex was there at the first frame.
+///
+/// One thread at a time for each context; any number may read a tracker.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_tracker_read_rest(
+    context: *mut frz_context,
+    tracker: *const frz_tracker,
+    first: *const frz_particles,
+    now: *const frz_particles,
+    dst: frz_span,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's; the span is the caller's.
+        unsafe {
+            let call = enter(context)?;
+            let follower = read(tracker)?;
+            let (first, now) = (particles(first)?, particles(now)?);
+            let nameless = |which: &str| Failure::argument(format!("{which}: the particles have no ids"));
+            let rest = Rest::of(&first).ok_or_else(|| nameless("first"))?;
+            if now.ids.is_empty() {
+                return Err(nameless("now"));
+            }
+            let places = follower.tracker.rest(call.ctx(), &rest, &now)?;
+            let of_vertex = places.iter().map(|place| place.map_or([f64::NAN; 3], |p| [p.x, p.y, p.z]));
+            dst.fill("dst", &of_vertex.collect::<Vec<_>>())
+        }
+    })
+}
