@@ -9,7 +9,7 @@ mod picture;
 #[path = "../common/program.rs"]
 mod program;
 
-mod base {
+mod geometry {
     mod faults;
     mod meshes;
     mod orientation;
