@@ -2,7 +2,7 @@
 
 #[path = "../tests/common/mod.rs"]
 mod common;
-#[path = "gates/edit_history.rs"]
+#[path = "gates/surface/edit_history.rs"]
 #[allow(dead_code)]
 mod edit_history;
 #[path = "gates/harness.rs"]
@@ -14,7 +14,7 @@ mod matching;
 mod projections;
 #[path = "times/rebuilding.rs"]
 mod rebuilding;
-#[path = "gates/rebuilt_sequences.rs"]
+#[path = "gates/surface/rebuilt_sequences.rs"]
 #[allow(dead_code)]
 mod rebuilt_sequences;
 #[path = "gates/scenes.rs"]
@@ -22,15 +22,15 @@ mod rebuilt_sequences;
 mod scenes;
 #[path = "times/shallow.rs"]
 mod shallow;
-#[path = "gates/shallow_speed.rs"]
+#[path = "gates/shallow/speed.rs"]
 #[allow(dead_code)]
 mod shallow_speed;
-#[path = "gates/speed.rs"]
+#[path = "gates/snow/speed.rs"]
 #[allow(dead_code)]
 mod speed;
 #[path = "times/surface.rs"]
 mod surface;
-#[path = "gates/surface.rs"]
+#[path = "gates/surface/known_motion.rs"]
 #[allow(dead_code)]
 mod surface_gates;
 

@@ -18,10 +18,10 @@ use frazil::capi::snow::mist::*;
 use frazil::capi::snow::mist_params::*;
 use frazil::capi::snow::mist_points::*;
 
+use crate::capi::host::view;
 use crate::harness::Harness;
-use crate::host::view;
-use crate::reliability_step_meshes as meshes;
-use crate::reliability_watch::{Tried, Watch};
+use crate::reliability::step_meshes as meshes;
+use crate::reliability::watch::{Tried, Watch};
 
 /// A struct of zeroes that begins with its size.
 pub fn sized<T>() -> T {

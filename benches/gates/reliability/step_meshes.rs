@@ -15,9 +15,9 @@ use frazil::capi::snow::mist::*;
 use frazil::capi::tracker::eased::*;
 use frazil::capi::tracker::mesh::*;
 
-use crate::host::{view, works};
-use crate::reliability_step_calls::{grain_params, mist_params, sized, step_length};
-use crate::reliability_watch::Tried;
+use crate::capi::host::{view, works};
+use crate::reliability::step_calls::{grain_params, mist_params, sized, step_length};
+use crate::reliability::watch::Tried;
 
 /// Corners of a cube of half an edge of 1, and its faces.
 const CORNERS: [[f32; 3]; 8] = [

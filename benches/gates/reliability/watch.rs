@@ -8,8 +8,8 @@ use frazil::capi::frz_status::{self, *};
 use frazil::capi::runtime::context::*;
 use rustix::time::{ClockId, clock_gettime};
 
-use crate::grains::Random;
-use crate::host::Threads;
+use crate::capi::host::Threads;
+use crate::snow::grains::Random;
 
 /// Steps of each function.
 pub const STEPS: usize = 10_000;

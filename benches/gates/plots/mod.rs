@@ -1,0 +1,4 @@
+//! Plots of what was measured against theory.
+
+pub mod chart;
+pub mod font;

@@ -1,0 +1,130 @@
+//! Gate of mist that is cancelled through C: the time until its step returns, and that it left all as it was.
+
+use std::cell::Cell;
+use std::ptr::{null, null_mut};
+
+use frazil::capi::level_set::body::{frz_body, frz_body_init};
+use frazil::capi::snow::mist::*;
+use frazil::capi::snow::mist_params::*;
+use frazil::capi::snow::mist_points::*;
+use frazil::capi::{frz_status, frz_view};
+
+use crate::capi::cancel_latency::{Steps, measure};
+use crate::capi::host::{Threads, view, works, written};
+use crate::common::shapes::sphere;
+use crate::harness::Harness;
+use crate::snow::grains::{FRAME, Random};
+
+/// Edge of a cell (m), and of the cube in which points raise mist.
+const CELL: f64 = 0.01;
+const CUBE: f64 = 0.9;
+
+/// Mist that points raise around a ball.
+struct Host {
+    threads: Threads,
+    mist: *mut frz_mist,
+    places: Vec<[f64; 3]>,
+    speeds: Vec<[f32; 3]>,
+    ball: [Vec<[f32; 3]>; 2],
+    corners: Vec<[u32; 3]>,
+    cells: Cell<u64>,
+}
+
+impl Host {
+    fn new(random: &mut Random) -> Self {
+        let mut params = std::mem::MaybeUninit::<frz_mist_params>::uninit();
+        let mesh = sphere(0.15, 24);
+        let at = |x: f32| {
+            mesh.positions.iter().map(|place| [place.x + x, place.y + 0.45, place.z + 0.45]).collect()
+        };
+        let mut host = Self {
+            threads: Threads::new(2),
+            mist: null_mut(),
+            places: (0..4000).map(|_| [0, 1, 2].map(|_| CUBE * random.next())).collect(),
+            speeds: (0..4000).map(|_| [0, 1, 2].map(|_| 2.0 * random.next() as f32 - 0.5)).collect(),
+            ball: [at(0.4), at(0.45)],
+            corners: mesh.triangles.clone(),
+            cells: Cell::new(0),
+        };
+        // SAFETY: the pointers are valid, and the parameters are filled before they are read.
+        unsafe {
+            works(frz_mist_params_init(params.as_mut_ptr(), size_of::<frz_mist_params>()));
+            let mut params = params.assume_init();
+            (params.cell, params.from_speed, params.flags) = (CELL, 0.0, FRZ_MIST_FALLING);
+            (params.turbulence, params.confinement) = (3.0, 0.3);
+            works(frz_mist_create(host.threads.ctx, &params, null(), 0, &mut host.mist));
+        }
+        host
+    }
+
+    fn body(&self) -> frz_body {
+        let mut body = std::mem::MaybeUninit::<frz_body>::uninit();
+        // SAFETY: the body is filled before it is read.
+        let mut body = unsafe {
+            works(frz_body_init(body.as_mut_ptr(), size_of::<frz_body>()));
+            body.assume_init()
+        };
+        body.positions = view(&self.ball[0]);
+        body.positions_end = view(&self.ball[1]);
+        body.indices = view(self.corners.as_flattened());
+        body
+    }
+}
+
+impl Steps for Host {
+    fn threads(&self) -> &Threads {
+        &self.threads
+    }
+
+    fn step(&self) -> frz_status {
+        let body = self.body();
+        let [places, speeds]: [frz_view; 2] = [view(&self.places), view(&self.speeds)];
+        let mut report = std::mem::MaybeUninit::<frz_mist_report>::zeroed();
+        // SAFETY: the pointers are valid; all zeroes are a report.
+        unsafe {
+            (*report.as_mut_ptr()).struct_size = size_of::<frz_mist_report>() as u32;
+            let status = frz_mist_step_points(
+                self.threads.ctx,
+                self.mist,
+                places,
+                speeds,
+                0.005,
+                null(),
+                null(),
+                &body,
+                1,
+                0.0,
+                FRAME,
+                report.as_mut_ptr(),
+            );
+            self.cells.set(self.cells.get().max(report.assume_init().cells));
+            status
+        }
+    }
+
+    fn state(&self) -> Vec<u8> {
+        // SAFETY: the pointers are valid.
+        written(|room, capacity, size| unsafe {
+            frz_mist_save(self.threads.ctx, self.mist, room, capacity, size)
+        })
+    }
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        // SAFETY: nobody uses them any more.
+        unsafe { frz_mist_destroy(self.mist) };
+    }
+}
+
+pub fn run(h: &mut Harness) {
+    let name = "snow.mist.cancel_p99";
+    if !h.wants(name) {
+        return;
+    }
+    let mut random = Random(42);
+    let host = Host::new(&mut random);
+    (0..3).for_each(|_| works(host.step()));
+    let what = format!("{:.1} million cells of air", host.cells.get() as f64 / 1e6);
+    measure(h, name, &host, &mut random, &what);
+}

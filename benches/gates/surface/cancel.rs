@@ -1,0 +1,282 @@
+//! Gates of a mesh's step that is cancelled through C, also of one that rebuilds it, and of the look at one to come: the time until it
+//! returns, and that it left all as it was.
+
+use std::cell::Cell;
+use std::mem::MaybeUninit;
+use std::ptr::{null, null_mut};
+
+use frazil::capi::mesh::triangles::*;
+use frazil::capi::tracker::eased::frz_tracker_read_eased;
+use frazil::capi::tracker::mesh::*;
+use frazil::capi::{frz_span, frz_status, frz_view};
+use frazil::geometry::{DVec3, TriMesh, Vec3};
+
+use crate::capi::cancel_latency::{Steps, measure};
+use crate::capi::host::{Threads, view, works, written};
+use crate::common::liquids::{ball, context, filled, own_surface, turned};
+use crate::harness::Harness;
+use crate::snow::grains::Random;
+
+const NO_VIEW: frz_view = frz_view { data: null(), count: 0, stride: 0 };
+/// Initial distance between particles (m), and time between frames (s).
+const SPACING: f64 = 0.01;
+const FRAME: f64 = 1.0 / 24.0;
+/// Frames ahead, as is usual.
+const AHEAD: u32 = 4;
+/// Two blocks of liquid that meet face to face in one step: their edge, and how far apart their outermost particles are before it and
+/// after it (spacings). All of both faces is then rebuilt.
+const EDGE: f64 = 36.0;
+const GAPS: [f64; 2] = [4.0, 1.0];
+
+/// Particles that move, with a mesh around them; each step is the same, as a tracker that has made one is put back.
+struct Host {
+    threads: Threads,
+    /// Trackers are put back on these: no cancel reaches them.
+    others: Threads,
+    params: frz_tracker_params,
+    mesh: *mut frz_mesh,
+    tracker: Cell<*mut frz_tracker>,
+    /// The tracker's state before a step.
+    first: Vec<u8>,
+    /// Before a step and after it (m).
+    places: [Vec<[f64; 3]>; 2],
+    ids: Vec<i64>,
+}
+
+impl Host {
+    fn new(places: [Vec<DVec3>; 2], mesh: &TriMesh, is_rebuilt: bool) -> Self {
+        let mut params = MaybeUninit::<frz_tracker_params>::uninit();
+        // SAFETY: the pointer is valid, and the parameters are filled before they are read.
+        let mut params = unsafe {
+            works(frz_tracker_params_init(params.as_mut_ptr(), size_of::<frz_tracker_params>()));
+            params.assume_init()
+        };
+        params.spacing = SPACING;
+        params.rebuild = u32::from(is_rebuilt);
+        let mut host = Self {
+            threads: Threads::new(2),
+            others: Threads::new(2),
+            params,
+            mesh: null_mut(),
+            tracker: Cell::new(null_mut()),
+            first: Vec::new(),
+            ids: (0..places[0].len() as i64).collect(),
+            places: places.map(|places| places.iter().map(|place| (*place).into()).collect()),
+        };
+        let corners: Vec<[f32; 3]> = mesh.positions.iter().map(|place| (*place).into()).collect();
+        let desc = frz_mesh_desc {
+            struct_size: size_of::<frz_mesh_desc>() as u32,
+            flags: 0,
+            positions: view(&corners),
+            face_counts: NO_VIEW,
+            indices: view(mesh.triangles.as_flattened()),
+            attributes: null(),
+            attribute_count: 0,
+        };
+        let mut tracker = null_mut();
+        // SAFETY: the pointers are valid.
+        unsafe {
+            works(frz_mesh_create(host.threads.ctx, &desc, &mut host.mesh));
+            let first = host.particles(0);
+            works(frz_tracker_create(
+                host.threads.ctx,
+                &host.params,
+                host.mesh,
+                &first,
+                null(),
+                0,
+                &mut tracker,
+            ));
+        }
+        host.tracker.set(tracker);
+        host.first = host.state();
+        host
+    }
+
+    fn particles(&self, frame: usize) -> frz_particles {
+        frz_particles {
+            struct_size: size_of::<frz_particles>() as u32,
+            flags: 0,
+            positions: view(&self.places[frame]),
+            velocities: NO_VIEW,
+            ids: view(&self.ids),
+        }
+    }
+
+    /// Makes a step, and puts the tracker back if it was not cancelled; `report` may be null.
+    fn step_told(&self, report: *mut frz_tracker_report) -> frz_status {
+        let (from, to) = (self.particles(0), self.particles(1));
+        // SAFETY: the pointers are valid, or null where that is allowed.
+        let status =
+            unsafe { frz_tracker_step(self.threads.ctx, self.tracker.get(), &from, &to, FRAME, report) };
+        if status == frz_status::FRZ_OK {
+            self.put_back();
+        }
+        status
+    }
+
+    /// Reads the vertices as they are shown before the step, which is made for it, into room for each (m), and puts the tracker back if
+    /// that was not cancelled, so that the step is to be made again.
+    fn look(&self, shown: &mut [[f64; 3]]) -> frz_status {
+        let (now, to) = (self.particles(0), self.particles(1));
+        let coming: [*const frz_particles; 1] = [&to];
+        let room = frz_span { data: shown.as_mut_ptr().cast(), count: shown.len(), stride: 0 };
+        // SAFETY: the pointers are valid.
+        let status = unsafe {
+            frz_tracker_read_eased(
+                self.threads.ctx,
+                self.tracker.get(),
+                &now,
+                coming.as_ptr(),
+                coming.len(),
+                AHEAD,
+                FRAME,
+                room,
+            )
+        };
+        if status == frz_status::FRZ_OK {
+            self.put_back();
+        }
+        status
+    }
+
+    fn put_back(&self) {
+        let mut again = null_mut();
+        // SAFETY: the pointers are valid, or null where that is allowed; nobody uses the old tracker any more.
+        unsafe {
+            works(frz_tracker_create(
+                self.others.ctx,
+                &self.params,
+                self.mesh,
+                null(),
+                self.first.as_ptr().cast(),
+                self.first.len(),
+                &mut again,
+            ));
+            frz_tracker_destroy(self.tracker.replace(again));
+        }
+    }
+}
+
+impl Steps for Host {
+    fn threads(&self) -> &Threads {
+        &self.threads
+    }
+
+    fn step(&self) -> frz_status {
+        self.step_told(null_mut())
+    }
+
+    fn state(&self) -> Vec<u8> {
+        // SAFETY: the pointers are valid.
+        written(|room, capacity, size| unsafe {
+            frz_tracker_save(self.threads.ctx, self.tracker.get(), room, capacity, size)
+        })
+    }
+}
+
+/// A host that looks at the step, and does not make it. Its tracker has so many vertices.
+struct Looking<'a> {
+    host: &'a Host,
+    vertices: usize,
+}
+
+impl Steps for Looking<'_> {
+    fn threads(&self) -> &Threads {
+        &self.host.threads
+    }
+
+    fn step(&self) -> frz_status {
+        self.host.look(&mut vec![[0.0; 3]; self.vertices])
+    }
+
+    fn state(&self) -> Vec<u8> {
+        self.host.state()
+    }
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        // SAFETY: nobody uses them any more.
+        unsafe {
+            frz_tracker_destroy(self.tracker.get());
+            frz_mesh_destroy(self.mesh);
+        }
+    }
+}
+
+pub fn run(h: &mut Harness) {
+    following(h);
+    rebuilding(h);
+}
+
+/// A ball that turns.
+fn following(h: &mut Harness) {
+    let name = "surface.cancel_p99";
+    if !h.wants(name) {
+        return;
+    }
+    let ball = ball(26.0, 100, 0.25);
+    let at = |angle: f64| ball.places.iter().map(|place| turned(*place, angle, Default::default())).collect();
+    let host = Host::new([at(0.0), at(0.02)], &ball.mesh, false);
+    let what = format!("{} particles", host.ids.len());
+    measure(h, name, &host, &mut Random(42), &what);
+}
+
+/// Two blocks that meet: the step, and the look at it.
+fn rebuilding(h: &mut Harness) {
+    let names @ [step, look] = ["surface.cancel_rebuilt_p99", "surface.cancel_eased_p99"];
+    if !names.iter().any(|name| h.wants(name)) {
+        return;
+    }
+    let half = 0.5 * EDGE * SPACING;
+    let block = filled(SPACING, 0.1, half, |place| place.amax() < half);
+    let at = |gap: f64| -> Vec<DVec3> {
+        // Particles lie half a spacing below a block's faces.
+        let by = DVec3::new(half + 0.5 * (gap - 1.0) * SPACING, 0.0, 0.0);
+        block.iter().map(|place| place - by).chain(block.iter().map(|place| place + by)).collect()
+    };
+    let places = GAPS.map(at);
+    let mesh = own_surface(&context(2), &places[0], SPACING);
+    let host = Host::new(places, &mesh, true);
+    // SAFETY: it is made of numbers.
+    let mut report: frz_tracker_report = unsafe { std::mem::zeroed() };
+    report.struct_size = size_of::<frz_tracker_report>() as u32;
+    works(host.step_told(&mut report));
+    if report.rebuilt_cells == 0 {
+        for name in names {
+            if h.wants(name) {
+                h.gate(name, f64::NAN, "nothing was rebuilt");
+            }
+        }
+        return;
+    }
+    let what = format!(
+        "{} particles and {} triangles, {} cells flagged and {} rebuilt, {} triangles made",
+        host.ids.len(),
+        mesh.triangles.len(),
+        report.changed_cells,
+        report.rebuilt_cells,
+        report.made_triangles
+    );
+    if h.wants(step) {
+        measure(h, step, &host, &mut Random(43), &what);
+    }
+    if h.wants(look) {
+        looking(h, look, &host, &mesh, &what);
+    }
+}
+
+/// The look at a step to come, from a mesh.
+fn looking(h: &mut Harness, name: &'static str, host: &Host, mesh: &TriMesh, what: &str) {
+    let mut shown = vec![[0.0; 3]; mesh.positions.len()];
+    works(host.look(&mut shown));
+    let is_moved = |(shown, own): &(&[f64; 3], &Vec3)| DVec3::from(**shown) != own.cast::<f64>();
+    let moved = shown.iter().zip(&mesh.positions).filter(is_moved).count();
+    if moved == 0 {
+        return h.gate(name, f64::NAN, "no vertex is eased");
+    }
+    let what = format!("{what}; it is only looked at, and {moved} vertices are eased");
+    let looking = Looking { host, vertices: mesh.positions.len() };
+    measure(h, name, &looking, &mut Random(44), &what);
+}

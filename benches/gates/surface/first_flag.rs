@@ -1,0 +1,70 @@
+//! Gate of sets that merge, split, tear and close: how many frames after the particles' own surface changes a vertex is flagged, or
+//! a part listed that the mesh does not cover (it has no vertices).
+
+use frazil::Context;
+use frazil::geometry::{DVec3, TriMesh};
+use frazil::surface::{Implicit, Isosurface, Params, Tracker};
+
+use crate::common::liquids::{context, numbered};
+use crate::common::made_sets::{Set, sets};
+use crate::harness::Harness;
+use crate::surface::spot::parts;
+
+/// Initial distance between particles (m), and time between frames (s).
+const SPACING: f64 = 0.01;
+const FRAME: f64 = 1.0 / 24.0;
+/// Most frames of a set.
+const FRAMES: usize = 60;
+
+pub fn run(h: &mut Harness) {
+    let name = "surface.early";
+    if !h.wants(name) {
+        return;
+    }
+    let ctx = context(2);
+    let mut lags = Vec::new();
+    for set in sets() {
+        let (change, flag) = frames(&ctx, &set);
+        println!(
+            "# {}: the particles' surface changes at frame {change:?}, the first flag is at {flag:?}",
+            set.name
+        );
+        lags.push(match (change, flag) {
+            (Some(change), Some(flag)) => flag.saturating_sub(change) as f64,
+            (None, _) | (_, None) => FRAMES as f64,
+        });
+    }
+    let worst = lags.iter().copied().fold(0.0, f64::max);
+    h.gate(name, worst, &format!("balls, dumbbell, sheet, bubble: {lags:?}"));
+}
+
+fn surface(ctx: &Context, places: &[DVec3]) -> TriMesh {
+    let phi = Implicit::new(ctx, places, SPACING, 0.5 * SPACING).expect("a surface");
+    Isosurface::new(&phi).mesh(&phi)
+}
+
+/// The first frame at which the particles' own surface has other parts or handles, and the first at which a step tells of it.
+fn frames(ctx: &Context, set: &Set) -> (Option<usize>, Option<usize>) {
+    let at = |frame: usize| {
+        numbered(set.places.iter().map(|place| (set.motion)(*place, frame as f64) * SPACING).collect())
+    };
+    let kind = |surface: &TriMesh| (parts(surface), surface.euler_characteristic());
+    let first = surface(ctx, &at(0).places);
+    let begin = kind(&first);
+    let mut tracker = Tracker::new(ctx, Params::for_spacing(SPACING), &first, &at(0)).expect("a tracker");
+    let (mut change, mut flag) = (None, None);
+    for frame in 1..FRAMES {
+        let (from, to) = (at(frame - 1), at(frame));
+        if change.is_none() && kind(&surface(ctx, &to.places)) != begin {
+            change = Some(frame);
+        }
+        let report = tracker.step(ctx, &from, &to, FRAME).expect("a step");
+        if flag.is_none() && report.flagged() + report.apart.len() > 0 {
+            flag = Some(frame);
+        }
+        if change.is_some() && flag.is_some() {
+            break;
+        }
+    }
+    (change, flag)
+}

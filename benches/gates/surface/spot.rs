@@ -1,0 +1,320 @@
+//! Gates of a detailed mesh on a real solver's cache, through the command: `spot_drop` of the test data.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use frazil::Context;
+use frazil::geometry::mesh::attributes::{MeshArray, Number, On};
+use frazil::geometry::{DVec3, DetailedMesh, TriMesh, Uvs};
+use frazil::io::mesh;
+use frazil::surface::{Implicit, Isosurface, Params, Particles, Tracker};
+
+use crate::common::character::output;
+use crate::common::liquids::context;
+use crate::common::nearest::distances;
+use crate::common::spot::{self, FPS, FRAMES, SPACING, particles_at};
+use crate::harness::{Harness, timed};
+use crate::snow::grains::passes::kill;
+
+/// Frames whose particles' surface is triangulated on a quarter of the spacing.
+const LOOKED_AT: [i32; 6] = [1, 3, 4, 11, 26, 41];
+/// Rounds of smoothing that take the sculpted detail away.
+const ROUNDS: usize = 20;
+
+const NAMES: [&str; 10] = [
+    "surface.spot_off_surface",
+    "surface.spot_detail",
+    "surface.spot_gain",
+    "surface.spot_flagged_before",
+    "surface.spot_flagged",
+    "surface.spot_volume",
+    "surface.velocity",
+    "surface.arrays_kept",
+    "surface.same_bytes_kill",
+    "surface.same_bytes_cpu",
+];
+
+pub fn run(h: &mut Harness) {
+    if !NAMES.iter().any(|name| h.wants(name)) {
+        return;
+    }
+    let Some(first) = spot::first() else {
+        NAMES.into_iter().for_each(|name| h.skipped(name, "no data"));
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let spot = Spot { cache: first.with_file_name("spot.%04d.bgeo"), folder: folder.path().to_path_buf() };
+    let own = spot.write_mesh(&first.with_file_name("spot_detail.ply"));
+    let (took, noisy) = timed(|| assert!(spot.pass("once", 2).status().expect("frazil").success()));
+    println!("# {FRAMES} frames in {took:.1} s, with files{noisy}");
+    if NAMES[..8].iter().any(|name| h.wants(name)) {
+        let frames: Vec<DetailedMesh> = (1..=FRAMES).map(|frame| spot.frame("once", frame)).collect();
+        shape(h, &spot, &frames);
+        carried(h, &own, &frames);
+    }
+    same_bytes(h, &spot, took);
+}
+
+/// The cache, and where its shots go.
+struct Spot {
+    cache: PathBuf,
+    folder: PathBuf,
+}
+
+impl Spot {
+    /// Writes the mesh with a seam in its texture coordinates, and with arrays of vertices, faces and corners.
+    fn write_mesh(&self, sculpted: &Path) -> DetailedMesh {
+        let mesh = mesh::read(sculpted).expect("a mesh");
+        let faces = mesh.triangles.len();
+        let array = |name: &str, on, number, count: usize| MeshArray {
+            name: name.into(),
+            on,
+            number,
+            values: (0..count).map(|n| (n * 7 % 251) as f64).collect(),
+        };
+        let uvs = Uvs {
+            places: (0..3 * faces).map(|n| [n as f32 * 1.3e-5, 1.0 / (1.0 + n as f32)]).collect(),
+            corners: Some((0..3 * faces as u32).collect()),
+            missing: 0,
+        };
+        let arrays = vec![
+            array("red", On::Vertices, Number::U8, mesh.positions.len()),
+            array("part", On::Faces, Number::I32, faces),
+            array("wet", On::Corners, Number::F32, 3 * faces),
+        ];
+        let written: Vec<&MeshArray> = arrays.iter().collect();
+        let carried = mesh::Carried { uvs: Some(&uvs), arrays: &written, ..mesh::Carried::default() };
+        mesh::write_carried(&self.folder.join("spot.ply"), &mesh, &carried).expect("a file");
+        DetailedMesh { mesh, uvs: Some(uvs), arrays }
+    }
+
+    /// A pass into a folder of its own.
+    fn pass(&self, out: &str, threads: usize) -> Command {
+        let mut run = Command::new(env!("CARGO_BIN_EXE_frazil"));
+        run.arg("surface").arg("-p").arg(&self.cache).arg("-m").arg(self.folder.join("spot.ply"));
+        run.args([
+            "-q",
+            "--fps",
+            &FPS.to_string(),
+            "--spacing",
+            &SPACING.to_string(),
+            "--set",
+            "surface.rebuild=false",
+        ]);
+        run.arg("-o").arg(self.folder.join(out)).args(["--threads", &threads.to_string()]);
+        run.stdout(Stdio::null()).stderr(Stdio::null());
+        run
+    }
+
+    fn frame(&self, out: &str, frame: i32) -> DetailedMesh {
+        let path = self.folder.join(format!("{out}/surface/surface.{frame:04}.ply"));
+        mesh::read_detailed(&path).expect("a frame")
+    }
+
+    fn particles(&self, frame: i32) -> Particles {
+        particles_at(&self.cache, frame)
+    }
+
+    /// Whether the particles' own surface merges or splits between a frame and the one before.
+    fn changes(&self, ctx: &Context, frame: i32) -> bool {
+        let [before, now] = [frame - 1, frame].map(|frame| self.phi(ctx, frame, 0.5));
+        let kind = |surface: &TriMesh| (parts(surface), surface.euler_characteristic());
+        let [from, to] = [frame - 1, frame].map(|frame| self.particles(frame));
+        let mut own = Tracker::new(ctx, Params::for_spacing(SPACING), &before, &from).expect("a tracker");
+        let report = own.step(ctx, &from, &to, 1.0 / FPS).expect("a step");
+        kind(&before) != kind(&now) || report.jumped + report.lost > 0
+    }
+
+    /// The particles' own surface at a frame, on cells of some share of the spacing.
+    fn phi(&self, ctx: &Context, frame: i32, cell: f64) -> TriMesh {
+        let phi =
+            Implicit::new(ctx, &self.particles(frame).places, SPACING, cell * SPACING).expect("a surface");
+        Isosurface::new(&phi).mesh(&phi)
+    }
+}
+
+fn array<'a>(mesh: &'a DetailedMesh, name: &str) -> &'a [f64] {
+    &mesh.arrays.iter().find(|array| array.name == name).expect("an array").values
+}
+
+fn is_flagged(mesh: &DetailedMesh) -> Vec<bool> {
+    array(mesh, "flagged").iter().map(|flag| *flag != 0.0).collect()
+}
+
+/// Distance to the surface, detail, flags and volume.
+fn shape(h: &mut Harness, spot: &Spot, frames: &[DetailedMesh]) {
+    let ctx = context(2);
+    let counts: Vec<usize> =
+        frames.iter().map(|frame| is_flagged(frame).iter().filter(|flag| **flag).count()).collect();
+    // The first frame at which the particles' own surface merges or splits: parts or handles are others, or a fold closes, so that
+    // it does not lie where the particles carried it from the frame before.
+    let change = (2..=FRAMES).find(|frame| spot.changes(&ctx, *frame));
+    let last = change.unwrap_or(FRAMES + 1) - 1;
+    let first_flag = counts.iter().position(|count| *count > 0).map_or(FRAMES, |index| index as i32);
+    println!(
+        "# the particles' own surface changes first at frame {change:?}, the first flag is at frame {}",
+        first_flag + 1
+    );
+
+    let mut off = Vec::new();
+    for frame in LOOKED_AT {
+        let surface = spot.phi(&ctx, frame, 0.25);
+        let (mesh, flags) = (&frames[frame as usize - 1], is_flagged(&frames[frame as usize - 1]));
+        let delta = array(mesh, "delta");
+        let distances = distances(&surface, &mesh.mesh.positions, 0.25 * SPACING);
+        let kept = (0..flags.len()).filter(|vertex| !flags[*vertex] && !delta[*vertex].is_nan());
+        let mut of_frame: Vec<f64> =
+            kept.map(|vertex| (distances[vertex] - delta[vertex].abs()).abs() / SPACING).collect();
+        of_frame.sort_unstable_by(f64::total_cmp);
+        off.push(of_frame[of_frame.len() * 95 / 100]);
+    }
+    let worst = off.iter().copied().fold(0.0, f64::max);
+    h.gate(NAMES[0], worst, &format!("the worst of frames {LOOKED_AT:?}: {off:.4?}"));
+
+    let around = neighbours(&frames[0].mesh);
+    let before = detail(&frames[0].mesh, &around);
+    let (mut correlation, mut gain) = (1.0f64, 1.0f64);
+    for mesh in &frames[1..last as usize] {
+        let flags = is_flagged(mesh);
+        let is_whole =
+            |vertex: &usize| !flags[*vertex] && around[*vertex].iter().all(|other| !flags[*other as usize]);
+        let now = detail(&mesh.mesh, &around);
+        let pairs: Vec<[f64; 2]> =
+            (0..flags.len()).filter(is_whole).map(|vertex| [before[vertex], now[vertex]]).collect();
+        let [r, slope] = regression(&pairs);
+        correlation = correlation.min(r);
+        if (slope - 1.0).abs() > (gain - 1.0).abs() {
+            gain = slope;
+        }
+    }
+    h.gate(NAMES[1], correlation, &format!("the worst of frames 2 to {last}"));
+    h.gate(NAMES[2], (gain - 1.0).abs(), &format!("a gain of {gain:.4} in the worst frame"));
+
+    let share = |counts: &[usize]| {
+        100.0 * counts.iter().sum::<usize>() as f64 / (counts.len() * frames[0].mesh.positions.len()) as f64
+    };
+    h.gate(NAMES[3], share(&counts[..last as usize]), &format!("frames 1 to {last}"));
+    h.gate(NAMES[4], share(&counts), &format!("at most {} vertices", counts.iter().max().expect("frames")));
+
+    let ratio = |frame: i32| frames[frame as usize - 1].mesh.volume() / spot.phi(&ctx, frame, 0.5).volume();
+    let begin = ratio(1);
+    let drift = (2..=first_flag).map(|frame| 100.0 * (ratio(frame) / begin - 1.0).abs()).fold(0.0, f64::max);
+    h.gate(NAMES[5], drift, &format!("frames 2 to {first_flag}, before the first flag"));
+}
+
+/// Velocities against the next frame's places, and what the mesh carries.
+fn carried(h: &mut Harness, own: &DetailedMesh, frames: &[DetailedMesh]) {
+    let mut most = 0.0f64;
+    for pair in frames.windows(2) {
+        let speed = ["vx", "vy", "vz"].map(|name| array(&pair[0], name));
+        for (vertex, place) in pair[0].mesh.positions.iter().enumerate() {
+            let by = DVec3::new(speed[0][vertex], speed[1][vertex], speed[2][vertex]) / FPS;
+            let next: DVec3 = pair[1].mesh.positions[vertex].cast();
+            most = most.max((place.cast::<f64>() + by - next).norm() / SPACING);
+        }
+    }
+    h.gate(NAMES[6], most, "all vertices of all frames, places and velocities in 32 bits");
+    let is_kept = |frame: &DetailedMesh| {
+        frame.uvs == own.uvs
+            && frame.mesh.triangles == own.mesh.triangles
+            && own.arrays.iter().all(|array| frame.arrays.contains(array))
+    };
+    h.holds(
+        NAMES[7],
+        frames.iter().all(is_kept),
+        "texture coordinates with seams, arrays of vertices, faces and corners",
+    );
+}
+
+/// The same bytes after kills, on one and two threads, and at other CPU levels.
+fn same_bytes(h: &mut Harness, spot: &Spot, took: f64) {
+    let files = |out: &str| output(&spot.folder.join(out));
+    if h.wants(NAMES[8]) {
+        let made = || std::fs::read_dir(spot.folder.join("killed/surface")).map_or(0, |files| files.count());
+        let kills =
+            kill(|threads| spot.pass("killed", threads), 0.25 * took, || Some(made()).filter(|n| *n > 0));
+        assert!(spot.pass("killed", 2).status().expect("frazil").success());
+        let note = format!("after kills at frames {kills:?}; 1 and 2 threads");
+        h.holds(NAMES[8], files("once") == files("killed") && kills.len() > 2, &note);
+    }
+    if h.wants(NAMES[9]) {
+        let levels = ["baseline", "avx2"];
+        let all: Vec<_> = levels
+            .iter()
+            .map(|level| {
+                let mut run = spot.pass(level, 2);
+                run.env("FRAZIL_CPU", level).args(["--frames", "1-12"]);
+                assert!(run.status().expect("frazil").success());
+                (1..=12).map(|frame| spot.frame(level, frame)).collect::<Vec<_>>()
+            })
+            .collect();
+        let once: Vec<_> = (1..=12).map(|frame| spot.frame("once", frame)).collect();
+        h.holds(NAMES[9], all.iter().all(|frames| *frames == once), "baseline and avx2, 12 frames");
+    }
+}
+
+/// Count of connected parts.
+pub fn parts(mesh: &TriMesh) -> usize {
+    let mut parent: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+    let root = |parent: &mut Vec<u32>, mut at: u32| {
+        while parent[at as usize] != at {
+            parent[at as usize] = parent[parent[at as usize] as usize];
+            at = parent[at as usize];
+        }
+        at
+    };
+    for [a, b, c] in &mesh.triangles {
+        for other in [b, c] {
+            let (from, to) = (root(&mut parent, *a), root(&mut parent, *other));
+            parent[from as usize] = to;
+        }
+    }
+    let mut roots: Vec<u32> = mesh.triangles.iter().map(|triangle| root(&mut parent, triangle[0])).collect();
+    roots.sort_unstable();
+    roots.dedup();
+    roots.len()
+}
+
+/// Vertices that share an edge with each.
+pub fn neighbours(mesh: &TriMesh) -> Vec<Vec<u32>> {
+    let mut around = vec![Vec::new(); mesh.positions.len()];
+    for [a, b, c] in &mesh.triangles {
+        for (from, to) in [(a, b), (b, c), (c, a), (b, a), (c, b), (a, c)] {
+            around[*from as usize].push(*to);
+        }
+    }
+    around.iter_mut().for_each(|list| {
+        list.sort_unstable();
+        list.dedup();
+    });
+    around
+}
+
+/// What smoothing takes away at each vertex, along the smooth mesh's normal (m).
+pub fn detail(mesh: &TriMesh, around: &[Vec<u32>]) -> Vec<f64> {
+    let mut places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
+    for _ in 0..ROUNDS {
+        let mean = |vertex: usize| {
+            let list = &around[vertex];
+            list.iter().map(|other| places[*other as usize]).sum::<DVec3>() / list.len().max(1) as f64
+        };
+        places = (0..places.len()).map(|vertex| 0.5 * (places[vertex] + mean(vertex))).collect();
+    }
+    let smooth = TriMesh {
+        positions: places.iter().map(|place| place.cast()).collect(),
+        triangles: mesh.triangles.clone(),
+    };
+    let normals = smooth.normals();
+    let part =
+        |vertex: usize| (mesh.positions[vertex].cast::<f64>() - places[vertex]).dot(&normals[vertex].cast());
+    (0..places.len()).map(part).collect()
+}
+
+/// Correlation of pairs, and the slope of the second over the first.
+pub fn regression(pairs: &[[f64; 2]]) -> [f64; 2] {
+    let count = pairs.len() as f64;
+    let mean = [0, 1].map(|n| pairs.iter().map(|pair| pair[n]).sum::<f64>() / count);
+    let sum =
+        |a: usize, b: usize| pairs.iter().map(|pair| (pair[a] - mean[a]) * (pair[b] - mean[b])).sum::<f64>();
+    [sum(0, 1) / (sum(0, 0) * sum(1, 1)).sqrt(), sum(0, 1) / sum(0, 0)]
+}
