@@ -7,7 +7,7 @@
  *
  * Answers: functions that can fail answer a frz_status; frz_last_error() then tells in one sentence what is at fault.
  * After a failure, what a call was to change is as it was, and what it was to hand out is NULL or zero. Enums come in
- * as uint32_t and are checked. Without a word to the contrary no pointer may be NULL.
+ * as uint32_t and are checked. Pointers must not be NULL unless stated.
  *
  * Handles: what comes through an out-pointer is the caller's, and goes back by the destroy function of its kind, which
  * takes NULL too. A returned const pointer is lent. Nothing of frazil is ever given to free(). A handle is used by one
@@ -25,7 +25,7 @@
  * libfrazil_core, which is frazil without OpenVDB; frazil_core.pc and the CMake target frazil::core define it. Programs
  * that link the whole library, libfrazil, define nothing. A process holds one of the two libraries, never both.
  *
- * A guest's manners: frazil never prints, exits, installs signal handlers, or changes the locale, the working folder
+ * Guarantees to the host: frazil never prints, exits, installs signal handlers, or changes the locale, the working folder
  * or the floating-point flags of a thread after a call (inside, denormal numbers count as 0). It starts no thread
  * before the first pool and ends all with the last. Results are the same bytes on any number of threads.
  */
@@ -3454,7 +3454,7 @@ frz_status frz_grid_to_bytes(frz_context *context,
  * OpenVDB does not survive every kind of damage: a file with a flipped bit can crash frz_grid_load, and the host with
  * it, or never end. Here the frazil program reads the file, within a limit of time and memory that goes by the file's
  * size and the context's memory limit, and hands the grid over in shared memory. Reading takes some 10 % longer, and
- * 20 to 50 ms to start the program. A crash, a loop without end or a hunger for memory is FRZ_ERROR_FILE. A cancel is
+ * 20 to 50 ms to start the program. A crash, an infinite loop or excessive memory use is FRZ_ERROR_FILE. A cancel is
  * heeded within 10 ms.
  *
  * program: UTF-8; the frazil program, of this library's version. FRZ_ERROR_IO when it cannot be started.
@@ -4180,8 +4180,8 @@ void frz_tracker_destroy(frz_tracker *tracker);
 frz_status frz_tracker_set_params(frz_tracker *tracker, const frz_tracker_params *params);
 
 /**
- * Hands over the particles to which the step after the coming one goes, early: with frz_tracker_params.rebuild their surface is made
- * while the coming step rebuilds the mesh, on threads that have nothing to do. It makes no difference to what comes out; particles that
+ * Prefetches the particles of the step after the coming one: with frz_tracker_params.rebuild their surface is made
+ * while the coming step rebuilds the mesh, on threads that have nothing to do. The result is identical; particles that
  * then do not come cost time. Of no use with frz_tracker_read_eased, which makes the steps to come itself.
  *
  * particles: as they will be; they are copied.

@@ -72,7 +72,7 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
         session.ctx.check().during()?;
         let (from, to) = (of_frame(&args.input, frame), of_frame(&args.output, frame));
         let detail = args.read(&from);
-        // What the first file is without, nothing can be begun with.
+        // Fail early if the first file lacks it.
         let detail = if told.is_empty() { detail.before()? } else { detail.during()? };
         if told.is_empty() {
             args.warn_of_losses(&from, &detail).before()?;

@@ -30,7 +30,7 @@ pub struct Args {
     /// Mesh at the first frame, in the particles' space [default: the particles' own surface]
     #[arg(short, long, value_name = "FILE", requires = "particles")]
     mesh: Option<PathBuf>,
-    /// Initial distance between particles (m) [default: estimated, and said]
+    /// Initial distance between particles (m) [default: estimated and logged]
     #[arg(long, value_name = "M", value_parser = positive, requires = "particles")]
     spacing: Option<f64>,
     /// Frames a second, of the particles and of the shot [default: 24]

@@ -166,8 +166,8 @@ impl Axis {
 }
 
 /// Whether the line through voxels with these coordinates passes left of the way from `a` to `b`, as one sees them with the first
-/// turned coordinate ([`Axis::turned`]) to the right and the second upward; exact, under the symbolic shift. The other way round
-/// it is the contrary; of a point on itself it means nothing.
+/// turned coordinate ([`Axis::turned`]) to the right and the second upward; exact, under the symbolic shift. Swapping `a` and
+/// `b` negates it; it is undefined where they are one point.
 pub fn passes_left(axis: Axis, a: Fixed, b: Fixed, [p, q]: [i32; 2]) -> bool {
     let [a, b] = [a, b].map(|end| axis.turned(end)).map(|[p, q, _]| [p, q]);
     let p = if axis == Axis::Z { p } else { -p };

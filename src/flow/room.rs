@@ -1,4 +1,4 @@
-//! Room for fields that live within one call only: paths while values are carried, residuals while the pressure is solved, tiles
+//! Scratch fields, reused between calls: paths while values are carried, residuals while the pressure is solved, tiles
 //! on their way to other slots. It stays between calls and only grows, so that a step of as many tiles allocates nothing.
 
 use rayon::prelude::*;

@@ -10,7 +10,7 @@ use crate::geometry::DVec3;
 /// Sampled poses per second of the motion, and their least and greatest number.
 const RATE: f64 = 60.0;
 const POSES: (f64, f64) = (24.0, 240.0);
-/// Vertices that are posed at most, over all poses: a look must not take minutes.
+/// Most vertices that are posed, over all poses: bounds the time of the analysis.
 const MOST_VERTICES: f64 = 5e7;
 /// Part of a figure's height that standing parts may be above the lowest one of their pose, and that one above the level
 /// that so great a part of the poses reach down to: a toe that digs, or a jump, must not hide a walk.

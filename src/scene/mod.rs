@@ -29,8 +29,8 @@ use crate::motion::Space;
 use crate::snow::NoiseParams;
 use std::path::{Path, PathBuf};
 
-/// A scene with every default filled in and every path absolute. Nothing of it changes but as its text does: what a stage
-/// reads and the settings by which its frames are known again are always the same.
+/// A scene with every default filled in and every path absolute. Immutable after parsing: what a stage
+/// reads, and the settings by which its frames are recognised, follow from its text alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     pub(crate) path: PathBuf,

@@ -52,7 +52,7 @@ pub(super) struct Thick {
     east: PerColumn<f32>,
     south: PerColumn<f32>,
     links: Vec<f32>,
-    /// Viscosity of each column, over the liquid's; and 16 more numbers.
+    /// Viscosity of each column, over the liquid's; padded by a strip, as depths are.
     times: PerColumn<f32>,
 }
 

@@ -100,7 +100,7 @@ pub fn most_halvings(params: &Params) -> u32 {
 /// speed, and where this no longer grows with depth, at that speed: within a cell a step everywhere, or it would grow.
 const FASTEST: f32 = 1.0 / 3.0;
 
-/// The mean of phi^2, phi being the profile of a film's velocity over its depth (`flow::walls`).
+/// The mean of phi^2, phi being the profile of a film's velocity over its depth (`solver::lateral_friction`).
 const BESIDE: f64 = 1.2;
 
 /// g unit dt^2 / dx^2 of a step (1 / units).

@@ -171,7 +171,7 @@ impl Tracker {
     /// Sets the parameters from the next step on.
     ///
     /// # Errors
-    /// A parameter out of range, another spacing or another cell, or another word about rebuilding; the old parameters are then kept.
+    /// A parameter out of range, another spacing or cell, or a different `rebuild` flag; the old parameters are then kept.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
         params.validate()?;
         for (name, old, new) in
@@ -449,7 +449,7 @@ impl Tracker {
 /// Checks what a step goes from and to, `dt` (s) later.
 pub(super) fn validate_step(from: &Particles, to: &Particles, dt: f64) -> Result<()> {
     if !(dt > 0.0 && dt.is_finite()) {
-        return Err(Error::argument(format!("a step of {dt} s does not go on in time")));
+        return Err(Error::argument(format!("dt = {dt} s must be positive and finite")));
     }
     from.validate()?;
     to.validate()

@@ -1,4 +1,4 @@
-//! Skins that fold inside out.
+//! Self-inverting surfaces in a sweep.
 //!
 //! Where the winding number of a pose is negative, outward motion only brings it back to 0: the point is not swept, though
 //! the surface passed it outward. A point is swept when its winding number reaches 1 at some time. So near such places each

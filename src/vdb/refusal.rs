@@ -1,4 +1,4 @@
-//! Errors for what OpenVDB's tools refuse, in our own words. Theirs go to the log.
+//! Maps OpenVDB's exceptions to errors; their own texts go to the log.
 
 use crate::error::{Error, one_line};
 

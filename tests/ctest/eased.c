@@ -334,9 +334,9 @@ static void refusals(frz_context *ctx, frz_context *alone, const frz_mesh *mesh)
     q = right, q.now = &nothing;
     FAILS(ask(q), FRZ_ERROR_ARGUMENT, "there are 0 particles");
     q = right, q.dt = 0;
-    FAILS(ask(q), FRZ_ERROR_ARGUMENT, "does not go on in time");
+    FAILS(ask(q), FRZ_ERROR_ARGUMENT, "must be positive and finite");
     q = right, q.dt = -DT;
-    FAILS(ask(q), FRZ_ERROR_ARGUMENT, "does not go on in time");
+    FAILS(ask(q), FRZ_ERROR_ARGUMENT, "must be positive and finite");
     q = right, q.dt = NAN;
     FAILS(ask(q), FRZ_ERROR_ARGUMENT, "dt is not finite");
     q = right, q.dst = SPAN(shown, count - 1);

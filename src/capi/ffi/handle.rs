@@ -24,7 +24,7 @@ const GONE: u32 = 0xdead_0fff;
 /// Users of a handle that is being changed.
 const CHANGING: i32 = -1;
 
-/// A value with the marks that make misuse tellable; all kinds begin with the tag.
+/// A value behind the header by which misuse is detected; all kinds begin with the tag.
 #[repr(C)]
 pub(in crate::capi) struct Handle<T> {
     tag: AtomicU32,

@@ -35,7 +35,7 @@ impl Saved {
         // SAFETY: the caller's promise.
         let written = unsafe { write_bytes(dst, capacity, size, || bytes.len(), || Ok(bytes.as_slice())) };
         if dst.is_null() || written.is_err() {
-            // Who asked for the size, or had too little room, comes again.
+            // A caller that asked for the size, or had too little room, calls a second time.
             *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(bytes);
         }
         written

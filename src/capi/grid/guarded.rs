@@ -14,7 +14,7 @@ use crate::vdb::guard::Guard;
 /// OpenVDB does not survive every kind of damage: a file with a flipped bit can crash frz_grid_load, and the host with
 /// it, or never end. Here the frazil program reads the file, within a limit of time and memory that goes by the file's
 /// size and the context's memory limit, and hands the grid over in shared memory. Reading takes some 10 % longer, and
-/// 20 to 50 ms to start the program. A crash, a loop without end or a hunger for memory is FRZ_ERROR_FILE. A cancel is
+/// 20 to 50 ms to start the program. A crash, an infinite loop or excessive memory use is FRZ_ERROR_FILE. A cancel is
 /// heeded within 10 ms.
 ///
 /// program: UTF-8; the frazil program, of this library's version. FRZ_ERROR_IO when it cannot be started.

@@ -45,7 +45,7 @@ pub unsafe extern "C" fn frz_tracker_read_eased(
             call.ctx().check()?;
             finite("dt", dt)?;
             if dt <= 0.0 {
-                return Err(Failure::argument(format!("dt = {dt} s does not go on in time")));
+                return Err(Failure::argument(format!("dt = {dt} s must be positive and finite")));
             }
             if ahead == 0 || ahead as usize > MOST {
                 return Err(Failure::argument(format!("ahead = {ahead} is not within 1 to {MOST}")));

@@ -286,8 +286,8 @@ pub unsafe extern "C" fn frz_tracker_set_params(
     })
 }
 
-/// Hands over the particles to which the step after the coming one goes, early: with frz_tracker_params.rebuild their surface is made
-/// while the coming step rebuilds the mesh, on threads that have nothing to do. It makes no difference to what comes out; particles that
+/// Prefetches the particles of the step after the coming one: with frz_tracker_params.rebuild their surface is made
+/// while the coming step rebuilds the mesh, on threads that have nothing to do. The result is identical; particles that
 /// then do not come cost time. Of no use with frz_tracker_read_eased, which makes the steps to come itself.
 ///
 /// particles: as they will be; they are copied.

@@ -11,7 +11,7 @@ const LEAF: usize = 4;
 const GRAIN: usize = 1024;
 /// Nodes that wait at most while the tree is searched: one for each level, of which there are 30 at most.
 const WAITING: usize = 64;
-/// A triangle whose first corner has a lesser sine has no side to speak of: it is searched as its edges, which lie within this part
+/// A triangle whose first corner has a smaller sine is degenerate: it is searched as its edges, which lie within this part
 /// of its length.
 const NEEDLE: f64 = 1e-8;
 /// Distances up to this part of the largest coordinate are rounding in 64 bits, and count as none; the numbers of a mesh are 6e-8

@@ -1,4 +1,4 @@
-//! The last resort of readers: a panic in code of others becomes an error.
+//! Converts panics in third-party parsers to errors.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};

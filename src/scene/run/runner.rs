@@ -156,7 +156,7 @@ impl<'a> Run<'a> {
             run.stages.push(own_stage);
         }
         run.load(ctx)?;
-        // All that can be refused was.
+        // Validation is complete: commit.
         run.commit()?;
         Ok(run)
     }

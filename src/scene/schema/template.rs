@@ -22,7 +22,7 @@ pub(super) fn template_of(system: System, keys: &[Key]) -> String {
     let mut out = format!(
         "# {}: `frazil check shot.toml`, then `frazil {} shot.toml -o cache/`.\n\
          # SI units, Y up, degrees where a key ends in _deg; paths are relative to this file.\n\
-         # A line behind a # may be left out: what stands there is what is taken, or an example.\n",
+         # Lines that begin with # show defaults, or examples; uncomment them to change a value.\n",
         system.title(),
         system.name(),
     );

@@ -267,7 +267,7 @@ pub const MANY_KEYS: &[Key] = &[
     Key::new("source", "from", FRAMES, "first frame; left out: from the beginning").or_nothing().such_as("1").concerns(STEP),
     Key::new("source", "until", FRAMES, "last frame; left out: to the end").or_nothing().such_as("120").concerns(STEP),
     Key::new("source", "follows", Kind::Flag, FOLLOWS).or("false").concerns(STEP),
-    Key::new("source", "frequency", Kind::Number(0.0, 1.0e6, "1/s"), "how often in a second its rate swells (1/s)")
+    Key::new("source", "frequency", Kind::Number(0.0, 1.0e6, "1/s"), "pulse frequency of its rate (1/s)")
         .or("0.0")
         .such_as("1.2")
         .concerns(STEP),
@@ -289,7 +289,7 @@ pub const MANY_KEYS: &[Key] = &[
     Key::new("drain", "discharge", Kind::Number(0.0, 1.0, ""), "share of the hole that the jet fills: 0.6 to 0.65 for a sharp edge")
         .or("0.62")
         .concerns(STEP),
-    Key::new("drain", "frequency", Kind::Number(0.0, 1.0e6, "1/s"), "how often in a second its rate swells (1/s)")
+    Key::new("drain", "frequency", Kind::Number(0.0, 1.0e6, "1/s"), "pulse frequency of its rate (1/s)")
         .or("0.0")
         .concerns(STEP),
     Key::new("drain", "swing", Kind::Number(0.0, 1.0, ""), "share of its rate by which it swells and falls")

@@ -33,7 +33,7 @@ const COUNTED: f64 = 4096.0;
 /// Times of a shot at which boxes are counted at most: of a longer one several frames count as one.
 const MOMENTS: usize = 512;
 
-/// What mist takes, as far as that can be told.
+/// Estimated memory and disk of the mist stage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MistForecast {
     /// Edge of a cell of air (m).

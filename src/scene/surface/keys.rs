@@ -50,7 +50,7 @@ pub const KEYS: &[Key] = &[
         "surface",
         "spacing",
         Kind::Number(1.0e-6, 1.0e6, "m"),
-        "initial distance between particles (m), r; left out: estimated at the first frame, and said",
+        "initial distance between particles (m), r; default: estimated at the first frame, and logged",
     )
     .or_nothing()
     .such_as("0.0086")

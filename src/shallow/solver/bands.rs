@@ -47,7 +47,7 @@ pub struct Bands {
     room: Vec<f32>,
     /// Whether they might be full.
     may_be_full: Vec<bool>,
-    /// A column takes at most so many times the greatest depth beside it, with its own.
+    /// Bound of the inflow of a column, in multiples of the greatest depth beside it and its own.
     takes: i64,
     /// Count of scalars that the liquid carries.
     scalars: usize,

@@ -1,4 +1,4 @@
-//! What drives the liquid through a pipe, and what holds it back (thesis Eq. 4.1 and 4.5).
+//! The flux of a pipe: driven by gravity, held back by viscous drag (thesis Eq. 4.1 and 4.5).
 //!
 //! A flux is kept as the depth (units) that it moves in a step: w = f dt / (dx^2 unit). In these, Eq. 4.1 with the wetted section
 //! A = dx H reads w' = zeta w + (dt^2 g unit / dx^2) H (eta_i - eta_j), and Eq. 4.5 w'' = w' H^2 / (H^2 + 3 dt nu (1 + S^2)^2); H is the depth

@@ -1,4 +1,4 @@
-//! Whole transfers within what columns have and have room for, in rounds.
+//! Iterative limiter of integer transfers: no column gives more than it has or takes more than it has room for.
 //!
 //! All are cut at once in each round, by integers, so that nothing depends on an order: first to what their givers have, then, until nothing
 //! is over, to what their takers have room for with what they give. Each cut makes others safer as givers, and may leave them too little room

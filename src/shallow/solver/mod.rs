@@ -50,7 +50,7 @@ use stop::Stop;
 /// Depths and fluxes, by column index.
 #[derive(Debug, Clone)]
 pub struct Flow {
-    /// H (units), and 16 more numbers.
+    /// H (units), padded by a strip: SIMD loads may read past the last index.
     pub(super) depth: PerColumn<i32>,
     /// Flux to the east and to the south (units in a step of `last`).
     pub(super) flux: [PerColumn<f32>; 2],

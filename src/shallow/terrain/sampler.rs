@@ -1,4 +1,4 @@
-//! Solids of signed distances, OpenVDB level sets for instance: whoever has them hands in a function that samples a batch of places.
+//! Solids of signed distances, such as OpenVDB level sets: the caller supplies a function that samples a batch of positions.
 
 use super::Solids;
 use super::solids::{Solid, unite};

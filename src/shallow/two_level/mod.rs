@@ -1,7 +1,7 @@
 //! Level of detail: cells of the terrain's size near what matters, and of twice the size everywhere else.
 //!
 //! Two liquids over one lattice of heights: a *fine* one whose ground is there in a box of cells only, the *near* part, and a *coarse* one whose ground is
-//! there in all others (`ground.rs`). What is not theirs is without columns, and a wall. Along the edge of the box pipes of their own join them (`seam.rs`). A coarse unit is four
+//! there in all others (`ground.rs`). Outside of its region each has no columns, and a wall there. Along the edge of the box pipes of their own join them (`seam.rs`). A coarse unit is four
 //! fine ones, so volumes are counted in fine units; what makes no coarse unit waits, with the scalars that it carries, and is part of the balance (`rests.rs`). When the box moves, four
 //! fine columns become a coarse one, and back (`shift.rs`), and what flows goes on (`momentum.rs`). Nothing is lost. `surface/` writes one mesh of both.
 

@@ -188,7 +188,9 @@ impl Mist {
     pub fn step(&mut self, ctx: &Context, around: &Around<'_>, times: [f64; 2]) -> Result<StepReport> {
         let [from, to] = times;
         if !(to > from && (to - from).is_finite()) {
-            return Err(Error::argument(format!("a step from {from} s to {to} s does not go on in time")));
+            return Err(Error::argument(format!(
+                "the length of a step, {from} s to {to} s, must be positive and finite"
+            )));
         }
         around.sources.iter().try_for_each(|source| source.check(self.params.cell))?;
         let raising = around.sources.iter().filter(|source| source.raises(&self.params));

@@ -1,4 +1,4 @@
-//! Changes that no vertex tells of (thesis 2.8, "at every frame"): where the mesh is not where the particles' surface is, by more than its
+//! Topology errors that are invisible at vertices (thesis 2.8, "at every frame"): where the mesh is not where the particles' surface is, by more than its
 //! detail, though each of its vertices was projected.
 //!
 //! A vertex that was projected lies as far from phi = 0 as it keeps. So what is hidden lies between vertices, or has none, or never

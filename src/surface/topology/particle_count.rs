@@ -19,7 +19,7 @@ const SPREAD: f64 = 4.0;
 /// Least and greatest place of a part.
 pub type Bounds = [DVec3; 2];
 
-/// Particles, of which a part must hold some.
+/// Particles, of which a part of the mesh must hold a minimum count.
 #[derive(Debug, Clone, Copy)]
 pub struct Crowd<'a> {
     /// Their places (m).

@@ -294,6 +294,6 @@ mod tests {
         assert!(off(Weighting::Mean) > 0.02, "{}", off(Weighting::Mean));
         let params = Params::for_spacing(1.0);
         let error = carried(&ctx, &outside, &from, &to, 0.0, &params).unwrap_err();
-        assert_eq!(error.to_string(), "a step of 0 s does not go on in time");
+        assert_eq!(error.to_string(), "dt = 0 s must be positive and finite");
     }
 }

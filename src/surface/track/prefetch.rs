@@ -31,7 +31,7 @@ impl Ahead {
 
 impl Tracker {
     /// Hands over the particles to which the step after the coming one goes: where the mesh is rebuilt, their surface is made at the same
-    /// time, on threads that have nothing to do. It makes no difference to what comes out.
+    /// time, on threads that have nothing to do. The result is identical.
     pub fn set_ahead(&mut self, particles: Arc<Particles>) {
         self.ahead.wanted = Some(particles);
     }

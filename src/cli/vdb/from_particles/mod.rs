@@ -40,7 +40,7 @@ Examples:
 pub struct Args {
     /// Particles (.bgeo, .vtk, .vtu, .xyz, .ply, .vdb), or a sequence of them (splash.%04d.bgeo)
     particles: PathBuf,
-    /// Initial distance between particles (m) [default: estimated, and said]
+    /// Initial distance between particles (m) [default: estimated and logged]
     #[arg(long, value_name = "M", value_parser = positive)]
     spacing: Option<f64>,
     /// Edge of a voxel (m), 1/8 to 2 spacings; of spheres 1/100 to 2/3 of their radius [default: half a spacing; of spheres at most

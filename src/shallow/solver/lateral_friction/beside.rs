@@ -20,7 +20,7 @@ const REACH_FULL: f32 = 3.162_277_7;
 /// What columns are in.
 pub struct Around<'a> {
     pub columns: &'a Columns,
-    /// H (units), and 16 more numbers.
+    /// H (units), padded by a strip: SIMD loads may read past the last index.
     pub depth: &'a [i32],
     /// Whether a strip has ceilings, or places without a column.
     pub roofed: &'a [bool],

@@ -16,7 +16,7 @@ use crate::shallow::solver::pressurised::network::Network;
 
 /// Most reductions: a pipe knows of all within 16 cells.
 const MOST: usize = 4;
-/// What a and b may add up to, that of the last step is taken for.
+/// Below this sum of a and b, neighbours take their values of the last step.
 const LAGS: f32 = 0.5;
 const ZEROS: [f32; STRIP] = [0.0; STRIP];
 

@@ -64,7 +64,7 @@ pub struct Liquid<'a> {
     pub active: &'a Active,
     pub fast: &'a Fast,
     pub network: &'a Network,
-    /// H (units), and 16 more numbers.
+    /// H (units), padded by a strip: SIMD loads may read past the last index.
     pub depth: &'a [i32],
     /// Fluxes to the east and to the south (units in the last step).
     pub flux: [&'a [f32]; 2],
