@@ -29,4 +29,4 @@ pub mod stains;
 
 pub mod snapshot;
 
-pub(in crate::capi) mod lists;
+mod lists;

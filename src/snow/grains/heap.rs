@@ -1,18 +1,19 @@
-//! Grains and their motion: sub-steps of [`super::solve`], in which pairs are found again where grains have moved.
+//! Grains and their motion: sub-steps of [`super::solver::solve`], in which pairs are found again where grains have moved.
 
 use rayon::prelude::*;
 
-use super::contacts::{Held, MOST as MOST_GRAINS};
-use super::crowd::{MOST, MOST_BEFORE};
-use super::field::{Field, Seen};
-use super::layout::{At, Layout, NONE, SUB_STEPS_AHEAD, holds, locate, order, settle, world};
-use super::rest;
-use super::rows::{Row, Shared, V, norm};
-use super::search::{Scratch, Search, Travel};
-pub use super::shell::Shell;
-use super::solve::{Coefficients, Motion, sub_step};
-use super::touch::{self, Touch};
-use super::trapped;
+use super::colliders::field::{Field, Seen};
+use super::colliders::search::{Scratch, Search, Travel};
+pub use super::colliders::shell::Shell;
+use super::colliders::touch;
+use super::colliders::touch::Touch;
+use super::solver::contacts::{Held, MOST as MOST_GRAINS};
+use super::solver::crowd::{MOST, MOST_BEFORE};
+use super::solver::layout::{At, Layout, NONE, SUB_STEPS_AHEAD, holds, locate, order, settle, world};
+use super::solver::rest;
+use super::solver::rows::{Row, Shared, V, norm};
+use super::solver::solve::{Coefficients, Motion, sub_step};
+use super::solver::trapped;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
@@ -159,7 +160,7 @@ impl Heap {
         self.rows.iter().map(|row| !row.rests())
     }
 
-    /// Identities of the grains that the last step left trapped, ascending: see [`super::trapped`].
+    /// Identities of the grains that the last step left trapped, ascending: see [`super::solver::trapped`].
     pub fn trapped(&self) -> &[u32] {
         &self.trapped
     }
@@ -346,13 +347,19 @@ fn follow(shells: &mut [(Shell, Pose<'_>)], share: f64, pose: &mut Vec<DVec3>) -
 
 impl Floor {
     /// Touches of a block's members near the floor.
-    fn touches(&self, block: &super::layout::Block, rows: &[Row], diameter: f64, reach: f32) -> Vec<Touch> {
+    fn touches(
+        &self,
+        block: &super::solver::layout::Block,
+        rows: &[Row],
+        diameter: f64,
+        reach: f32,
+    ) -> Vec<Touch> {
         // Height of the floor above the bottom of the block (diameters).
         let height =
-            (self.height / diameter - f64::from(block.at[1]) * f64::from(super::layout::EDGE)) as f32;
+            (self.height / diameter - f64::from(block.at[1]) * f64::from(super::solver::layout::EDGE)) as f32;
         let near = block.members.iter().filter(|slot| {
             let row = &rows[**slot as usize];
-            row.place[1] - height - 0.5 < super::contacts::SKIN + norm(row.velocity) * reach
+            row.place[1] - height - 0.5 < super::solver::contacts::SKIN + norm(row.velocity) * reach
         });
         let touch = |&grain: &u32| Touch {
             grain,

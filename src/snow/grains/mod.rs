@@ -20,32 +20,16 @@
 //! | anchor | the position of a grain that its pairs are found from, slightly ahead of the grain |
 //! | rest | a grain that has lain still stops and supports others like the ground, until something wakes it |
 
-mod claims;
-mod collide;
-mod contacts;
-mod crowd;
-mod density;
-mod distance;
-pub(super) mod field;
-mod ground;
+mod birth;
+pub(super) mod colliders;
 #[doc(hidden)]
 pub mod heap;
-mod layout;
-mod nearby;
 mod params;
-mod rest;
-mod rows;
-mod search;
-pub(super) mod shell;
 #[doc(hidden)]
-pub mod solve;
-mod sourcing;
+pub mod solver;
 mod starts;
 mod state;
-mod surfaces;
 mod surroundings;
-mod touch;
-mod trapped;
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -55,16 +39,16 @@ use crate::geometry::DVec3;
 use crate::geometry::points::{Attribute, Column, Points, Values};
 use crate::numeric::blocks::{DIM, Origin};
 
-use claims::Claims;
+use birth::claims::Claims;
+use birth::sourcing::Sourcing;
 use heap::{Division, Heap};
-use layout::locate;
-use sourcing::Sourcing;
+use solver::layout::locate;
 use starts::Starts;
 use surroundings::{Bounds, Obstacles, TIES, have_stayed};
 
-pub use ground::Ground;
+pub use birth::sourcing::{Base, PACKING, Removal, removals};
+pub use colliders::ground::Ground;
 pub use params::Params;
-pub use sourcing::{Base, PACKING, Removal, removals};
 pub use starts::Start;
 pub(super) use surroundings::HOLES;
 pub use surroundings::{FASTEST_OBJECT, Object, Surroundings};
@@ -204,7 +188,8 @@ impl Grains {
             return Err(Error::argument(text));
         }
         let is_out = |place: &DVec3| {
-            !place.iter().all(|x| x.is_finite()) || !layout::holds(locate(*place, self.heap.diameter).0)
+            !place.iter().all(|x| x.is_finite())
+                || !solver::layout::holds(locate(*place, self.heap.diameter).0)
         };
         if let Some(at) = places.iter().position(is_out) {
             return Err(Error::argument(format!("positions: element {at} is too far from the origin")));
@@ -227,7 +212,7 @@ impl Grains {
     /// Fails if there would be more grains than allowed.
     fn room_for(&self, more: usize, frame: i32) -> Result<()> {
         let (count, most) = (self.heap.count() + more, self.params.most);
-        if count > most || self.next_id as usize + more > contacts::MOST {
+        if count > most || self.next_id as usize + more > solver::contacts::MOST {
             return Err(Error::argument(format!(
                 "frame {frame} would have {count} grains, more than max = {most}: larger grains or more compression make fewer"
             )));
@@ -442,7 +427,9 @@ impl Grains {
             // An offset is relative to the centre of its voxel, at most half a voxel.
             let place = place.map(|x| x / VOXEL);
             let voxel = place.map(|x| (x + 0.5).floor());
-            cells.push([0, 1, 2].map(|axis| at[axis] * (layout::EDGE / VOXEL) as i32 + voxel[axis] as i32));
+            cells.push(
+                [0, 1, 2].map(|axis| at[axis] * (solver::layout::EDGE / VOXEL) as i32 + voxel[axis] as i32),
+            );
             offsets.push([0, 1, 2].map(|axis| place[axis] - voxel[axis]));
         }
         let trapped = match self.trapped() {

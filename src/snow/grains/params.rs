@@ -1,9 +1,9 @@
 //! Parameters of grains.
 
-use super::density;
 use super::heap::Division;
-use super::rest::Rest;
-use super::solve::Coefficients;
+use super::solver::density;
+use super::solver::rest::Rest;
+use super::solver::solve::Coefficients;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::snow::grain_friction;

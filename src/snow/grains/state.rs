@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::Grains;
-use super::contacts::{Held, MOST};
+use super::colliders::touch::Touch;
 use super::heap::Heap;
-use super::layout::{EDGE, holds};
-use super::rows::Row;
-use super::touch::Touch;
+use super::solver::contacts::{Held, MOST};
+use super::solver::layout::{EDGE, holds};
+use super::solver::rows::Row;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::numeric::bytes::{Reader, Writer};

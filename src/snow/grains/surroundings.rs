@@ -1,9 +1,9 @@
 //! Inputs of a step of grains besides the grains themselves, as colliders, and the changes in them that wake all grains.
 
-use super::field::Field;
-use super::ground::{FRICTION, Ground};
+use super::colliders::field::Field;
+use super::colliders::ground::{FRICTION, Ground};
+use super::colliders::shell::Shell;
 use super::heap::{Colliders, Floor};
-use super::shell::Shell;
 use super::{Base, Params};
 use crate::error::Result;
 use crate::geometry::{DVec3, TriMesh};

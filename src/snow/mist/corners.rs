@@ -4,7 +4,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::flow::Coord;
 use crate::geometry::DVec3;
-use crate::snow::grains::field::Window;
+use crate::snow::grains::colliders::field::Window;
 use crate::vdb::FloatGrid;
 
 /// The corners of cells, and of the parts into which they are divided.

@@ -14,7 +14,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::flow::{Coord, Faces, Solids, Tiles};
 use crate::geometry::DVec3;
-use crate::snow::grains::shell::Shell;
+use crate::snow::grains::colliders::shell::Shell;
 use crate::snow::grains::{FASTEST_OBJECT, HOLES};
 use crate::sweep::{self, Body, Settings};
 use crate::vdb::FloatGrid;

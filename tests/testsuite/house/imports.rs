@@ -28,11 +28,11 @@ const UNSAFE: [&str; 9] = [
     "src/numeric/lanes.rs",
     "src/context/pool.rs",
     "src/shallow/solver/transfer.rs",
-    "src/snow/grains/collide.rs",
-    "src/snow/grains/layout.rs",
-    "src/snow/grains/rows.rs",
-    "src/snow/grains/search.rs",
-    "src/snow/grains/solve.rs",
+    "src/snow/grains/solver/collide.rs",
+    "src/snow/grains/solver/layout.rs",
+    "src/snow/grains/solver/rows.rs",
+    "src/snow/grains/colliders/search.rs",
+    "src/snow/grains/solver/solve.rs",
 ];
 
 fn sources(folder: &Path, out: &mut Vec<PathBuf>) {

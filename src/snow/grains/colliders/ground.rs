@@ -49,7 +49,7 @@ impl Ground {
     }
 
     /// Its collider.
-    pub(super) fn shell(&self) -> &Shell {
+    pub(in crate::snow::grains) fn shell(&self) -> &Shell {
         &self.shell
     }
 }

@@ -8,10 +8,10 @@
 use rayon::prelude::*;
 
 use super::ground::RIM_CORNER;
-use super::rows::{Row, dot};
 use super::touch::{FIRST_SHELL, Touch};
 use crate::geometry::DVec3;
 use crate::numeric::lanes::LANES;
+use crate::snow::grains::solver::rows::{Row, dot};
 
 /// Vertices that one task measures.
 const VERTICES: usize = 4096;
@@ -302,7 +302,7 @@ impl Shell {
     }
 
     /// Compares a triangle with the best so far and with the square of a reach (m2).
-    pub(super) fn compare(&self, index: usize, place: DVec3, reach: f64, best: &mut Best) {
+    pub(in crate::snow::grains) fn compare(&self, index: usize, place: DVec3, reach: f64, best: &mut Best) {
         let [a, b, c] = self.corners(index);
         let weights = nearest_weights(place, a, b, c);
         let point = a * weights[0] + b * weights[1] + c * weights[2];
@@ -328,7 +328,7 @@ impl Shell {
 
     /// Visits the leaves that may be within a distance (m), plus their displacement, of positions in a box: each with its box
     /// and displacement (m).
-    pub(super) fn for_each_leaf(
+    pub(in crate::snow::grains) fn for_each_leaf(
         &self,
         [low, high]: &[DVec3; 2],
         within: f64,
@@ -354,7 +354,7 @@ impl Shell {
     }
 
     /// Corners of the triangles of a leaf.
-    pub(super) fn leaf_corners(&self, leaf: u32) -> impl Iterator<Item = [DVec3; 3]> + '_ {
+    pub(in crate::snow::grains) fn leaf_corners(&self, leaf: u32) -> impl Iterator<Item = [DVec3; 3]> + '_ {
         let first = leaf as usize * LEAF;
         (first..(first + LEAF).min(self.triangles.len())).map(|index| self.corners(index))
     }
@@ -372,7 +372,7 @@ impl Shell {
         ((place - a).dot(&normal), normal)
     }
 
-    pub(super) fn resolve(&self, found: Found, place: DVec3) -> Nearest {
+    pub(in crate::snow::grains) fn resolve(&self, found: Found, place: DVec3) -> Nearest {
         let Found { square, triangle, weights, point, .. } = found;
         let way = |corner: usize| {
             let index = self.triangles[triangle][corner] as usize;
@@ -394,10 +394,10 @@ fn is_on_rim(rim: u8, weights: [f64; 3]) -> bool {
 }
 
 /// The nearest triangle so far.
-pub(super) struct Best {
-    pub(super) found: Option<Found>,
+pub(in crate::snow::grains) struct Best {
+    pub(in crate::snow::grains) found: Option<Found>,
     /// Square of the distance (m2) beyond which no triangle can be better.
-    pub(super) most: f64,
+    pub(in crate::snow::grains) most: f64,
 }
 
 impl Default for Best {
@@ -407,7 +407,7 @@ impl Default for Best {
 }
 
 /// A triangle, the barycentric weights of its nearest point, that point, and the square of its distance (m2).
-pub(super) struct Found {
+pub(in crate::snow::grains) struct Found {
     square: f64,
     triangle: usize,
     weights: [f64; 3],

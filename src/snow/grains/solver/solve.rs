@@ -21,11 +21,11 @@ use super::density::SURROUNDED;
 use super::layout::{Block, Layout};
 use super::rest::{self, Rest};
 use super::rows::{Part, Row, Shared, V, add, dot, norm, scaled, sub};
-use super::touch::Touch;
 use crate::context::Context;
 use crate::error::Result;
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::Lanes;
+use crate::snow::grains::colliders::touch::Touch;
 
 /// Constants of a sub-step.
 #[derive(Debug, Clone, Copy)]
@@ -406,11 +406,11 @@ fn prefetch(rows: Shared<'_, Row>, batch: Option<&Batch>) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::rows::SUPPORTED;
     use super::*;
     use crate::numeric::cpu::FlushDenormals;
     use crate::snow::grains::Params;
     use crate::snow::grains::heap::Division;
-    use crate::snow::grains::rows::SUPPORTED;
 
     #[test]
     fn a_push_of_any_length_leaves_a_finite_velocity() {

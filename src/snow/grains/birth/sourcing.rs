@@ -16,7 +16,7 @@ use crate::snow::base_layer::{filled, filling};
 use crate::vdb::{FloatGrid, Probe};
 
 use super::claims::Claims;
-use super::field::Window;
+use crate::snow::grains::colliders::field::Window;
 
 /// Packing of new grains: the share of space that they fill.
 pub const PACKING: f64 = 0.55;

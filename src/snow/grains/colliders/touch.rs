@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::layout::Block;
-use super::rows::{V, add, dot, scaled};
+use crate::snow::grains::solver::layout::Block;
+use crate::snow::grains::solver::rows::{V, add, dot, scaled};
 
 /// A contact between a grain and a collider, as a plane that the grain cannot move.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

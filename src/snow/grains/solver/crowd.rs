@@ -11,7 +11,6 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::heap::{Colliders, Heap};
 use super::layout::{At, EDGE, world};
 use super::rest;
 use super::rows::{Row, V, add};
@@ -20,6 +19,7 @@ use crate::context::Context;
 use crate::error::Result;
 #[cfg(test)]
 use crate::geometry::DVec3;
+use crate::snow::grains::heap::{Colliders, Heap};
 
 /// Edge of a cell (diameters): it holds 2 x 2 x 2 grains side by side.
 const CELL: f32 = 2.0;
@@ -60,7 +60,12 @@ impl Heap {
     ///
     /// # Errors
     /// Cancel; errors of a grid.
-    pub(super) fn make_room(&mut self, ctx: &Context, colliders: &Colliders<'_>, most: usize) -> Result<()> {
+    pub(in crate::snow::grains) fn make_room(
+        &mut self,
+        ctx: &Context,
+        colliders: &Colliders<'_>,
+        most: usize,
+    ) -> Result<()> {
         let crowded = self.crowded(most);
         if crowded.is_empty() {
             return Ok(());
@@ -383,7 +388,7 @@ fn block(cell: Cell) -> At {
 
 /// A jittered position in an octant of a cell (diameters, from the cell's least corner).
 fn scattered(cell: Cell, eighth: usize) -> V {
-    let hash = super::sourcing::hash(eighth as u64, 0, cell.map(i64::from));
+    let hash = crate::snow::grains::birth::sourcing::hash(eighth as u64, 0, cell.map(i64::from));
     [0, 1, 2].map(|axis: usize| {
         let share = (hash >> (21 * axis) & 0x1f_ffff) as f32 / 1_048_576.0 - 1.0;
         0.25 * CELL + 0.5 * CELL * (eighth >> axis & 1) as f32 + JITTER * share
@@ -395,8 +400,8 @@ mod tests {
     use super::*;
     use crate::context::Pool;
     use crate::geometry::mesh::TriMesh;
+    use crate::snow::grains::colliders::shell::Shell;
     use crate::snow::grains::heap::Floor;
-    use crate::snow::grains::shell::Shell;
 
     /// Positions (m) of grains of diameter 1 m on a floor, beside a mesh, after crowding was relieved.
     fn spread(places: &[DVec3], mesh: Option<(TriMesh, bool)>) -> Vec<DVec3> {

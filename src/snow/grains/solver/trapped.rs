@@ -4,15 +4,15 @@
 
 use rayon::prelude::*;
 
-use super::field::Seen;
-use super::heap::Colliders;
 use super::layout::{At, Layout, world};
-use super::nearby::Nearby;
 use super::rows::{Row, V, add, dot};
-use super::search::around;
 use super::surfaces::Surfaces;
-use super::touch::Touch;
 use crate::error::Result;
+use crate::snow::grains::colliders::field::Seen;
+use crate::snow::grains::colliders::nearby::Nearby;
+use crate::snow::grains::colliders::search::around;
+use crate::snow::grains::colliders::touch::Touch;
+use crate::snow::grains::heap::Colliders;
 
 /// Depth (diameters) beyond which a grain counts as inside a surface.
 pub const DEEP: f64 = 0.1;

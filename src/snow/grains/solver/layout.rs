@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::contacts::{Batch, Held, SKIN, THIN_SKIN};
 use super::rows::{Row, Shared, V, add, dot, norm, scaled};
-use super::touch::Touch;
 use crate::geometry::DVec3;
 use crate::numeric::lanes::LANES;
+use crate::snow::grains::colliders::touch::Touch;
 
 /// Edge of a block (diameters). At least twice the reach of a contact.
 pub const EDGE: f32 = 8.0;

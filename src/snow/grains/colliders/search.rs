@@ -1,13 +1,13 @@
 //! Finds the grains near meshes that move during the step: in every sub-step, block by block, among the few triangles near it.
 
-use super::contacts::SKIN;
-use super::layout::{Block, EDGE, world};
 use super::nearby::Nearby;
-use super::rest;
-use super::rows::{Row, Shared, V, dot, norm, scaled, sub};
 use super::shell::Shell;
 use super::touch::Touch;
 use crate::geometry::DVec3;
+use crate::snow::grains::solver::contacts::SKIN;
+use crate::snow::grains::solver::layout::{Block, EDGE, world};
+use crate::snow::grains::solver::rest;
+use crate::snow::grains::solver::rows::{Row, Shared, V, dot, norm, scaled, sub};
 
 /// Working memory of one thread.
 #[derive(Default)]

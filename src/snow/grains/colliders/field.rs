@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
-use super::contacts::SKIN;
-use super::layout::{At, Block, EDGE, Layout};
-use super::rows::{Row, V, dot, norm, scaled};
 use super::touch::{BASE, Touch};
 use crate::error::Result;
 use crate::numeric::blocks::{DIM, offset};
+use crate::snow::grains::solver::contacts::SKIN;
+use crate::snow::grains::solver::layout::{At, Block, EDGE, Layout};
+use crate::snow::grains::solver::rows::{Row, V, dot, norm, scaled};
 use crate::vdb::{FloatGrid, Probe};
 
 /// A level set as a collider.

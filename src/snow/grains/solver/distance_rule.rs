@@ -6,13 +6,13 @@
 
 use rayon::prelude::*;
 
-use super::heap::{Heap, Pose};
 use super::layout::{At, world};
 use super::rest;
 use super::rows::{Row, norm};
-use super::shell::Shell;
 use crate::error::Result;
 use crate::geometry::DVec3;
+use crate::snow::grains::colliders::shell::Shell;
+use crate::snow::grains::heap::{Heap, Pose};
 
 /// Speed above which a grain is fast, in sqrt(g d): a slower one rises by at most d / 32, too little to leave the hollow
 /// between the grains below it.

@@ -1,10 +1,10 @@
 //! Decides which object took the snow at a position when objects have different compression: the one whose surface comes
 //! nearest to the position at the start, the end or one of the moments between (`MOMENTS`); the first of equals.
 
-use super::shell::Shell;
-use super::surroundings::{Bounds, Object, bounds};
 use crate::error::Result;
 use crate::geometry::DVec3;
+use crate::snow::grains::colliders::shell::Shell;
+use crate::snow::grains::surroundings::{Bounds, Object, bounds};
 
 /// Count of poses that are examined in a step.
 const MOMENTS: u32 = 9;

@@ -1,0 +1,4 @@
+//! Snow that was removed becomes grains.
+
+pub(in crate::snow::grains) mod claims;
+pub(in crate::snow::grains) mod sourcing;

@@ -1,0 +1,14 @@
+//! Grains in motion: pairs, contacts, rest, and what is put right at the end of a step.
+
+mod collide;
+pub(in crate::snow::grains) mod contacts;
+pub(in crate::snow::grains) mod crowd;
+pub(in crate::snow::grains) mod density;
+mod distance_rule;
+pub(in crate::snow::grains) mod layout;
+pub(in crate::snow::grains) mod rest;
+pub(in crate::snow::grains) mod rows;
+#[doc(hidden)]
+pub mod solve;
+mod surfaces;
+pub(in crate::snow::grains) mod trapped;
