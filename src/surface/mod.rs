@@ -40,10 +40,10 @@ mod topology;
 mod track;
 mod tracker;
 
+pub use level_set::SUPPORT;
 pub use level_set::band::Distances;
 pub use level_set::implicit::Implicit;
 pub use level_set::isosurface::Isosurface;
-pub use level_set::kernel::SUPPORT;
 #[doc(hidden)]
 pub use level_set::marching_cubes::cases as cube_cases;
 #[cfg(feature = "vdb")]

@@ -17,9 +17,12 @@ use crate::io::records::input_hashes::Seen;
 use crate::motion::Space;
 use crate::shallow::grid::{Grid, Heights};
 use crate::shallow::terrain::facing::facing;
+#[cfg(feature = "cli")]
 use crate::shallow::terrain::height;
+#[cfg(feature = "vdb")]
 use crate::shallow::terrain::sampler;
 use crate::shallow::terrain::{Solids, triangles};
+#[cfg(feature = "vdb")]
 use crate::vdb::{FloatGrid, GridClass, file};
 
 /// What the liquid flows over (m).

@@ -5,10 +5,11 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::foot_slip::Walk;
-use super::object_path::Course;
-use super::relief::Relief;
-use super::{Forecast, Inputs, MistForecast, disk, has_grains, has_mist, memory};
+use super::estimate::{disk, memory};
+use super::inspect::foot_slip::Walk;
+use super::inspect::object_path::Course;
+use super::inspect::relief::Relief;
+use super::{Forecast, Inputs, MistForecast, has_grains, has_mist};
 use crate::context::Context;
 use crate::error::Result;
 use crate::scene::run::Stored;

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::grain_files::{changes_since, partial};
-use super::grains::params;
 use super::inputs::Inputs;
+use super::stages::grain_files::{changes_since, partial};
+use super::stages::grains::params;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::points::Values;

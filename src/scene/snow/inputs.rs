@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::initial_grains::Drift;
-use super::mist;
-use super::warnings::{replaced, too_small};
+use super::inspect::warnings::{replaced, too_small};
+use super::stages::mist;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::check::orientation::{Closing, Orientation};

@@ -1,10 +1,10 @@
 //! The stages of a scene with snow.
 
 use super::Inputs;
-use super::base::Base;
-use super::grains::Grains;
-use super::mist::Mist;
-use super::volumes::Volumes;
+use super::stages::base::Base;
+use super::stages::grains::Grains;
+use super::stages::mist::Mist;
+use super::stages::volumes::Volumes;
 use super::{has_grains, has_mist};
 use crate::scene::Scene;
 use crate::scene::objects::Objects;

@@ -7,7 +7,8 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::kernel::{Near, SUPPORT, values};
+use super::SUPPORT;
+use super::kernel::{Near, values};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;

@@ -5,12 +5,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::SUPPORT;
 use super::thickness::Spread;
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::{LANES, Lanes};
 
-/// Radius within which particles count (spacings).
-pub const SUPPORT: f64 = 4.0;
 /// Greatest rate at which the mean may move with the place, and that from which on nothing is inside (Solenthaler et al., 2007).
 const RATES: [f64; 2] = [0.4, 3.5];
 

@@ -12,3 +12,6 @@ pub(in crate::surface) mod smooth;
 #[cfg(feature = "vdb")]
 pub(in crate::surface) mod spheres;
 mod thickness;
+
+/// Radius within which particles count (spacings).
+pub const SUPPORT: f64 = 4.0;

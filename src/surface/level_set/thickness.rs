@@ -10,7 +10,7 @@
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-use super::kernel::SUPPORT;
+use super::SUPPORT;
 
 /// The least distance of a surface from a sheet's middle (cells). Nodes inside of a sheet must be neighbours along edges of the grid, or
 /// marching cubes cut it to pieces: whatever its direction, its sides must be apart by a diagonal of a cell's face.

@@ -6,13 +6,13 @@ use std::collections::HashMap;
 
 use serde::Serialize;
 
-use super::mist_keys::mist_params;
-use super::object_path::Course;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::scene::Scene;
 use crate::scene::run::Stored;
+use crate::scene::snow::inspect::object_path::Course;
+use crate::scene::snow::keys::mist::mist_params;
 use crate::snow::mist::{self, LEAST, Params};
 use crate::vdb::file;
 
@@ -61,7 +61,7 @@ impl MistForecast {
     ///
     /// # Errors
     /// A damaged report or file of that mist; cancel.
-    pub(super) fn of(
+    pub(in crate::scene::snow) fn of(
         ctx: &Context,
         scene: &Scene,
         courses: &[Course],

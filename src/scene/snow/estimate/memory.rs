@@ -1,9 +1,9 @@
 //! How much memory a scene will need, before any of it is taken.
 
-use super::grains::params;
-use super::volume_keys::Needs;
-use super::{Inputs, has_grains};
 use crate::error::{Error, Result};
+use crate::scene::snow::keys::volumes::Needs;
+use crate::scene::snow::stages::grains::params;
+use crate::scene::snow::{Inputs, has_grains};
 use crate::scene::{BaseMode, Layer, Scene};
 use crate::snow;
 use crate::vdb::file;
@@ -25,7 +25,7 @@ const BYTES_OF_UNITED: u64 = 700;
 const FIXED: f64 = 64e6;
 
 /// Estimates a scene's memory (bytes), without grains that come from the snow: how many those are is known when the base is
-/// there, see [`Forecast`](super::forecast::Forecast).
+/// there, see [`Forecast`](super::grains::Forecast).
 ///
 /// # Errors
 /// When the layer's file cannot be read.
@@ -43,7 +43,7 @@ pub fn estimate(scene: &Scene, inputs: &Inputs) -> Result<u64> {
 ///
 /// # Errors
 /// As [`estimate`].
-pub(super) fn of_volumes(scene: &Scene, inputs: &Inputs, grains: u64) -> Result<u64> {
+pub(in crate::scene::snow) fn of_volumes(scene: &Scene, inputs: &Inputs, grains: u64) -> Result<u64> {
     let asked = scene.output.volumes;
     let needs = Needs::of(asked, &scene.values);
     let layer = layer(inputs)?;
@@ -67,7 +67,7 @@ pub(super) fn of_volumes(scene: &Scene, inputs: &Inputs, grains: u64) -> Result<
 }
 
 /// Voxels of the united surface along a cell's edge.
-pub(super) fn division(scene: &Scene, inputs: &Inputs) -> usize {
+pub(in crate::scene::snow) fn division(scene: &Scene, inputs: &Inputs) -> usize {
     let cell = inputs.snow.cell;
     snow::volumes::united::division(cell, params(scene, cell).radius)
 }
@@ -77,7 +77,7 @@ pub(super) fn division(scene: &Scene, inputs: &Inputs) -> usize {
 ///
 /// # Errors
 /// As [`estimate`].
-pub(super) fn of_grains(inputs: &Inputs, grains: u64) -> Result<u64> {
+pub(in crate::scene::snow) fn of_grains(inputs: &Inputs, grains: u64) -> Result<u64> {
     Ok((2.0 * layer(inputs)? + around(inputs)) as u64
         + snow::grains::memory(grains as usize)
         + grains * BYTES_PER_WRITTEN)

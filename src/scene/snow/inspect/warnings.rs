@@ -1,15 +1,15 @@
 //! What of a scene's grains has no effect, or not the one that was likely meant.
 
-use super::GRAIN_KEYS;
 use crate::error::Result;
 use crate::motion::span;
 use crate::scene::schema::key::Fallback;
 use crate::scene::schema::{Values, rounded};
+use crate::scene::snow::GRAIN_KEYS;
 use crate::scene::{Object, Scene};
 use crate::sweep::Body;
 
 /// What to say of keys that another one stands in place of, unless they are as they would be if they were left out.
-pub(super) fn replaced(values: &Values) -> Vec<String> {
+pub(in crate::scene::snow) fn replaced(values: &Values) -> Vec<String> {
     let number = |name: &str| values.number(&format!("grains.{name}"));
     let pairs = [("friction", "repose_angle_deg"), ("attraction", "stands")];
     let given = pairs.into_iter().filter_map(|(key, other)| Some((key, number(key)?, other, number(other)?)));
@@ -34,7 +34,12 @@ fn left_out(values: &Values, name: &str) -> Option<f64> {
 }
 
 /// What to say of an object that takes snow and is smaller than a grain at a time (s).
-pub(super) fn too_small(scene: &Scene, object: &Object, body: &Body, time: f64) -> Result<Option<String>> {
+pub(in crate::scene::snow) fn too_small(
+    scene: &Scene,
+    object: &Object,
+    body: &Body,
+    time: f64,
+) -> Result<Option<String>> {
     let Some(radius) = scene.values.number("grains.radius").filter(|_| object.role.removes()) else {
         return Ok(None);
     };

@@ -2,7 +2,6 @@
 
 use serde_json::json;
 
-use super::inputs::Inputs;
 use super::settings;
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
@@ -11,6 +10,7 @@ use crate::io::usd::{Field, Holds};
 use crate::scene::run::{
     FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
+use crate::scene::snow::inputs::Inputs;
 use crate::scene::{BaseMode, Scene, moving};
 use crate::snow::base_layer::{BaseLayer, Changes, Grids, Params, StepReport};
 use crate::sweep::{Body, TOLERANCE};
@@ -219,7 +219,7 @@ impl Writer {
 ///
 /// # Errors
 /// A frame that is not there; a file that is not what was written.
-pub(super) fn grids(ctx: &Context, done: &Stored, frame: i32) -> Result<Grids> {
+pub(in crate::scene::snow) fn grids(ctx: &Context, done: &Stored, frame: i32) -> Result<Grids> {
     let mut frames = done.frames_to(frame)?;
     let whole = frames.next().unwrap_or(frame);
     let mut grids = read_grids(done, whole)?;
@@ -230,7 +230,12 @@ pub(super) fn grids(ctx: &Context, done: &Stored, frame: i32) -> Result<Grids> {
 }
 
 /// Takes a layer from the frame before to a frame that keeps its changes.
-pub(super) fn follow(ctx: &Context, done: &Stored, grids: &mut Grids, frame: i32) -> Result<()> {
+pub(in crate::scene::snow) fn follow(
+    ctx: &Context,
+    done: &Stored,
+    grids: &mut Grids,
+    frame: i32,
+) -> Result<()> {
     ctx.check()?;
     grids.apply_delta(ctx, &read_grids(done, frame)?)
 }
@@ -250,7 +255,11 @@ fn vdb_bytes(scene: &Scene, frame: i32, grids: &[&FloatGrid], made_from: &str) -
 }
 
 /// What every .vdb file of a shot says of itself.
-pub(super) fn metadata(scene: &Scene, frame: i32, made_from: &str) -> Vec<(String, MetaValue)> {
+pub(in crate::scene::snow) fn metadata(
+    scene: &Scene,
+    frame: i32,
+    made_from: &str,
+) -> Vec<(String, MetaValue)> {
     let fps = scene.shot.fps;
     let text = |text: &str| MetaValue::Text(text.into());
     vec![

@@ -12,7 +12,7 @@ use crate::scene::{Layer, Role, Scene, System, run};
 ///
 /// # Errors
 /// An input that cannot be read.
-pub(super) fn of_base(scene: &Scene, seen: &Seen) -> Result<Settings> {
+pub(in crate::scene::snow) fn of_base(scene: &Scene, seen: &Seen) -> Result<Settings> {
     let mut settings = settings_of(scene, "base", seen, &[Role::Collide, Role::Base, Role::Static])?;
     for (key, path) in scene.snow.iter().flat_map(|snow| snow.files()) {
         settings.insert(key.into(), format!("{}{}", run::CONTENT, seen.hash(path)?));
@@ -26,7 +26,7 @@ pub(super) fn of_base(scene: &Scene, seen: &Seen) -> Result<Settings> {
 
 /// The settings that make the layer before the first frame: what was kept cannot become another layer. Static objects
 /// are counted by themselves: others may come and go.
-pub(super) fn of_layer(all: &Settings) -> Settings {
+pub(in crate::scene::snow) fn of_layer(all: &Settings) -> Settings {
     let is_first = |key: &str| declared(key).is_some_and(|key| key.scope("base") == Some(Scope::First));
     let of_snow = all.iter().filter(|(key, _)| is_first(key));
     let mut out: Settings = of_snow.map(|(key, value)| (key.clone(), value.clone())).collect();

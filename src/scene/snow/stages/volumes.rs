@@ -4,8 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::grain_files::Whole;
 use super::grains::params;
-use super::volume_keys::Needs;
-use super::{Inputs, base, memory, mist};
+use super::{base, mist};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::points::Values;
@@ -17,6 +16,9 @@ use crate::scene::run::{
     Clip, FrameFiles, Kind, Prims, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
 use crate::scene::schema::keys::settings_of;
+use crate::scene::snow::Inputs;
+use crate::scene::snow::estimate::memory;
+use crate::scene::snow::keys::volumes::Needs;
 use crate::scene::{Scene, VolumesOutput};
 use crate::snow::base_layer::Grids;
 use crate::snow::volumes::{fog, united};

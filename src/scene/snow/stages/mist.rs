@@ -6,8 +6,6 @@ use serde_json::json;
 
 use super::base;
 use super::grain_files::Whole;
-use super::inputs::Inputs;
-use super::mist_keys::mist_params;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::flow::{Solids, Tiles};
@@ -20,6 +18,8 @@ use crate::scene::run::{
     FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
 use crate::scene::schema::keys::{first_of, settings_of};
+use crate::scene::snow::inputs::Inputs;
+use crate::scene::snow::keys::mist::mist_params;
 use crate::scene::{Role, Scene, System, moving};
 use crate::snow::base_layer;
 use crate::snow::mist::{self, Around, Grids, Params, Source, Start, StepReport, Surroundings, Wind};
@@ -61,7 +61,7 @@ pub struct Writer {
 }
 
 /// The file of a scene's wind, where it is a grid.
-pub(super) fn wind_file(scene: &Scene) -> Option<&Path> {
+pub(in crate::scene::snow) fn wind_file(scene: &Scene) -> Option<&Path> {
     scene.values.get("mist.wind").and_then(|value| value.path())
 }
 
@@ -69,7 +69,7 @@ pub(super) fn wind_file(scene: &Scene) -> Option<&Path> {
 ///
 /// # Errors
 /// A frame that does not exist; a file that was changed since it was written, or that has no such grid.
-pub(super) fn density(stored: &Stored, frame: i32) -> Result<FloatGrid> {
+pub(in crate::scene::snow) fn density(stored: &Stored, frame: i32) -> Result<FloatGrid> {
     file::read_own_named(&stored.file(frame, NAME)?, DENSITY)
 }
 
@@ -77,7 +77,7 @@ pub(super) fn density(stored: &Stored, frame: i32) -> Result<FloatGrid> {
 ///
 /// # Errors
 /// A file that cannot be read, or that has no such grid.
-pub(super) fn wind(path: &Path) -> Result<VectorGrid> {
+pub(in crate::scene::snow) fn wind(path: &Path) -> Result<VectorGrid> {
     let grids = file::describe(path)?;
     let vectors = grids.iter().find(|grid| grid.value_type.starts_with("Tree_vec3s"));
     let name = vectors.map(|grid| grid.name.clone()).ok_or_else(|| {

@@ -1,8 +1,9 @@
 //! How much space a shot's files will need.
 
-use super::grain_files::WHOLE_EVERY;
-use super::volume_keys::Needs;
-use super::{Inputs, memory};
+use super::memory;
+use crate::scene::snow::Inputs;
+use crate::scene::snow::keys::volumes::Needs;
+use crate::scene::snow::stages::grain_files::WHOLE_EVERY;
 use crate::scene::{BaseMode, Scene};
 
 /// Bytes of a whole base file for each column of cells, and of what a frame changes and removes besides.
@@ -35,7 +36,7 @@ const MESH_USDA: f64 = 180.0;
 const STATES: f64 = 2.0;
 
 /// Estimates the space of grains' files and states (bytes), of so many after each frame.
-pub(super) fn of_grains(scene: &Scene, there: &[f64]) -> u64 {
+pub(in crate::scene::snow) fn of_grains(scene: &Scene, there: &[f64]) -> u64 {
     let output = scene.output;
     let vdb = |frame: usize| match output.grains_delta && !frame.is_multiple_of(WHOLE_EVERY as usize) {
         true => GRAIN_CHANGES,

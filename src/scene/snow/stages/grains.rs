@@ -5,11 +5,8 @@ use std::sync::OnceLock;
 
 use serde_json::json;
 
-use super::forecast::Forecast;
+use super::base;
 use super::grain_files::{self, WHOLE_EVERY, ordered, told_apart};
-use super::grain_keys::material;
-use super::inputs::Inputs;
-use super::{base, initial_grains};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::{DVec3, Points, TriMesh};
@@ -21,6 +18,10 @@ use crate::scene::run::{
 };
 use crate::scene::schema::key::OBJECT;
 use crate::scene::schema::keys::{first_of, settings_of};
+use crate::scene::snow::estimate::grains::Forecast;
+use crate::scene::snow::initial_grains;
+use crate::scene::snow::inputs::Inputs;
+use crate::scene::snow::keys::grains::material;
 use crate::scene::{self, Role, Scene, System, moving};
 use crate::snow::base_layer::Grids;
 use crate::snow::grains::{self, Base, Ground, Object, Params, StepReport, Surroundings};
@@ -176,7 +177,7 @@ impl<'a> Grains<'a> {
 }
 
 /// Parameters of the grains of a scene with cells of `cell` m.
-pub(super) fn params(scene: &Scene, cell: f64) -> Params {
+pub(in crate::scene::snow) fn params(scene: &Scene, cell: f64) -> Params {
     let values = &scene.values;
     let number = |name: &str| values.number(&format!("grains.{name}"));
     let whole = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.whole());

@@ -34,7 +34,11 @@ pub struct Walk {
 ///
 /// # Errors
 /// As [`Character::open`].
-pub(super) fn walk(scene: &Scene, object: &Object, moved: &dyn Motion) -> Result<Option<Walk>> {
+pub(in crate::scene::snow) fn walk(
+    scene: &Scene,
+    object: &Object,
+    moved: &dyn Motion,
+) -> Result<Option<Walk>> {
     if !is_gltf(&object.file) {
         return Ok(None);
     }

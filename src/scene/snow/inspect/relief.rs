@@ -1,12 +1,12 @@
 //! Heights of the ground and of the snow's top, for `check`: what an object goes into.
 
-use super::Inputs;
 use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh};
+use crate::scene::snow::Inputs;
 use crate::snow::base_layer::initial::{Cover, Ground};
 
 /// The ground and the snow on it, as far as heights at a place are known before the layer is made.
-pub(super) struct Relief<'a> {
+pub(in crate::scene::snow) struct Relief<'a> {
     ground: Surface<'a>,
     /// Depth of the snow above the ground (m), or its top.
     snow: Snow<'a>,

@@ -1,6 +1,6 @@
 //! The keys of `[snow]` and those that it has of each object, and the layer that they describe.
 
-use super::mist_keys::mist_params;
+use super::mist::mist_params;
 use crate::error::Result;
 use crate::io::mesh::{EXTENSIONS, extension};
 use crate::scene::schema::key::{Key, Kind, OBJECT, Scope};

@@ -1,8 +1,8 @@
 //! What the keys of `[output]` that ask for volumes to render need of the rest of a scene.
 
-use super::{has_grains, has_mist};
 use crate::error::Result;
 use crate::scene::schema::{Table, Values};
+use crate::scene::snow::{has_grains, has_mist};
 use crate::scene::{Output, VolumesOutput};
 
 /// The stages that a scene's volumes are made from.

@@ -3,11 +3,12 @@
 
 use serde::Serialize;
 
-use super::grains::params;
-use super::{Inputs, disk, memory};
+use super::{disk, memory};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::scene::run::Stored;
+use crate::scene::snow::Inputs;
+use crate::scene::snow::stages::grains::params;
 use crate::snow::grains::PACKING;
 
 /// Relative error that an estimate of the grains may have.

@@ -1,9 +1,9 @@
 //! The keys of `[mist]`.
 
-use super::has_grains;
 use crate::error::{Error, Result};
 use crate::scene::schema::key::{Key, Kind, Scope};
 use crate::scene::schema::{Table, Values};
+use crate::scene::snow::has_grains;
 use crate::snow::mist::{FASTEST_WIND, Params};
 
 type Scopes = &'static [(&'static str, Scope)];

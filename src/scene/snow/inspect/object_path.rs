@@ -2,8 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::Inputs;
-use super::check::{Deepest, ObjectReport};
 use super::foot_slip::walk;
 use super::relief::Relief;
 use crate::context::Context;
@@ -11,6 +9,8 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::geometry::check::faults;
 use crate::motion::{Motion, Poses, span};
+use crate::scene::snow::Inputs;
+use crate::scene::snow::check::{Deepest, ObjectReport};
 use crate::scene::{Object, Scene};
 use crate::snow::base_layer::Reach;
 use crate::snow::grains::FASTEST_OBJECT;

@@ -19,7 +19,7 @@ use crate::vdb::file::{self, WriteOptions};
 use crate::vdb::{MetaValue, points};
 
 /// One frame in so many is complete.
-pub(super) const WHOLE_EVERY: i32 = 24;
+pub(in crate::scene::snow) const WHOLE_EVERY: i32 = 24;
 /// Metadata of a file of changes: the previous frame.
 const SINCE: &str = "frazil:changes_since";
 /// Metadata of a file of changes: the identities that are gone since then.
@@ -52,7 +52,7 @@ fn since(metadata: &[(String, MetaValue)]) -> Option<i32> {
 }
 
 /// Points sorted by identity.
-pub(super) fn ordered(mut points: Points) -> Points {
+pub(in crate::scene::snow) fn ordered(mut points: Points) -> Points {
     let ids = ids(&points);
     if !ids.is_sorted() {
         let mut order: Vec<u32> = (0..ids.len() as u32).collect();
@@ -68,7 +68,7 @@ pub(super) fn ordered(mut points: Points) -> Points {
 }
 
 /// Points whose attributes are either uniform in every frame or never, as the clips of a USD stage require.
-pub(super) fn told_apart(mut points: Points) -> Points {
+pub(in crate::scene::snow) fn told_apart(mut points: Points) -> Points {
     if points.attribute(TRAPPED) == Some(&FREE) {
         points.set(TRAPPED, Values::Bool(Column::Each(vec![false; points.count()])));
     }
@@ -87,7 +87,7 @@ fn ids(points: &Points) -> Vec<i64> {
 }
 
 /// Writes the .vdb file of a frame: all points, or the changes since `before`; both in the order of [`ordered`].
-pub(super) fn write(
+pub(in crate::scene::snow) fn write(
     ctx: &Context,
     scene: &Scene,
     files: &mut FrameFiles,
@@ -336,7 +336,7 @@ impl RebuildGrains {
 
 /// Complete grains, and the frame after which they are so.
 #[derive(Default)]
-pub(super) struct Whole {
+pub(in crate::scene::snow) struct Whole {
     at: Option<(i32, Points)>,
 }
 

@@ -1,0 +1,6 @@
+//! What a check says of a scene: heights, paths of objects, feet, and keys without effect.
+
+pub(in crate::scene::snow) mod foot_slip;
+pub(in crate::scene::snow) mod object_path;
+pub(in crate::scene::snow) mod relief;
+pub(in crate::scene::snow) mod warnings;
