@@ -4,6 +4,18 @@
 //! [`run`] runs any stage; [`snow`], [`surface`] and [`shallow`] have the inputs, the check and the stages of a system; the stage `objects`
 //! writes the objects as they move. A new stage is a type with the traits [`run::Stage`] and [`run::Stepping`] beside its
 //! system, named in the system's plan ([`snow::plan`]) and in the scopes of the keys that it depends on.
+//!
+//! # Glossary
+//!
+//! | word | meaning |
+//! |---|---|
+//! | shot | a scene's frames and the folder that they go to |
+//! | stage | a part of a shot with files of its own: objects, base, grains, mist, volumes, surface, liquid |
+//! | upstream | stages whose frames another one reads |
+//! | pass | the loop of a stage over the frames that it has to make |
+//! | record | the manifest of a frame's files, written last: the frame is done when it is there |
+//! | settings | the values that a stage depends on; another value makes its frames again |
+//! | state | from what a pass resumes exactly: a stage's own files, or bytes in `state/` |
 
 mod moving;
 mod objects;

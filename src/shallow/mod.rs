@@ -1,9 +1,25 @@
 //! Small amounts of liquid in real time: virtual pipes between columns, with the right viscosity (thesis chapter 4).
 //!
-//! Words: a *cell* is a square of the ground; a *column* the room for liquid above a solid of a cell, from its *base* to its *ceiling*; a *layer* the
-//! place of a column from the bottom of its cell; a *pipe* joins columns of adjacent cells; a *flux* is what flows through it, a *transfer* what it moves
-//! in a step; a *unit* is the smallest difference of heights and depths, which are integers, so that liquid is neither lost nor made;
-//! an *amount* what a column holds of a scalar, an integer, too.
+//! # Glossary
+//!
+//! | word | meaning |
+//! |---|---|
+//! | cell | a square of the ground |
+//! | column | the room for liquid above a solid of a cell, from its *base* to its *ceiling* |
+//! | layer | which column of its cell one is, counted from the lowest |
+//! | strip | 16 columns of one layer, neighbours in a row: what SIMD loads work on |
+//! | pipe | joins columns of adjacent cells; *regular* pipes join columns of one layer, *links* all others, and lead out of the domain |
+//! | cliff, overflow edge | where liquid may fall freely; a link that it falls from (`Lips` in the code) |
+//! | flux | volume per time through a pipe |
+//! | transfer | what a flux moves in a step, in whole units |
+//! | unit | the smallest difference of heights and depths, which are integers, so that liquid is neither lost nor made |
+//! | amount | what a column holds of a scalar, an integer, too |
+//! | head | the height to which a column's liquid would rise: its surface, or, if it is full up to its ceiling, what its pressure stands for |
+//! | rest, active | strips where no step changes anything are passed over; all others are active |
+//! | packet, rivulet | liquid in the air; overflow edges close to each other whose packets fall as one thread |
+//! | near | the box of fine cells of a liquid in cells of two sizes (`two_level/`) |
+//!
+//! The surface has words of its own (`surface/mod.rs`).
 
 mod clock;
 pub mod columns;
