@@ -1,8 +1,8 @@
-//! Mass of a density that is carried along: what advection loses or gains is put back where it did.
+//! Conserves the mass of a density that is carried along: what advection loses is put back, and what it gains is taken out, where it did.
 //!
 //! Every corner of the tiles has a hat: a weight of 1 there that falls linearly to 0 at the corners beside it, so that all hats
 //! together weigh each point once. Along its path each cell carries its mass to a point, and thus into the eight hats around it:
-//! that is the mass that each hat should hold. Advection makes another one of it. The density is then multiplied by factors that
+//! that is the mass that each hat should hold. After advection the hat holds a different mass. The density is then multiplied by factors that
 //! the corners give and that are linear between them: by what each hat should hold over what it holds, so that the mass of all
 //! hats together is right to rounding, and no density farther than a tile from a loss changes.
 
@@ -28,10 +28,11 @@ pub struct Keeping {
 
 /// Greatest factor by which density grows in a step: mist of which nearly all was cut off must not come back in what is left.
 const MOST_GAIN: f64 = 1.2;
-/// How often a hat that would have to gain more hands the rest on to those beside it. What is left then goes to all of the density.
+/// Passes in which a hat that would have to grow by more than that hands the excess on to the hats beside it. What is left after them is spread
+/// over all of the density.
 const PASSES: usize = 6;
-/// By which share of what a thin density lacks it fades in a step. Slowly: where it ended at once, flows that differ by rounding
-/// soon differed by as much as is thin.
+/// In a step a density below `least` loses this share of what it lacks to `least`. It fades slowly on purpose: when it ended at once, flows
+/// that differed by rounding only soon differed by as much as `least`.
 const FADING: f32 = 0.125;
 /// Rounds of factors. Those that are linear between corners bring a hat only part of the way where the ones beside it need the
 /// contrary; the last round makes the sum of all hats right.

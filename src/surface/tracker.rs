@@ -67,7 +67,8 @@ pub(super) const WIDER: f64 = 1.25;
 pub(super) const DRIFT: f64 = 0.25;
 /// Share of the vertices that set the reach: a spike does not widen the band everywhere.
 const MOST: f64 = 0.999;
-/// Where the band would reach farther than this (r) only a larger share of the vertices sets its reach; around the others it is wider.
+/// Where the band would have to reach farther than this (r) for a share of `MOST`, a share of `OFTEN` sets its reach, which is at least this;
+/// around the remaining vertices it is widened locally.
 const WIDE: f64 = 2.5;
 const OFTEN: f64 = 0.95;
 /// Projection moves no vertex by less than this (r): what it would correct is rounding.

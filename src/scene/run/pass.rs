@@ -17,7 +17,7 @@ use crate::io::files::atomic;
 use crate::io::records::checksummed;
 use crate::io::records::manifest::{Keeps, Manifest};
 
-/// So many frames on end that cannot be written are no accident of one name, but a disk that is full or gone.
+/// If so many frames in a row cannot be written, it is not for the name of one file, but because a disk is full or gone.
 const FAILURES: usize = 3;
 /// Steps that wait for the writer at most: a step's changes are a few MB.
 const WAITING: usize = 2;
@@ -207,8 +207,8 @@ struct Files<'a, S> {
 }
 
 impl<S: Stepping> Files<'_, S> {
-    /// Writes until there is no more work or a file fails, of a stage whose frames are written alone [`FAILURES`] frames on end; gives the
-    /// records of what was written besides.
+    /// Writes until there is no more work or a file cannot be written; for a stage whose frames can be written independently, until
+    /// [`FAILURES`] frames in a row could not. Returns the records of what was written, too.
     fn write_all(&self, waiting: Receiver<Job<S>>, done: Done<'_>) -> (Vec<Manifest>, Result<()>) {
         let mut manifests = Vec::new();
         let mut writer = None;

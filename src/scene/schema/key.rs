@@ -1,11 +1,11 @@
 //! How a key of a scene is declared: all that reading, writing and describing it needs.
 
-/// What of a stage depends on a key.
+/// Which part of a stage's work depends on a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
     /// The state before the first frame, and all that follows.
     First,
-    /// Every step; of an object, where it moves.
+    /// Every step; for a key of an object, only if it moves.
     Step,
     /// What is written of a frame.
     Output,

@@ -37,8 +37,8 @@ pub struct Falls {
     pub height: f64,
     /// Time between packets of a lip (s), 0.0001 to 1, at least a step; 1/120.
     pub interval: f64,
-    /// Volume of a drop (m3), 0 and up: where it takes longer than 8 intervals liquid waits at its lip until it is one, at most 60. 6.5e-11, a ball of half a
-    /// millimetre.
+    /// Volume of a drop (m3), 0 or more. If a lip takes longer than 8 intervals to deliver this volume, its liquid waits there until there is
+    /// enough for one drop, for 60 intervals at most. 6.5e-11, a ball half a millimetre across.
     pub drop: f64,
     /// Most packets in the air, 1 to 1,048,576, for which there is room from the beginning; 8192. While there are so many, liquid that goes over a lip is
     /// below at once.

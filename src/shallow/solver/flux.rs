@@ -16,7 +16,7 @@ pub struct Step {
     pub drive: f32,
     /// 3 dt nu / unit^2 (units^2).
     pub drag: f32,
-    /// [`FAST_WAVES`](super::fast_films::FAST_WAVES) over `drive` (units): over a depth, by how much the inertia of a fast film counts less.
+    /// [`FAST_WAVES`](super::fast_films::FAST_WAVES) divided by `drive` (units). Divided by a depth: the factor by which the inertia of a fast film is reduced.
     pub lighter: f32,
     /// The part of a column's depth that a pipe of a fast film moves in a step at most.
     pub fastest: f32,
@@ -297,8 +297,8 @@ struct Ends<'a> {
     light: &'a [u32; STRIP],
 }
 
-/// Fluxes of a strip's pipes to the east or to the south. Of a fixed length, and with each array that changes an argument of its own, so that a row of
-/// few strips is neither begun with tests whether arrays overlap nor ended column by column.
+/// Fluxes of a strip's pipes to the east or to the south. A strip has a fixed length, and each array that changes is an argument of its own:
+/// the compiled code then neither tests for overlapping arrays before a row nor ends it column by column.
 #[inline(always)]
 fn flux_strip<K: Kind, const LIGHT: bool, const RESTS: bool, const AXIS: usize>(
     step: &Step,

@@ -1,9 +1,10 @@
 //! A step, row by row: fluxes, their scaling and the new depths follow each other at a distance of a few rows, so that what one
 //! has read or written is still in the cache for the next (thesis Alg. 4.1, lines 1 to 4).
 //!
-//! With row r in front: fluxes of r and its K_min, which scale the pipes of r - 1; where there are ceilings, K_max of r - 1 and, with
-//! what leaves, again of r - 2. The transfers of the row behind these are final, and its depths change. Nothing in front reads them
-//! any more. A band of rows starts some rows before its own, and ends some behind, on copies: it finds the same numbers there as its neighbours.
+//! When the front is at row r, the fluxes and K_min of r are computed; with these the pipes of r - 1 can be scaled. Where there are
+//! ceilings, K_max of r - 1 follows, and that of r - 2 once more, with the room that outflow makes. The transfers of the row behind these
+//! are then final, and its depths change; nothing in front reads that row again. A band starts some rows before its own rows and ends
+//! some rows after them, on copies, so that it finds the same numbers there as its neighbours.
 
 use super::active::Active;
 use super::buffers::{Buffer, RING, Rows, SWEEPS};

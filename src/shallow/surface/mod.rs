@@ -15,9 +15,9 @@
 //! | wall | a column whose solid a neighbour's surface ends at, below the neighbour's ceiling |
 //! | extra | a vertex within a wall, which the surface below it goes on to |
 //!
-//! Two dry columns of a group need no link. Groups become two triangles or one, which face up; a group of four is divided between two
-//! columns that are both wet or both dry where only one diagonal is so, between the wet ones where both are, else where the sum of the
-//! heights is greater, else from north-west to south-east. The surface ends at the centres of the outermost cells.
+//! Two dry columns of a group need no link. Groups become two triangles or one, which face up. A group of four is divided along a
+//! diagonal: the only one whose two columns are both wet or both dry; if one is wet and the other dry, the wet one; otherwise that with the
+//! greater sum of heights, and if these are equal the one from north-west to south-east. The surface ends at the centres of the outermost cells.
 //!
 //! Where a group of four lacks one link, of two cells side by side, its two triangles overlap ([`Check::doubled`]): the liquid of these
 //! columns is at different layers there.
@@ -98,8 +98,8 @@ pub struct Layout {
     /// Least height of a wet vertex above its base (m), against flicker where the terrain is drawn too (thesis 4.2.4: 0.05 of a cell), and
     /// how far below its base a dry one is at least, where the liquid around is not lower still.
     pub least_depth: f64,
-    /// Depth (m) from which a wet vertex is at its full height, so that none jumps as its column wets or dries: thinner liquid is the nearer
-    /// to where the vertex of a dry column is the thinner it is. 0: at once; 0.02 of a cell does well.
+    /// Depth (m) from which a wet vertex is at its full height, so that none jumps as its column wets or dries: below
+    /// it, the thinner the liquid, the nearer its vertex is to where that of a dry column would be. 0: at once; 0.02 of a cell does well.
     pub fade_depth: f64,
     /// Depth from which the liquid is opaque (m), for [`Target::opacities`].
     pub opaque_depth: f64,

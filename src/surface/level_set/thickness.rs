@@ -84,7 +84,7 @@ impl Spread {
 mod tests {
     use super::*;
 
-    /// What a node sees that is a way from the middle of particles that stand for a volume each, of which one is `spread` long.
+    /// What a node sees of particles at these displacements from it, each of volume 1: their spread, and the displacement to their mean.
     fn seen(places: impl Iterator<Item = Vector3<f64>>) -> (Spread, Vector3<f64>) {
         let (mut weight, mut heavy) = (0.0, 0.0);
         let (mut mean, mut middle, mut square) = (Vector3::zeros(), Vector3::zeros(), Matrix3::zeros());

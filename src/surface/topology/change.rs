@@ -101,8 +101,8 @@ impl Change {
         }
     }
 
-    /// Shares 0..=1 of the vertices that there were, for those that there are: a vertex that was made has the mean of the neighbours that
-    /// stayed, 0 without any.
+    /// Carries shares (0..=1) over from the vertices before the change to those after it. A vertex that was made gets the mean of its
+    /// neighbours that stayed, 0 if there are none.
     pub(in crate::surface) fn carried_shares(&self, values: &[f32]) -> Vec<f32> {
         let old = |vertex: u32| self.origins[vertex as usize].map(|at| values[at as usize]);
         let sums: Vec<(f32, u32)> = around(self.origins.len(), &self.triangles, old);
@@ -117,7 +117,7 @@ impl Change {
         self.sources.iter().filter(|source| !matches!(source, Source::Whole(_))).count()
     }
 
-    /// Count of triangles that are of no triangle there was.
+    /// Count of triangles that neither are triangles of the mesh before nor parts of one.
     pub(in crate::surface) fn rebuilt_triangles(&self) -> usize {
         self.sources.iter().filter(|source| **source == Source::New).count()
     }

@@ -1,6 +1,6 @@
 //! Places of the particles' surface that the mesh does not cover, though it covers others of the same part: a bridge that has just
-//! grown between two bodies, the rim of a hole. They tell of a change before a vertex jumps there (the early test that thesis 2.3.3
-//! has not: a thread between vertices moves none of them).
+//! grown between two bodies, the rim of a hole. They reveal a change before a vertex jumps there. The thesis (2.3.3) has no such
+//! early test: a thread that forms between vertices moves none of them.
 //!
 //! What covers the surface is the mesh of the feet: each vertex without its detail. Where nothing changes it lies on the surface.
 
@@ -21,8 +21,8 @@ use crate::surface::particles::grid::{Coord, cell_of};
 const SLACK: f64 = 0.5;
 /// Vertices whose feet are so near to an uncovered place are beside it (spacings; two cells at least).
 const BESIDE: f64 = 1.0;
-/// How many times as far this is at the first frame, whose gaps are no change: as the surface moves through the grid they look a
-/// little larger or smaller.
+/// Factor by which `BESIDE` is larger at the first frame. Gaps of that frame are no change, but look a little larger or smaller as the
+/// surface moves through the grid.
 const FIRST: f64 = 2.0;
 /// A triangle of feet over more bins than this on an axis does not lie on the surface.
 const LONG: f64 = 1024.0;

@@ -19,7 +19,7 @@ const GRAIN: usize = 256;
 const PULLS: usize = 16;
 /// Longest way to what takes a vertex' place (spacings): what is farther away is another surface that appears.
 const LONGEST: f64 = 4.0;
-/// A part of the old surface from which nothing that is made is farther away than this (spacings) stays: that is no jump.
+/// A part of the old surface is not eased if nothing that is made there is farther from it than this (spacings): there is no jump to hide.
 const NEAR: f64 = 0.25;
 /// How often the ways of vertices that nothing pulls at become the mean of those around them.
 const SPREAD: usize = 8;
@@ -205,8 +205,8 @@ impl Patch {
         Self { is_loose: names.iter().map(|name| is_loose(*name)).collect(), names, triangles }
     }
 
-    /// Of places that are made those at parts of the patch, whose vertices lie at `begin`, where any is farther away than the first of two
-    /// lengths; those beyond the second belong to another surface.
+    /// The positions that are made at parts of the patch where the surface jumps: each counts for the nearest part (its vertices lie at `begin`),
+    /// and a part jumps if one of them is farther away than the first length. Those beyond the second belong to another surface, and are left out.
     fn jumps(&self, begin: &[DVec3], made: Vec<DVec3>, [near, longest]: [f64; 2]) -> Vec<DVec3> {
         let mut part_of = vec![0; self.triangles.len()];
         let parts = bodies(&self.triangles);
