@@ -23,7 +23,10 @@ fn text(path: &Path) -> String {
 /// Names of keys that are declared with a default.
 fn declared(files: &[PathBuf]) -> BTreeSet<String> {
     let mut names = BTreeSet::new();
-    for path in files.iter().filter(|path| path.to_str().unwrap().ends_with("keys.rs")) {
+    let has_keys = |path: &&PathBuf| {
+        path.ends_with("keys.rs") || path.parent().is_some_and(|folder| folder.ends_with("keys"))
+    };
+    for path in files.iter().filter(has_keys) {
         for key in text(path).split("Key::new(").skip(1).filter(|key| key.contains(".or(")) {
             let name = key
                 .split('"')
