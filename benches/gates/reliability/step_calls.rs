@@ -338,15 +338,13 @@ fn mist(tried: &mut Tried) {
             return;
         }
         for frame in 0..8 {
-            let (count, side, dt) =
-                (tried.any(1.0, 50.0) as usize, cell * tried.any(0.1, 8.0), step_length(tried));
-            // Most cross some tiles in a step, few any number: each tile that they cross is of the air for frames.
-            let farthest = if tried.chance(0.1) { f64::INFINITY } else { 32.0 * cell };
-            let fastest = tried.any(0.1, 50.0).min(farthest / dt);
+            let (count, side, fastest) =
+                (tried.any(1.0, 50.0) as usize, cell * tried.any(0.1, 8.0), tried.any(0.1, 50.0));
             let [places, speeds] = points(tried, count, side, fastest);
             let places: Vec<[f64; 3]> = places.iter().map(|place| place.map(f64::from)).collect();
             let params = mist_params(tried, cell);
             frz_mist_set_params(mist, &params);
+            let dt = step_length(tried);
             let (radius, time) = (cell * tried.any(0.05, 2.0), f64::from(frame));
             tried.step(|ctx| {
                 let [places, speeds] = [view(&places), view(&speeds)];
