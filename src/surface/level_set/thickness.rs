@@ -4,7 +4,7 @@
 //! r deep. The mean of a sheet lies in its middle, and its surface would be r from there however thin the sheet is. Half of its
 //! thickness takes the place of r where that is less.
 //!
-//! The thickness is told by the particles' mass, r^3 each, and by how they spread: in a sheet of thickness w the sum of q^2 (q = 1 - d^2 / R^2)
+//! The thickness follows from the particles' mass, r^3 each, and from their spread: in a sheet of thickness w the sum of q^2 (q = 1 - d^2 / R^2)
 //! is w pi R^2 Q^3 / 3 / r^3, Q being q at the sheet's middle, and the variance along the sheet is R^2 Q / 8. Where they spread less than that,
 //! at rims, in ribbons and threads, they fill less of the sheet, and it is thicker by as much.
 
@@ -21,13 +21,13 @@ const LEAST: f64 = std::f64::consts::FRAC_1_SQRT_2;
 pub struct Spread {
     /// Of weights.
     pub weight: f64,
-    /// Variances and covariances of places (cells^2).
+    /// Variances and covariances of positions (cells^2).
     pub covariance: Matrix3<f64>,
 }
 
 impl Spread {
-    /// How far from the mean the surface lies, and how far a node is from the mean (cells); `mean` is the way to it (cells), `spacing` r (cells).
-    /// In a sheet the way across counts as it is. The way along it counts less, up to r, where its rim is.
+    /// How far from the mean the surface lies, and how far the node is from the mean; `mean` is the displacement to it, `spacing` is r (all in cells).
+    /// In a sheet the part of the displacement across it counts in full, and the part along it less: the rim is where that is r.
     pub fn offset(&self, mean: Vector3<f64>, spacing: f64) -> (f64, f64) {
         let thick = (spacing, mean.norm());
         // Farther than a cell from where a surface can be, or no sheet.
@@ -61,11 +61,10 @@ impl Spread {
     /// Whether the liquid is thicker than twice the spacing without doubt.
     fn is_thick(&self, mean: Vector3<f64>, spacing: f64) -> bool {
         let trace = self.covariance.trace();
-        // The least variance is the determinant by the product of the others, which is at most that of their mean.
-        if 4.0 * self.covariance.determinant() * 12.0 >= trace * trace * 4.0 * spacing * spacing {
-            return trace > 0.0;
-        }
-        self.thickness(mean, spacing, 0.5 * trace, 0.5 * trace) >= 2.0 * spacing
+        // The smallest variance is the determinant over the product of the others, which is at most (trace / 2)^2. NaN: a single particle.
+        let smallest = 4.0 * self.covariance.determinant() / (trace * trace);
+        12.0 * smallest >= 4.0 * spacing * spacing
+            || self.thickness(mean, spacing, 0.5 * trace, 0.5 * trace) >= 2.0 * spacing
     }
 
     /// The thickness of a sheet along which variances are these (cells).
@@ -100,9 +99,14 @@ mod tests {
         (Spread { weight, covariance: square / weight - middle * middle.transpose() }, mean / heavy)
     }
 
+    /// What [`seen`] gives, with lengths in half spacings.
+    fn in_half_spacings((spread, mean): (Spread, Vector3<f64>)) -> (Spread, Vector3<f64>) {
+        (Spread { weight: spread.weight, covariance: spread.covariance * 4.0 }, mean * 2.0)
+    }
+
     #[test]
     fn a_sheet_of_any_thickness_is_as_thick_as_its_mass() {
-        for thick in [0.65, 0.8, 1.0, 1.3, 1.7] {
+        for thick in [0.5, 0.8, 1.0, 1.3, 1.7] {
             for height in [0.0, 0.2, 0.5, 1.0] {
                 // Eight layers, drawn out until each particle has a volume of 1.
                 let apart = (8.0f64 / thick).sqrt();
@@ -115,9 +119,10 @@ mod tests {
                         })
                     })
                 });
-                let (spread, mean) = seen(places);
-                let (offset, _) = spread.offset(mean, 1.0);
-                let expected = f64::max(0.5 * thick, LEAST);
+                let (spread, mean) = in_half_spacings(seen(places));
+                let (offset, _) = spread.offset(mean, 2.0);
+                // Half of the thickness, in cells of half a spacing.
+                let expected = f64::max(thick, LEAST);
                 assert!(
                     (offset / expected - 1.0).abs() < 0.06,
                     "{thick} at {height}: {offset} of {expected}"
