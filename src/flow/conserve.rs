@@ -1,4 +1,5 @@
-//! Conserves the mass of a density that is carried along: what advection loses is put back, and what it gains is taken out, where it did.
+//! Conserves the mass of an advected density: what advection loses is put back where it was lost, and what it gains is removed where it
+//! was gained.
 //!
 //! Every corner of the tiles has a hat: a weight of 1 there that falls linearly to 0 at the corners beside it, so that all hats
 //! together weigh each point once. Along its path each cell carries its mass to a point, and thus into the eight hats around it:

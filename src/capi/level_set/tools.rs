@@ -75,11 +75,11 @@ impl frz_noise {
 
     /// The library's own parameters for voxels of a size (m); none for no noise.
     pub(in crate::capi) fn params(&self, cell: f64) -> Option<NoiseParams> {
-        let usual = NoiseParams::for_cell(cell);
-        let or = |value: f64, usual: f64| if value == -1.0 { usual } else { value };
+        let defaults = NoiseParams::for_cell(cell);
+        let or = |value: f64, defaults: f64| if value == -1.0 { defaults } else { value };
         let params = NoiseParams {
-            amplitude: or(self.amplitude, usual.amplitude),
-            size: or(self.size, usual.size),
+            amplitude: or(self.amplitude, defaults.amplitude),
+            size: or(self.size, defaults.size),
             octaves: self.octaves,
             seed: self.seed,
         };

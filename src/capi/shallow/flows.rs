@@ -137,7 +137,7 @@ impl Attached {
         }
         let at = match &on {
             None => given.at,
-            Some(on) => terrain.place(on)?,
+            Some(on) => terrain.position(on)?,
         };
         let pulse = Pulse { frequency: given.pulse_frequency, share: given.pulse_share };
         let pulse = (pulse.frequency != 0.0).then_some(pulse);

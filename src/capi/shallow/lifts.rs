@@ -32,7 +32,7 @@ unsafe impl Sized32 for frz_shallow_distance {
 }
 
 impl frz_shallow_distance {
-    fn usual() -> Self {
+    fn defaults() -> Self {
         let Distance { least, margin, rim } = Distance::default();
         Self { struct_size: 0, flags: 0, least, margin, rim }
     }
@@ -124,8 +124,8 @@ pub unsafe extern "C" fn frz_shallow_find_lifts(
                 fill(fitted, None, Fitted::default().into())?;
             }
             let distance = match distance.is_null() {
-                true => frz_shallow_distance::usual(),
-                false => sized(distance, frz_shallow_distance::usual())?,
+                true => frz_shallow_distance::defaults(),
+                false => sized(distance, frz_shallow_distance::defaults())?,
             };
             no_flags(distance.flags, 0)?;
             let frz_shallow_distance { least, margin, rim, .. } = distance;

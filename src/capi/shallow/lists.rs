@@ -12,7 +12,7 @@ pub(in crate::capi) unsafe fn each_sized<T: Sized32>(
     list: *const T,
     count: usize,
     nouns: [&str; 2],
-    usual: T,
+    defaults: T,
     mut take: impl FnMut(T) -> Outcome,
 ) -> Outcome {
     let [noun, all] = nouns;
@@ -36,7 +36,7 @@ pub(in crate::capi) unsafe fn each_sized<T: Sized32>(
     }
     for at in 0..count {
         // SAFETY: as above.
-        let one = unsafe { sized(list.byte_add(at * stride), usual) };
+        let one = unsafe { sized(list.byte_add(at * stride), defaults) };
         one.and_then(&mut take).map_err(|failure| named(at, failure))?;
     }
     Ok(())

@@ -170,10 +170,10 @@ unsafe impl Sized32 for frz_shallow_params {
 }
 
 impl frz_shallow_params {
-    pub(in crate::capi) fn usual() -> Self {
-        let usual = Params::default();
+    pub(in crate::capi) fn defaults() -> Self {
+        let defaults = Params::default();
         let falls = Falls::default();
-        let longest_step = if let Pace::Realtime(longest) = usual.pace { longest } else { 0.0 };
+        let longest_step = if let Pace::Realtime(longest) = defaults.pace { longest } else { 0.0 };
         let mut params = Self {
             struct_size: 0,
             flags: 0,
@@ -181,8 +181,8 @@ impl frz_shallow_params {
             thinnest: 0.0,
             thinning_time: 0.0,
             thinning_power: 0.0,
-            gravity: usual.gravity,
-            kept: usual.kept,
+            gravity: defaults.gravity,
+            kept: defaults.kept,
             longest_step,
             pace: FRZ_SHALLOW_REALTIME as u32,
             border: FRZ_SHALLOW_CLOSED as u32,
@@ -193,14 +193,14 @@ impl frz_shallow_params {
             falls_drop: falls.drop,
             falls_most: 0,
             reserved2: 0,
-            rest: usual.rest,
+            rest: defaults.rest,
             friction: FRZ_SHALLOW_GROUND as u32,
             thickening_scalar: FRZ_SHALLOW_NO_SCALAR,
             thickening_from: 0.0,
             thickening_to: 0.0,
             thickening_times: 1.0,
         };
-        params.set_liquid(&usual.liquid);
+        params.set_liquid(&defaults.liquid);
         params
     }
 
@@ -266,7 +266,7 @@ pub(in crate::capi) unsafe fn params(pointer: *const frz_shallow_params) -> Outc
         return Ok(Params::default());
     }
     // SAFETY: the caller's promise.
-    unsafe { sized(pointer, frz_shallow_params::usual()) }?.params()
+    unsafe { sized(pointer, frz_shallow_params::defaults()) }?.params()
 }
 
 /// Fills parameters with the usual values: blood, in real time.
@@ -278,7 +278,7 @@ pub(in crate::capi) unsafe fn params(pointer: *const frz_shallow_params) -> Outc
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_params_init(params: *mut frz_shallow_params, size: usize) -> frz_status {
     // SAFETY: the parameters are NULL or have so many bytes.
-    guard(|| unsafe { fill(params, Some(size), frz_shallow_params::usual()) })
+    guard(|| unsafe { fill(params, Some(size), frz_shallow_params::defaults()) })
 }
 
 /// Sets the viscosity of parameters, and how it thins, to those of a known liquid; the rest stays.
@@ -295,7 +295,7 @@ pub unsafe extern "C" fn frz_shallow_params_liquid(
     guard(|| {
         // SAFETY: the parameters are NULL or have as many bytes as they say.
         unsafe {
-            let mut changed = sized(params.cast_const(), frz_shallow_params::usual())?;
+            let mut changed = sized(params.cast_const(), frz_shallow_params::defaults())?;
             changed.set_liquid(&meaning("liquid", "frz_liquid", liquid, &LIQUIDS)?);
             fill(params, None, changed)
         }

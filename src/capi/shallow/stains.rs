@@ -45,7 +45,7 @@ unsafe impl Sized32 for frz_shallow_staining {
 }
 
 impl frz_shallow_staining {
-    fn usual() -> Self {
+    fn defaults() -> Self {
         let Staining { film, takes, half_life, .. } = Staining::default();
         Self {
             struct_size: 0,
@@ -90,7 +90,7 @@ pub unsafe extern "C" fn frz_shallow_staining_init(
     size: usize,
 ) -> frz_status {
     // SAFETY: the description is NULL or has so many bytes.
-    guard(|| unsafe { fill(staining, Some(size), frz_shallow_staining::usual()) })
+    guard(|| unsafe { fill(staining, Some(size), frz_shallow_staining::defaults()) })
 }
 
 /// Stains on the vertices of a mesh, and what it has absorbed: they go with ground that deforms. The mesh need not be the one that the liquid was made
@@ -134,8 +134,8 @@ pub unsafe extern "C" fn frz_shallow_stains_create(
     unsafe {
         creates(context, out, |ctx| {
             let staining = match staining.is_null() {
-                true => frz_shallow_staining::usual(),
-                false => sized(staining, frz_shallow_staining::usual())?,
+                true => frz_shallow_staining::defaults(),
+                false => sized(staining, frz_shallow_staining::defaults())?,
             };
             let staining = staining.staining()?;
             let spill = read(shallow)?;

@@ -55,15 +55,15 @@ unsafe impl Sized32 for frz_shallow_layout {
 }
 
 impl frz_shallow_layout {
-    fn usual() -> Self {
-        let usual = Layout::default();
+    fn defaults() -> Self {
+        let defaults = Layout::default();
         Self {
             struct_size: 0,
             flags: 0,
-            scale: usual.scale,
-            least_depth: usual.least_depth,
-            opaque_depth: usual.opaque_depth,
-            fade_depth: usual.fade_depth,
+            scale: defaults.scale,
+            least_depth: defaults.least_depth,
+            opaque_depth: defaults.opaque_depth,
+            fade_depth: defaults.fade_depth,
         }
     }
 
@@ -262,7 +262,7 @@ pub(in crate::capi) unsafe fn layout(pointer: *const frz_shallow_layout) -> Outc
         return Ok((Layout::default(), 0));
     }
     // SAFETY: the caller's promise.
-    let given = unsafe { sized(pointer, frz_shallow_layout::usual()) }?;
+    let given = unsafe { sized(pointer, frz_shallow_layout::defaults()) }?;
     Ok((given.layout()?, given.flags))
 }
 
@@ -370,7 +370,7 @@ impl Wanted {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_layout_init(layout: *mut frz_shallow_layout, size: usize) -> frz_status {
     // SAFETY: the layout is NULL or has so many bytes.
-    guard(|| unsafe { fill(layout, Some(size), frz_shallow_layout::usual()) })
+    guard(|| unsafe { fill(layout, Some(size), frz_shallow_layout::defaults()) })
 }
 
 /// Reports the most that the surface of any liquid on this ground can have, so that buffers are made once. It holds until the ground

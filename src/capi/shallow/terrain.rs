@@ -103,7 +103,7 @@ impl Terrain {
     }
 
     /// The place (m) on a triangle of which its corners have these shares.
-    pub(in crate::capi) fn place(&self, (triangle, shares): &(u32, [f64; 3])) -> Outcome<[f64; 3]> {
+    pub(in crate::capi) fn position(&self, (triangle, shares): &(u32, [f64; 3])) -> Outcome<[f64; 3]> {
         let Self::Mesh(mesh) = self else {
             return Err(Failure::argument("the liquid was not made with a mesh: there is no triangle"));
         };
@@ -248,7 +248,7 @@ pub unsafe extern "C" fn frz_shallow_update_terrain(
                 mesh.come();
                 for (index, flow) in flows.iter_mut().enumerate() {
                     if let Some(on) = &flow.on {
-                        flow.point.at = terrain.place(on)?;
+                        flow.point.at = terrain.position(on)?;
                         shallow.move_flow(index, flow.point.at);
                     }
                 }

@@ -68,7 +68,7 @@ pub unsafe extern "C" fn frz_shallow_detail_update_terrain(
                 mesh.come();
                 for (index, flow) in flows.iter_mut().enumerate() {
                     if let Some(on) = &flow.on {
-                        flow.point.at = terrain.place(on)?;
+                        flow.point.at = terrain.position(on)?;
                         detail.move_flow(index, flow.point.at);
                     }
                 }

@@ -204,8 +204,8 @@ pub unsafe extern "C" fn frz_grains_create(
     // SAFETY: the pointers are NULL or the caller's.
     unsafe {
         creates(context, out, |ctx| {
-            let usual = frz_grains_params::usual();
-            let params = if params.is_null() { usual } else { sized(params, usual)? };
+            let defaults = frz_grains_params::defaults();
+            let params = if params.is_null() { defaults } else { sized(params, defaults)? };
             let own = params.params()?;
             let state =
                 frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
@@ -244,7 +244,7 @@ pub unsafe extern "C" fn frz_grains_set_params(
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
             let mut grains = change(grains)?;
-            let params = sized(params, frz_grains_params::usual())?;
+            let params = sized(params, frz_grains_params::defaults())?;
             grains.grains.set_params(params.params()?)?;
             grains.ground = params.ground();
             Ok(())

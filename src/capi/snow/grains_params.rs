@@ -79,25 +79,25 @@ pub(in crate::capi) const FARTHEST: f64 = 1.0e6;
 
 impl frz_grains_params {
     /// Those of the library, for voxels of 1 cm.
-    pub(in crate::capi) fn usual() -> Self {
-        let usual = Params::for_cell(0.01);
+    pub(in crate::capi) fn defaults() -> Self {
+        let defaults = Params::for_cell(0.01);
         Self {
             struct_size: 0,
             flags: 0,
-            radius: usual.radius,
-            compression: usual.compression,
-            friction: usual.friction,
-            attraction: usual.attraction,
-            restitution: usual.restitution,
-            air: usual.air,
-            gravity: usual.gravity,
+            radius: defaults.radius,
+            compression: defaults.compression,
+            friction: defaults.friction,
+            attraction: defaults.attraction,
+            restitution: defaults.restitution,
+            air: defaults.air,
+            gravity: defaults.gravity,
             floor: 0.0,
             lowest: -FARTHEST,
             keep_low: [0.0; 3],
             keep_high: [0.0; 3],
             lifetime: 0.0,
-            max_grains: usual.most as u64,
-            seed: usual.seed,
+            max_grains: defaults.most as u64,
+            seed: defaults.seed,
             sub_steps: 0,
             reserved: 0,
             active_distance: 0.0,
@@ -157,7 +157,7 @@ impl frz_grains_params {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_grains_params_init(params: *mut frz_grains_params, size: usize) -> frz_status {
     // SAFETY: the parameters are NULL or have so many bytes.
-    guard(|| unsafe { fill(params, Some(size), frz_grains_params::usual()) })
+    guard(|| unsafe { fill(params, Some(size), frz_grains_params::defaults()) })
 }
 
 /// Sets the friction and the attraction of parameters from what can be measured of snow.
@@ -179,7 +179,7 @@ pub unsafe extern "C" fn frz_grains_params_of_snow(
         let to = required(params, "params")?;
         // SAFETY: the parameters are the caller's, checked for their size.
         unsafe {
-            let mut now = sized(to.cast_const(), frz_grains_params::usual())?;
+            let mut now = sized(to.cast_const(), frz_grains_params::defaults())?;
             now.params()?;
             now.attraction = grain_cohesion::of_wall(stands, 2.0 * now.radius, repose_angle_deg).min(1000.0);
             now.friction = grain_friction::of_repose(repose_angle_deg, now.attraction > 0.0);

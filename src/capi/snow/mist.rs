@@ -163,8 +163,8 @@ pub unsafe extern "C" fn frz_mist_create(
     // SAFETY: the pointers are NULL or the caller's.
     unsafe {
         creates(context, out, |ctx| {
-            let usual = frz_mist_params::usual();
-            let params = if params.is_null() { usual } else { sized(params, usual)? };
+            let defaults = frz_mist_params::defaults();
+            let params = if params.is_null() { defaults } else { sized(params, defaults)? };
             let own = params.params()?;
             let state =
                 frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
@@ -202,7 +202,7 @@ pub unsafe extern "C" fn frz_mist_set_params(
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
             let mut air = change(mist)?;
-            let params = sized(params, frz_mist_params::usual())?;
+            let params = sized(params, frz_mist_params::defaults())?;
             air.mist.set_params(params.params()?)?;
             air.floor = params.ground();
             Ok(())

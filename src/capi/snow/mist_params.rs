@@ -60,24 +60,24 @@ const USUAL: f64 = 0.01 * 4.0 / 3.0;
 
 impl frz_mist_params {
     /// Those of the library, for voxels of 1 cm.
-    pub(in crate::capi) fn usual() -> Self {
-        let usual = Params::for_cell(USUAL);
+    pub(in crate::capi) fn defaults() -> Self {
+        let defaults = Params::for_cell(USUAL);
         Self {
             struct_size: 0,
             flags: 0,
-            cell: usual.cell,
-            from_speed: usual.from_speed,
-            gravity: usual.gravity,
-            half_life: usual.half_life,
-            wind: usual.wind,
-            turbulence: usual.turbulence,
-            turbulence_size: usual.turbulence_size,
-            confinement: usual.confinement,
-            noise: usual.noise,
-            noise_size: usual.noise_size,
+            cell: defaults.cell,
+            from_speed: defaults.from_speed,
+            gravity: defaults.gravity,
+            half_life: defaults.half_life,
+            wind: defaults.wind,
+            turbulence: defaults.turbulence,
+            turbulence_size: defaults.turbulence_size,
+            confinement: defaults.confinement,
+            noise: defaults.noise,
+            noise_size: defaults.noise_size,
             floor: 0.0,
-            seed: usual.seed,
-            padding: usual.padding,
+            seed: defaults.seed,
+            padding: defaults.padding,
         }
     }
 
@@ -122,5 +122,5 @@ impl frz_mist_params {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_mist_params_init(params: *mut frz_mist_params, size: usize) -> frz_status {
     // SAFETY: the parameters are NULL or have so many bytes.
-    guard(|| unsafe { fill(params, Some(size), frz_mist_params::usual()) })
+    guard(|| unsafe { fill(params, Some(size), frz_mist_params::defaults()) })
 }

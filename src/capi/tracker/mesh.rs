@@ -149,10 +149,10 @@ impl Noun for frz_tracker {
 /// The pointer must be NULL or the caller's, and its views describe memory that can be read.
 pub(in crate::capi) unsafe fn particles(pointer: *const frz_particles) -> Outcome<Particles> {
     let none = frz_view::NONE;
-    let usual = frz_particles { struct_size: 0, flags: 0, positions: none, velocities: none, ids: none };
+    let defaults = frz_particles { struct_size: 0, flags: 0, positions: none, velocities: none, ids: none };
     // SAFETY: the caller's promise.
     let (places, velocities, ids) = unsafe {
-        let given = sized(pointer, usual)?;
+        let given = sized(pointer, defaults)?;
         no_flags(given.flags, 0)?;
         (
             given.positions.elements::<[f64; 3]>("positions")?,
@@ -218,7 +218,7 @@ pub unsafe extern "C" fn frz_tracker_create(
     // SAFETY: the pointers are NULL or the caller's.
     unsafe {
         creates(context, out, |ctx| {
-            let params = sized(params, frz_tracker_params::usual())?.params()?;
+            let params = sized(params, frz_tracker_params::defaults())?.params()?;
             let mesh = read(mesh)?;
             let triangles = &mesh.triangles;
             let state =
@@ -278,7 +278,7 @@ pub unsafe extern "C" fn frz_tracker_set_params(
         // SAFETY: the pointers are NULL or the caller's.
         unsafe {
             let mut follower = change(tracker)?;
-            let params = sized(params, frz_tracker_params::usual())?.params()?;
+            let params = sized(params, frz_tracker_params::defaults())?.params()?;
             follower.tracker.set_params(params)?;
             follower.outlook = Outlook::default();
             Ok(())

@@ -88,21 +88,21 @@ unsafe impl Sized32 for frz_tracker_params {
 }
 
 impl frz_tracker_params {
-    pub(in crate::capi) fn usual() -> Self {
-        let usual = Params::for_spacing(0.0);
+    pub(in crate::capi) fn defaults() -> Self {
+        let defaults = Params::for_spacing(0.0);
         Self {
             struct_size: 0,
             flags: 0,
-            spacing: usual.spacing,
-            cell: usual.cell,
-            change: usual.change,
-            half_life: usual.half_life,
-            fade: usual.fade,
+            spacing: defaults.spacing,
+            cell: defaults.cell,
+            change: defaults.change,
+            half_life: defaults.half_life,
+            fade: defaults.fade,
             weighting: FRZ_TRACKER_AFFINE as u32,
             reserved: 0,
-            rebuild: u32::from(usual.rebuild),
+            rebuild: u32::from(defaults.rebuild),
             r#match: FRZ_TRACKER_MATCH_FLAGGED as u32,
-            min_drop: usual.min_drop as u32,
+            min_drop: defaults.min_drop as u32,
             reserved3: 0,
         }
     }
@@ -144,5 +144,5 @@ impl frz_tracker_params {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_tracker_params_init(params: *mut frz_tracker_params, size: usize) -> frz_status {
     // SAFETY: the parameters are NULL or have so many bytes.
-    guard(|| unsafe { fill(params, Some(size), frz_tracker_params::usual()) })
+    guard(|| unsafe { fill(params, Some(size), frz_tracker_params::defaults()) })
 }

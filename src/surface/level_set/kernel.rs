@@ -1,5 +1,5 @@
 //! The implicit function of Solenthaler, Schläfli and Pajarola (2007; thesis 2.3.1) at single nodes: phi(x) = |x - a(x)| - r f,
-//! where a is the weighted mean of the particles' places around x and r their spacing. f is 1, and less where the mean moves
+//! where a is the weighted mean of the positions of the particles around x and r their spacing. f is 1, and less where the mean moves
 //! too fast with x: between particles far apart, where there is no liquid. Where liquid is thinner than 2 r, half of its
 //! thickness is the most that r f can be (`level_set/thickness.rs`).
 
@@ -10,7 +10,7 @@ use super::thickness::Spread;
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::{LANES, Lanes};
 
-/// Greatest rate at which the mean may move with the place, and that from which on nothing is inside (Solenthaler et al., 2007).
+/// Greatest rate at which the mean may move with the position, and that from which on nothing is inside (Solenthaler et al., 2007).
 const RATES: [f64; 2] = [0.4, 3.5];
 
 /// Particles around some nodes, in cells from a common corner.
@@ -19,7 +19,7 @@ pub struct Near {
     pub places: Vec<[f32; 3]>,
 }
 
-/// Sums over the particles around eight nodes, d being the way from a node to a particle and q = 1 - (d / R)^2:
+/// Sums over the particles around eight nodes, d being the displacement from a node to a particle and q = 1 - (d / R)^2:
 /// q^3, q^3 d, q^2 d, and the six products of q^2 d d.
 #[derive(Clone, Copy)]
 struct Sums {
@@ -80,13 +80,13 @@ fn value(sums: &Sums, lane: usize, spacing: f64) -> f64 {
     if weight <= 0.0 {
         return radius;
     }
-    // The way to the mean, and the derivative of the mean's place. The weight's derivative is 6 q^2 d / R^2.
+    // The displacement to the mean, and the derivative of the mean's position. The weight's derivative is 6 q^2 d / R^2.
     let mean = sums.mean.each_ref().map(|sum| of(sum) / weight);
     let slope = sums.slope.each_ref().map(of);
     let scale = 6.0 / (radius * radius * weight);
     let mut rate = Matrix3::zeros();
     for (sum, [a, b]) in sums.square.iter().zip(PAIRS) {
-        // Its symmetric part: what turns with the place does not spread.
+        // Its symmetric part: what turns with the position does not spread.
         let entry = scale * (of(sum) - 0.5 * (mean[a] * slope[b] + mean[b] * slope[a]));
         (rate[(a, b)], rate[(b, a)]) = (entry, entry);
     }
