@@ -104,29 +104,35 @@ mod tests {
         (Spread { weight: spread.weight, covariance: spread.covariance * 4.0 }, mean * 2.0)
     }
 
+    /// Half of the thickness that a node finds `height` off the middle of a sheet of so many layers, over what it is.
+    fn found(thick: f64, layers: i32, height: f64) -> f64 {
+        // Drawn out until each particle has a volume of 1.
+        let apart = (f64::from(layers) / thick).sqrt();
+        let layer = move |n: i32| ((f64::from(n) + 0.5) / f64::from(layers) - 0.5) * thick - height;
+        let at = move |n: i32, shift: f64| (f64::from(n) + 0.31) * apart + shift;
+        let on = || -8..8;
+        let places = (0..layers).flat_map(|y| {
+            on().flat_map(move |x| {
+                on().map(move |z| {
+                    Vector3::new(at(x, 0.4 * f64::from(y)), layer(y), at(z, 0.7 * f64::from(y)))
+                })
+            })
+        });
+        let (spread, mean) = in_half_spacings(seen(places));
+        let (offset, _) = spread.offset(mean, 2.0);
+        // In cells of half a spacing.
+        offset / f64::max(thick, LEAST)
+    }
+
     #[test]
     fn a_sheet_of_any_thickness_is_as_thick_as_its_mass() {
         for thick in [0.5, 0.8, 1.0, 1.3, 1.7] {
             for height in [0.0, 0.2, 0.5, 1.0] {
-                // Eight layers, drawn out until each particle has a volume of 1.
-                let apart = (8.0f64 / thick).sqrt();
-                let layer = |n: i32| (f64::from(n) + 0.5) / 8.0 * thick - 0.5 * thick - height;
-                let at = |n: i32| (f64::from(n) + 0.31) * apart;
-                let places = (0..8).flat_map(|y| {
-                    (-6..6).flat_map(move |x| {
-                        (-6..6).map(move |z| {
-                            Vector3::new(at(x) + 0.4 * f64::from(y), layer(y), at(z) + 0.7 * f64::from(y))
-                        })
-                    })
-                });
-                let (spread, mean) = in_half_spacings(seen(places));
-                let (offset, _) = spread.offset(mean, 2.0);
-                // Half of the thickness, in cells of half a spacing.
-                let expected = f64::max(thick, LEAST);
-                assert!(
-                    (offset / expected - 1.0).abs() < 0.06,
-                    "{thick} at {height}: {offset} of {expected}"
-                );
+                // Particles of one layer have no spread across it: their mass alone says how thick it is.
+                for layers in [1, 2, 8] {
+                    let ratio = found(thick, layers, height);
+                    assert!((ratio - 1.0).abs() < 0.06, "{thick} in {layers} layers at {height}: {ratio}");
+                }
             }
         }
     }
