@@ -20,7 +20,8 @@ use std::path::Path;
 use frazil::geometry::mesh::attributes::{Number, On};
 use frazil::geometry::{DVec3, MeshArray, Points, TriMesh};
 use frazil::io::{mesh, particles};
-use frazil::surface::{Change, Params, Particles, Source, Tracker};
+use frazil::mesh_repair::Source;
+use frazil::surface::{Change, Params, Particles, Tracker};
 use frazil::{Context, Error, Pool};
 
 /// Initial distance between particles (m).

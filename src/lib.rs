@@ -99,6 +99,7 @@ pub mod error;
 pub mod flow;
 pub mod geometry;
 pub mod io;
+pub mod mesh_repair;
 pub mod motion;
 pub mod numeric;
 #[cfg(feature = "cli")]

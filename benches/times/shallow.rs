@@ -5,8 +5,8 @@ use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::{Pace, Section};
 use frazil::shallow::pipes::Border;
-use frazil::shallow::surface::ledges::Ledges;
-use frazil::shallow::surface::minimum_heights::{Distance, Lifts};
+use frazil::shallow::surface::heights::minimum_heights::{Distance, Lifts};
+use frazil::shallow::surface::rim::ledges::Ledges;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 

@@ -15,12 +15,12 @@ use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid,
 use frazil::scene::{FrameChoice, Frames};
 use serde_json::json;
 
-use super::cloud;
 use super::each::Each;
-use super::exit::{Failure, Phase};
 use super::options::{Axis, MeshSpace, positive, warn_if_far};
 use super::output;
+use super::points;
 use super::session::Session;
+use super::session::exit::{Failure, Phase};
 
 /// Turn meshes, sequences of them, characters and points into other files.
 ///
@@ -65,7 +65,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    if cloud::is_one(&args.input, &args.output, args.frames.as_ref()).before()? {
+    if points::is_one(&args.input, &args.output, args.frames.as_ref()).before()? {
         return args.points()?.run(session);
     }
     if args.voxel.is_some() {
@@ -291,14 +291,14 @@ impl Sequence {
 
 impl Args {
     /// The conversion of points, which are written in metres with Y up.
-    fn points(&self) -> Result<cloud::Conversion<'_>, Failure> {
+    fn points(&self) -> Result<points::Conversion<'_>, Failure> {
         if self.to_scale != 1.0 || self.to_up == Axis::Z {
             return Err(Failure::refused("--to-scale and --to-up are for meshes"));
         }
         if self.clip.is_some() || self.node.is_some() {
             return Err(Failure::refused("--clip and --node are for .glb and .gltf files"));
         }
-        Ok(cloud::Conversion {
+        Ok(points::Conversion {
             input: &self.input,
             output: &self.output,
             frames: self.frames.as_ref(),

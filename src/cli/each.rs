@@ -2,7 +2,7 @@
 
 use frazil::{Error, Result};
 
-use super::exit::Failure;
+use super::session::exit::Failure;
 
 /// Failed frames that are named one by one, and those that are listed in the end.
 const MAX_NAMED: usize = 20;

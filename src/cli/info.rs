@@ -6,10 +6,10 @@ use frazil::io;
 use frazil::motion::{Character, Play, gait, is_gltf};
 use serde_json::{Map, Value, json};
 
-use super::exit::{Failure, Phase};
 use super::options::{Origin, warn_if_far};
 use super::output;
 use super::session::Session;
+use super::session::exit::{Failure, Phase};
 
 /// Say what .vdb, mesh (.obj, .ply, .stl), character (.glb, .gltf) and particle files (.bgeo, .vtk, .vtu, .xyz, .ply) hold.
 #[derive(clap::Args)]
@@ -40,9 +40,9 @@ pub fn run(args: Args, session: &Session) -> Result<(), Failure> {
             "vdb" => super::needs_openvdb(path),
             _ if is_gltf(path) => character(path, &args.origin),
             "ply" if io::particles::ply::holds_points(path).is_ok_and(|yes| yes) => {
-                super::cloud::info(path, args.origin.at)
+                super::points::info(path, args.origin.at)
             }
-            _ if super::cloud::is_named(path) => super::cloud::info(path, args.origin.at),
+            _ if super::points::is_named(path) => super::points::info(path, args.origin.at),
             _ => mesh(path, &args.origin),
         };
         all.push(json!({ "file": path.display().to_string(), "holds": holds.before()? }));

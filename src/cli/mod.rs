@@ -1,36 +1,22 @@
 //! The command line: one file per command.
 
 mod check;
-mod cloud;
-mod compare;
-mod compared;
 mod convert;
 mod each;
-mod exit;
 mod info;
-#[cfg(feature = "vdb")]
-mod machine;
 mod mesh;
 mod new;
 mod options;
 mod output;
+mod points;
 mod preview;
-mod progress;
-mod repair;
 mod session;
-mod shallow;
 mod shot;
-mod signals;
-#[cfg(feature = "vdb")]
-mod snow;
-#[cfg(feature = "vdb")]
-mod surface;
-mod usage;
 #[cfg(feature = "vdb")]
 mod vdb;
 
 use clap::{Parser, Subcommand};
-use exit::Failure;
+use session::exit::Failure;
 use session::{Globals, Session};
 use std::process::ExitCode;
 
@@ -55,10 +41,10 @@ enum Command {
     New(new::Args),
     Check(check::Args),
     #[cfg(feature = "vdb")]
-    Snow(snow::Args),
+    Snow(shot::snow::Args),
     #[cfg(feature = "vdb")]
-    Surface(surface::Args),
-    Shallow(shallow::Args),
+    Surface(shot::surface::Args),
+    Shallow(shot::shallow::Args),
     #[cfg(feature = "vdb")]
     Vdb(vdb::Args),
     Mesh(mesh::Args),
@@ -73,10 +59,10 @@ impl Command {
             Self::New(args) => new::run(&args),
             Self::Check(args) => check::run(&args, session),
             #[cfg(feature = "vdb")]
-            Self::Snow(args) => snow::run(&args, session),
+            Self::Snow(args) => shot::snow::run(&args, session),
             #[cfg(feature = "vdb")]
-            Self::Surface(args) => surface::run(&args, session),
-            Self::Shallow(args) => shallow::run(&args, session),
+            Self::Surface(args) => shot::surface::run(&args, session),
+            Self::Shallow(args) => shot::shallow::run(&args, session),
             #[cfg(feature = "vdb")]
             Self::Vdb(args) => vdb::run(args, session),
             Self::Mesh(args) => mesh::run(&args, session),
@@ -90,14 +76,14 @@ impl Command {
 /// Runs the program; nothing that a user can do makes it panic or print a trace.
 pub fn run() -> ExitCode {
     #[cfg(feature = "vdb")]
-    if let Some(code) = frazil::vdb::guard::serve(std::env::args_os().skip(1)) {
+    if let Some(code) = frazil::vdb::reading::guard::serve(std::env::args_os().skip(1)) {
         return code.into();
     }
-    exit::install_panic_hook();
+    session::exit::install_panic_hook();
     let ended = std::panic::catch_unwind(|| {
         let cli = match Cli::try_parse() {
             Ok(cli) => cli,
-            Err(error) => return usage::report(&error),
+            Err(error) => return session::usage::report(&error),
         };
         match Session::start(cli.globals) {
             Ok(session) => {
@@ -107,7 +93,7 @@ pub fn run() -> ExitCode {
             Err(failure) => failure.report(),
         }
     });
-    ended.unwrap_or(exit::FAILED).into()
+    ended.unwrap_or(session::exit::FAILED).into()
 }
 
 /// Says that a file needs what this program was built without.

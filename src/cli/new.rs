@@ -2,8 +2,8 @@
 
 use frazil::scene::{self, reference, template};
 
-use super::exit::{Failure, Phase};
 use super::output;
+use super::session::exit::{Failure, Phase};
 
 /// Print a commented scene to begin with.
 #[derive(clap::Args)]

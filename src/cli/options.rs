@@ -89,6 +89,7 @@ pub fn join_corners(mesh: &mut TriMesh) {
 }
 
 /// Warns of corners of a file's mesh that rounding does not decide.
+#[cfg(feature = "vdb")]
 pub fn warn_of_corners(path: &Path, mesh: &TriMesh) {
     let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
     if let Some(what) = Weld::of(&places, &mesh.triangles).warning() {

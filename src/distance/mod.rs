@@ -3,11 +3,11 @@
 //! Coordinates are integers ([`lattice`]), so that how often a line passes through a surface is decided without rounding
 //! ([`winding`]); distances are found block by block, eight voxels at a time ([`nearest`], [`triangle`]).
 
-pub mod columns;
 pub mod lattice;
 pub mod lists;
 pub mod nearest;
 pub mod region;
+pub mod scanlines;
 pub mod signs;
 pub mod triangle;
 pub mod vectors;

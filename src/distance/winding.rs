@@ -8,10 +8,10 @@
 use rayon::prelude::*;
 
 use super::Face;
-use super::columns::Columns;
 use super::lattice::{Fixed, UNITS, floor};
 use super::lists::Lists;
 use super::region::{Region, each_block, extent};
+use super::scanlines::Columns;
 
 /// The lines along z through the voxels of a region, each with its sorted crossings; only where faces are above or below.
 pub struct Lines {

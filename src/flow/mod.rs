@@ -17,28 +17,21 @@
 // Kernels index several arrays by one lane, row or axis.
 #![allow(clippy::needless_range_loop)]
 
-mod advect;
-mod around;
-mod conserve;
-mod multigrid;
-mod operator;
-mod paths;
-mod pockets;
+mod advection;
+mod outer_grid;
 mod pressure;
-mod room;
+mod scratch;
 mod slip;
 mod solids;
 mod state;
-mod stencil;
 pub mod tiles;
-mod transfer;
 mod vorticity;
 mod window;
 
-pub use advect::Scheme;
-use advect::Way;
-pub use conserve::Keeping;
-pub use paths::FARTHEST;
+pub use advection::advect::Scheme;
+use advection::advect::Way;
+pub use advection::conserve::Keeping;
+pub use advection::paths::FARTHEST;
 pub use pressure::Solved;
 pub use solids::{Faces, Solids};
 pub use state::Kept;
@@ -46,9 +39,9 @@ pub use tiles::{Coord, Field, Tile, Tiles};
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use multigrid::Multigrid;
+use pressure::multigrid::Multigrid;
 use rayon::prelude::*;
-use room::Room;
+use scratch::Room;
 
 /// A velocity, a density and a pressure on sparse tiles.
 #[derive(Debug, Default)]
@@ -87,9 +80,9 @@ impl Flow {
             return Err(Error::argument("the wind is not finite"));
         }
         let cell = cell as f32;
-        let wide = |level: u32| cell * around::WIDER.pow(level) as f32;
-        let mut flow = Self { cell: wide(around::LEVELS), ambient, ..Self::default() };
-        for level in (0..around::LEVELS).rev() {
+        let wide = |level: u32| cell * outer_grid::WIDER.pow(level) as f32;
+        let mut flow = Self { cell: wide(outer_grid::LEVELS), ambient, ..Self::default() };
+        for level in (0..outer_grid::LEVELS).rev() {
             let cell = wide(level);
             flow = Self { cell, ambient, around: Some(Box::new(flow)), ..Self::default() };
         }
@@ -147,7 +140,7 @@ impl Flow {
         room.move_wide(pressure, &from, 0.0);
         room.move_active(density, &from[..tiles.active()], 0.0);
         if let Some(around) = &mut self.around {
-            around.resize(&around::tiles_around(active));
+            around.resize(&outer_grid::tiles_around(active));
         }
         let tiles = std::mem::take(&mut self.tiles);
         self.read_around(&tiles, &old);
@@ -204,7 +197,7 @@ impl Flow {
         let Self { tiles, velocity, density, ambient, around, room, .. } = self;
         let (scale, around) = (dt as f32 / self.cell, around.as_deref());
         let way = Way { ambient: *ambient, scale, scheme, around, keeping };
-        advect::advect(ctx, tiles, (velocity, density), &way, room)
+        advection::advect::advect(ctx, tiles, (velocity, density), &way, room)
     }
 
     /// Makes the velocity free of divergence: what is left, times the cell, is at most `tolerance` times the greatest speed.
@@ -213,7 +206,7 @@ impl Flow {
     /// Cancel; errors of the boundary.
     pub fn project(&mut self, ctx: &Context, boundary: &Boundary<'_>, tolerance: f32) -> Result<Solved> {
         if let Some(mut around) = self.around.take() {
-            around::restrict(self, &mut around);
+            outer_grid::restrict(self, &mut around);
             std::mem::swap(&mut around.room, &mut self.room);
             let solved = around.project(ctx, boundary, tolerance);
             std::mem::swap(&mut around.room, &mut self.room);
@@ -233,8 +226,8 @@ impl Flow {
     }
 
     /// Its velocity at lower faces on an axis, for finer tiles.
-    fn faces(&self, axis: usize) -> around::Reader<'_> {
-        around::Reader {
+    fn faces(&self, axis: usize) -> outer_grid::Reader<'_> {
+        outer_grid::Reader {
             tiles: &self.tiles,
             field: &self.velocity[axis],
             axis: Some(axis),
@@ -244,13 +237,13 @@ impl Flow {
 
     /// Takes the pressure in the rim from the air around.
     fn press(&mut self, around: &Self) {
-        let wide = around::continued(&around.multigrid.finest, &around.pressure);
-        let reader = around::Reader { tiles: &around.tiles, field: &wide, axis: None, outside: 0.0 };
+        let wide = outer_grid::continued(&around.multigrid.finest, &around.pressure);
+        let reader = outer_grid::Reader { tiles: &around.tiles, field: &wide, axis: None, outside: 0.0 };
         let (tiles, active) = (&self.tiles, self.tiles.active());
         let rim = self.pressure[active..].par_iter_mut().enumerate().with_min_len(4);
         rim.for_each_init(window::Window::default, |window, (index, tile)| {
             *tile = reader.read(window, tiles.coords()[active + index]);
-            tile.iter_mut().for_each(|pressure| *pressure *= around::WIDER as f32);
+            tile.iter_mut().for_each(|pressure| *pressure *= outer_grid::WIDER as f32);
         });
     }
 

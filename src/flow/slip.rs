@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::operator::Operator;
+use super::pressure::operator::Operator;
 use super::solids::Solids;
 use super::tiles::{FACES, Field, NONE, Tile, Tiles};
 

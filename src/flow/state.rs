@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::Flow;
-use super::room::first;
+use super::scratch::first;
 use super::tiles::{Coord, Field, Tile, Tiles};
 use crate::error::{Error, Result};
 use crate::numeric::bytes::{Reader, Writer};

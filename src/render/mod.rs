@@ -13,28 +13,27 @@
 //! ```
 
 mod camera;
-mod cloud;
 mod cut;
 pub mod fog;
 mod gif;
 mod liquid;
 mod model;
 mod models;
-mod palette;
 mod picture;
 mod ramp;
 mod shade;
-mod shadows;
+mod sphere_shadows;
+mod spheres;
 #[cfg(feature = "vdb")]
 mod volume;
 
 pub use camera::{Camera, Size};
-pub use cloud::Cloud;
 pub use cut::{Cut, Field, Plane};
 pub use fog::Fog;
+pub use gif::palette::Palette;
 pub use gif::{Gif, delays};
 pub use model::Model;
 pub use models::Models;
-pub use palette::Palette;
 pub use picture::Picture;
 pub use shade::{Light, SNOW};
+pub use spheres::Cloud;

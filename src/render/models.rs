@@ -1,13 +1,13 @@
 //! Everything that is in the picture, and the drawing of it.
 
 use super::camera::{Camera, Lens, Size};
-use super::cloud::{Cloud, Splats};
 use super::fog::{Fog, LitFogs, Veil};
 use super::liquid::{MOST_FILMS, wet};
 use super::model::{Hit, Model};
 use super::picture::Picture;
 use super::shade::{Colour, Light, shade, to_bytes};
-use super::shadows::Shadows;
+use super::sphere_shadows::Shadows;
+use super::spheres::{Cloud, Splats};
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::DVec3;

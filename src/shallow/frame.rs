@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::clock::Clock;
 use super::params::Pace;
-use super::solver::bands::attended;
+use super::solver::rows::bands::attended;
 use super::solver::stop::Stop;
 use super::system::{Report, Shallow};
 use super::time_step;

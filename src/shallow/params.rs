@@ -3,7 +3,7 @@
 use super::free_fall::Falls;
 use super::material::Liquid;
 use super::pipes::Border;
-use super::thickening::Thickening;
+use super::solver::viscosity_by_scalar::Thickening;
 use crate::error::{Error, Result};
 
 /// Parameters of the flow.

@@ -1,21 +1,21 @@
 //! The liquid of a domain, frame by frame.
 
 use super::columns::Columns;
+use super::columns::grid::BOTTOMLESS;
 use super::frame::Kept;
 use super::free_fall::Falling;
-use super::grid::BOTTOMLESS;
-use super::identity::Identity;
 use super::params::{Friction, Params, Section};
-use super::pipes::rules::{Apart, Rules};
+use super::pipes::pipe_rules::{Apart, Rules};
 use super::pipes::{Border, Pipes};
 use super::remap::Remap;
 use super::scalars::amounts::Account;
 use super::solver::Flow;
 use super::solver::overflow_edges::Lips;
 use super::solver::stop::Stop;
+use super::solver::viscosity_by_scalar::Thick;
 use super::sources::{FlowPoint, Flows};
 use super::terrain::Solids;
-use super::thickening::Thick;
+use super::terrain::identity::Identity;
 use super::time_step;
 use super::time_step::{Measures, Next};
 use crate::context::Context;

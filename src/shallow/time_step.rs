@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::grid::TOP;
+use super::columns::grid::TOP;
 use super::params::{Friction, Pace, Params, Section};
 use super::solver::fast_films::FAST_WAVES;
 use super::solver::flux::{Step, Thinning};

@@ -9,6 +9,6 @@ pub mod grains;
 pub mod mist;
 mod noise;
 #[cfg(feature = "vdb")]
-pub mod volumes;
+pub mod render_volumes;
 
 pub use noise::NoiseParams;

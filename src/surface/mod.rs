@@ -27,15 +27,14 @@
 // Kernels index several arrays by one lane or axis.
 #![allow(clippy::needless_range_loop)]
 
-#[cfg(test)]
-pub(crate) mod balls;
 mod level_set;
 mod params;
 mod particles;
 mod remesh;
-mod repair;
 mod report;
 mod state;
+#[cfg(test)]
+pub(crate) mod test_particles;
 mod topology;
 mod track;
 mod tracker;
@@ -45,7 +44,6 @@ pub use level_set::band::Distances;
 pub use level_set::implicit::Implicit;
 pub use level_set::isosurface::Isosurface;
 #[doc(hidden)]
-pub use level_set::marching_cubes::cases as cube_cases;
 #[cfg(feature = "vdb")]
 pub use level_set::openvdb::{HALF_WIDTH, level_set};
 pub use level_set::sampler::Sampler;
@@ -61,9 +59,6 @@ pub use particles::spacing::{estimate as estimate_spacing, rough as rough_spacin
 pub use particles::specks::specks;
 pub use particles::transfer::transfer;
 pub use remesh::Improvements;
-pub use repair::{
-    Losses, Prepared, RepairReport, Repaired, Source, Traced, carried as carry_attributes, repair,
-};
 pub use report::StepReport;
 pub use topology::change::Change;
 pub use topology::matching::{Matched, Matching, Node, Solver, match_topology};

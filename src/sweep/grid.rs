@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::chain::Window;
-use super::voxelise::{ALL, Band, Piece, Scratch, Voxeliser};
+use super::signed_distance::voxelise::{ALL, Band, Piece, Scratch, Voxeliser};
 use super::{Body, Settings};
 use crate::context::Context;
 use crate::distance::Face;

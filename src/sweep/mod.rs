@@ -1,10 +1,10 @@
 //! The volume that moving meshes sweep in an interval of time.
 //!
 //! [`chain`] is exact up to a tolerance: signed space-time tetrahedra (`chain.rs`), poses dense enough
-//! for arcs (`body.rs`), edges split where their ends move differently (`refine.rs`), order in time where a skin folds
-//! inside out (`folds.rs`, `passages.rs`), winding numbers from exact line crossings (room `distance`, `exposure.rs`), the
-//! parts of faces that bound the volume (`bins.rs`, `facets.rs`; `patch.rs` where many sheets nearly coincide), then
-//! exact distances in the narrow band (room `distance`, `depth.rs`, `voxelise.rs`).
+//! for arcs (`moving_mesh/body.rs`), edges split where their ends move differently (`moving_mesh/refine.rs`), order in time where a skin folds
+//! inside out (`chain/folds.rs`, `moving_mesh/passages.rs`), winding numbers from exact line crossings (room `distance`, `signed_distance/exposure.rs`), the
+//! parts of faces that bound the volume (`signed_distance/bins.rs`, `chain/facets.rs`; `chain/patch.rs` where many sheets nearly coincide), then
+//! exact distances in the narrow band (room `distance`, `signed_distance/depth.rs`, `signed_distance/voxelise.rs`).
 //! [`samples`] is the thesis' method (section 3.2): the union of N + 1 poses, dilated and smoothed.
 //!
 //! # Glossary
@@ -28,38 +28,24 @@
 //! | patch | a piece of the plane of an exposed face, around a spot |
 //! | passage | a tetrahedron through which the surface passes in a step |
 
-mod bins;
-mod body;
 mod chain;
-mod depth;
-mod exposure;
-mod facets;
-mod folds;
-mod passages;
-mod patch;
-mod prism;
-mod refine;
+mod moving_mesh;
 #[cfg(feature = "vdb")]
 mod samples;
-mod topology;
-mod voxelise;
+mod signed_distance;
 
 pub use crate::distance::lattice::{REACH, too_far};
-pub use body::{Body, Shape};
+pub use moving_mesh::body::{Body, Shape};
 #[cfg(feature = "vdb")]
 pub use samples::{SamplesSettings, samples};
 
 // For the rooms above, tests and benchmarks.
 #[doc(hidden)]
-pub use {
-    crate::distance::{
-        Face,
-        lattice::{Fixed, Lattice, UNITS},
-    },
-    chain::{Weights, Window, boundary},
-    topology::Topology,
-    voxelise::{ALL, Band, Piece, Scratch, Voxeliser},
-};
+pub use crate::distance::Face;
+pub use crate::distance::lattice::{Fixed, Lattice, UNITS};
+pub use chain::{Weights, Window, boundary};
+pub use moving_mesh::topology::Topology;
+pub use signed_distance::voxelise::{ALL, Band, Piece, Scratch, Voxeliser};
 
 use crate::error::{Error, Result};
 

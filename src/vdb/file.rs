@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use super::bridge::ffi;
+use super::distances;
 use super::grid::{FloatGrid, GridClass, MetaValue, to_meta};
+use super::reading::{decode, guard, layout};
 use super::vectors::{AnyGrid, GridRef};
-use super::{decode, distances, guard, layout};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::files::hash::Hasher;

@@ -4,20 +4,13 @@
 //! (i, j, k) has its centre at (i, j, k) x voxel size, unless a file has another transform.
 
 mod bridge;
-mod child;
-mod decode;
 pub mod distances;
 pub mod file;
 mod grid;
-pub mod guard;
-#[doc(hidden)]
-pub mod layout;
 mod leaf;
 pub mod level_set;
-mod mapping;
-mod parcel;
-mod parcel_points;
 pub mod points;
+pub mod reading;
 mod refusal;
 mod vectors;
 

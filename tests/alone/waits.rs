@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use crate::program::{CUBE, answer_to_sigterm, command, complains, works};
 use crate::turn;
 use frazil::geometry::{TriMesh, Vec3};
-use frazil::vdb::guard::Guard;
+use frazil::vdb::reading::guard::Guard;
 
 /// The most that an answer may take (a second is promised; the machine may be busy). Work that is left to notice the signal
 /// by itself takes up to 2.3 s here.

@@ -1,7 +1,7 @@
 //! What is solid on vertical lines, decided exactly: the winding number from triangles by whole numbers as large as it takes.
 
 use frazil::geometry::{DVec3, TriMesh, Vec3};
-use frazil::shallow::grid::{BOTTOMLESS, Heights, TOP};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Heights, TOP};
 use frazil::shallow::terrain::solids::Solid;
 
 use super::bodies::{self, Dice};

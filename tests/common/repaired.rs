@@ -12,7 +12,7 @@ use frazil::geometry::check::topology::Topology;
 use frazil::geometry::mesh::spacing;
 use frazil::geometry::spatial::bvh::Bvh;
 use frazil::geometry::{DVec3, TriMesh};
-use frazil::surface::{Repaired, Source, repair};
+use frazil::mesh_repair::{Repaired, Source, repair};
 use frazil::{Context, Pool};
 
 use super::bodies::Dice;

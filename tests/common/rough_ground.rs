@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use frazil::geometry::Vec3;
 use frazil::shallow::columns::Columns;
-use frazil::shallow::grid::{Grid, Heights};
+use frazil::shallow::columns::grid::{Grid, Heights};
 use frazil::shallow::terrain::triangles;
 
 use super::bodies::Dice;

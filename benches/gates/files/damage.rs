@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use frazil::io::mesh;
 use frazil::motion::{Character, Motion, Play};
 use frazil::vdb::file::{Compression, WriteOptions, to_bytes};
-use frazil::vdb::guard::Guard;
+use frazil::vdb::reading::guard::Guard;
 use frazil::vdb::{MetaValue, file, level_set};
 
 use crate::common::{character, hero, shapes};

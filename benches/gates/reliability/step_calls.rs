@@ -5,9 +5,9 @@ use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use frazil::capi::frz_status::*;
-use frazil::capi::shallow::flows::*;
 use frazil::capi::shallow::liquid::*;
 use frazil::capi::shallow::params::*;
+use frazil::capi::shallow::sources::*;
 use frazil::capi::shallow::terrain::*;
 use frazil::capi::shallow_two_level::ground::*;
 use frazil::capi::shallow_two_level::liquid::*;

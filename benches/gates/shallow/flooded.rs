@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use frazil::Context;
-use frazil::shallow::grid::{BOTTOMLESS, Grid};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};

@@ -1,7 +1,7 @@
 //! Ground and liquid of the gates that compare shallow liquids with theory.
 
 use frazil::Context;
-use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::terrain::Solids;

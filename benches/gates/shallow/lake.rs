@@ -4,7 +4,7 @@
 //! its viscosity and the slope. So the speed of a disturbed lake is that of its columns over 1 mm.
 
 use frazil::Context;
-use frazil::shallow::grid::{BOTTOMLESS, Grid};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 

@@ -7,7 +7,7 @@ use frazil::shallow::Shallow;
 use frazil::shallow::columns::{Columns, NONE};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Params;
-use frazil::shallow::surface::minimum_heights::{Distance, Fitted, Lifts};
+use frazil::shallow::surface::heights::minimum_heights::{Distance, Fitted, Lifts};
 use frazil::shallow::surface::{Depths, Indices, Layout, Surface, Target, bound};
 
 use crate::common::bodies::Dice;

@@ -3,7 +3,7 @@
 use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::Shallow;
 use frazil::shallow::columns::{Columns, NONE};
-use frazil::shallow::surface::ledges::Ledges;
+use frazil::shallow::surface::rim::ledges::Ledges;
 use frazil::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target, bound, check};
 
 use crate::common::bodies::Dice;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use frazil::geometry::{TriMesh, Vec3};
 use frazil::numeric::cpu::cpu_level;
-use frazil::shallow::grid::{Grid, Heights};
+use frazil::shallow::columns::grid::{Grid, Heights};
 use frazil::shallow::terrain::triangles::{self, Caster};
 use frazil::shallow::{Params, Shallow};
 

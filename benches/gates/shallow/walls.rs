@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use frazil::Context;
 use frazil::numeric::cpu::cpu_level;
-use frazil::shallow::grid::{BOTTOMLESS, Grid};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid};
 use frazil::shallow::params::{Friction, Pace};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};

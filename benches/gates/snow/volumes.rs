@@ -7,7 +7,7 @@ use frazil::Context;
 use frazil::geometry::DVec3;
 use frazil::snow::base_layer::BaseLayer;
 use frazil::snow::grains::Grains;
-use frazil::snow::volumes::{fog, united};
+use frazil::snow::render_volumes::{fog, united};
 use frazil::vdb::FloatGrid;
 
 use crate::harness::Harness;

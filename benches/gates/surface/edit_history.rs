@@ -1,6 +1,7 @@
 //! What became of the vertices and triangles that a mesh had, by what its changes say of themselves.
 
-use frazil::surface::{Change, Source};
+use frazil::mesh_repair::Source;
+use frazil::surface::Change;
 
 /// Which of a mesh's first vertices and triangles those of now are.
 pub struct History {

@@ -8,8 +8,8 @@ use frazil::geometry::points::{Column, Points, Values};
 use frazil::io::mesh::extension;
 use frazil::io::particles::{self, Cloud};
 use frazil::vdb::file::{Compression, WriteOptions};
-use frazil::vdb::guard::Guard;
 use frazil::vdb::points::to_bytes;
+use frazil::vdb::reading::guard::Guard;
 use rayon::prelude::*;
 
 use crate::common::caches::{IDS, PLACES, VELOCITIES, samples};

@@ -4,7 +4,8 @@
 use frazil::Context;
 use frazil::geometry::check::topology::Topology;
 use frazil::geometry::{DVec3, TriMesh};
-use frazil::surface::{Change, Distances, Implicit, Isosurface, Sampler, Source};
+use frazil::mesh_repair::Source;
+use frazil::surface::{Change, Distances, Implicit, Isosurface, Sampler};
 
 use crate::common::liquids::{context, own_surface};
 use crate::harness::Harness;

@@ -5,7 +5,8 @@ use std::time::Instant;
 
 use frazil::Context;
 use frazil::geometry::{DVec3, TriMesh};
-use frazil::surface::{Params, Particles, Source, StepReport, Tracker};
+use frazil::mesh_repair::Source;
+use frazil::surface::{Params, Particles, StepReport, Tracker};
 
 use crate::common::liquids::{Ball, ball, context, numbered};
 use crate::common::shapes::welded;

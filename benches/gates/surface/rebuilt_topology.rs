@@ -4,7 +4,8 @@
 use frazil::geometry::check::topology::bodies;
 use frazil::geometry::mesh::attributes::{Number, On};
 use frazil::geometry::{DetailedMesh, MeshArray, TriMesh};
-use frazil::surface::{Change, carry_attributes};
+use frazil::mesh_repair::carry_attributes;
+use frazil::surface::Change;
 
 use crate::common::liquids::{context, own_surface};
 use crate::harness::Harness;

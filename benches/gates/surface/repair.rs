@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use frazil::surface::cube_cases;
+use frazil::geometry::marching_cubes::cases as cube_cases;
 
 use crate::common::bodies::models;
 use crate::common::repaired::failures;

@@ -6,7 +6,8 @@
 
 use frazil::geometry::check::deviation::NearestTree;
 use frazil::geometry::{DVec3, DetailedMesh, TriMesh, Uvs, Vec3};
-use frazil::surface::{Change, Rest, Source, Traced, carry_attributes};
+use frazil::mesh_repair::{Source, Traced, carry_attributes};
+use frazil::surface::{Change, Rest};
 
 use crate::common::liquids::context;
 use crate::harness::Harness;

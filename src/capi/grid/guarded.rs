@@ -7,7 +7,7 @@ use super::sparse::frz_grid;
 use crate::capi::ffi::guard::frz_status;
 use crate::capi::ffi::views::required_text;
 use crate::capi::runtime::context::frz_context;
-use crate::vdb::guard::Guard;
+use crate::vdb::reading::guard::Guard;
 
 /// Reads a grid of floats or of vectors from a .vdb file that may be damaged, as frz_grid_load does, but in another process.
 ///

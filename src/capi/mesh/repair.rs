@@ -8,7 +8,7 @@ use crate::capi::runtime::context::{enter, frz_context};
 use crate::context::Context;
 use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{DetailedMesh, MeshArray};
-use crate::surface::{RepairReport, Repaired, carry_attributes, repair};
+use crate::mesh_repair::{RepairReport, Repaired, carry_attributes, repair};
 
 /// What frz_mesh_repair did.
 #[repr(C)]

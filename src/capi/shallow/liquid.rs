@@ -1,9 +1,9 @@
 //! Small amounts of liquid on a terrain, in real time.
 
-use super::flows::Attached;
-use super::ledges::Ledged;
-use super::lifts::Lifted;
 use super::params::{domain, frz_shallow_domain, frz_shallow_params, params};
+use super::sources::Attached;
+use super::surface::ledges::Ledged;
+use super::surface::minimum_heights::Lifted;
 use super::terrain::Terrain;
 use crate::capi::ffi::guard::{Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{Noun, change, destroy, read, required};

@@ -5,7 +5,7 @@ pub mod params;
 
 pub mod liquid;
 
-pub mod flows;
+pub mod sources;
 
 pub mod terrain;
 
@@ -14,10 +14,6 @@ pub mod read;
 pub mod state;
 
 pub mod surface;
-
-pub mod ledges;
-
-pub mod lifts;
 
 pub mod scalars;
 

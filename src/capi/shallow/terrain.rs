@@ -11,7 +11,7 @@ use crate::capi::runtime::context::{enter_light, frz_context};
 use crate::context::Context;
 use crate::geometry::{DVec3, TriMesh, Vec3};
 use crate::shallow::Moved;
-use crate::shallow::grid::{BOTTOMLESS, Grid, Heights};
+use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use crate::shallow::terrain::facing::facing;
 #[cfg(feature = "vdb")]
 use crate::shallow::terrain::sampler;

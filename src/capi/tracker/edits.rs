@@ -5,7 +5,8 @@ use crate::capi::ffi::guard::{frz_status, guard};
 use crate::capi::ffi::handle::{clear, read, required};
 use crate::capi::ffi::views::{frz_span, meaning};
 use crate::geometry::DVec3;
-use crate::surface::{Change, Source};
+use crate::mesh_repair::Source;
+use crate::surface::Change;
 
 /// What a step made of the mesh.
 pub(in crate::capi) struct Edits {

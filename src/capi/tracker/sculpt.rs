@@ -6,7 +6,8 @@ use crate::capi::ffi::guard::{frz_status, guard};
 use crate::capi::ffi::handle::{change, read};
 use crate::capi::mesh::triangles::frz_mesh;
 use crate::capi::runtime::context::{enter, frz_context};
-use crate::surface::{Outlook, Source};
+use crate::mesh_repair::Source;
+use crate::surface::Outlook;
 
 /// Puts an edited mesh in the place of the tracker's: an artist's change in the middle of a shot. How far each of its vertices is from
 /// the particles' surface is measured anew, and kept from there on. After a failure or a cancel the tracker is as it was.

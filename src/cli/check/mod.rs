@@ -1,10 +1,10 @@
 //! `frazil check`: every input of every frame, before a night on the farm; every file of a folder after it.
 
-#[cfg(feature = "vdb")]
-mod liquid;
-#[cfg(feature = "vdb")]
-mod scene;
 mod shallow;
+#[cfg(feature = "vdb")]
+mod snow;
+#[cfg(feature = "vdb")]
+mod surface;
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -12,9 +12,9 @@ use std::path::PathBuf;
 use frazil::scene::run::verify::{Verified, verify};
 use frazil::scene::{Override, Scene, System};
 
-use super::exit::{Failure, Phase};
 use super::output;
 use super::session::Session;
+use super::session::exit::{Failure, Phase};
 
 /// Read every input of every frame of a scene, and print its sizes, memory and disk; nothing is computed.
 ///
@@ -45,7 +45,7 @@ impl Args {
     fn free_space(&self) -> Option<u64> {
         let absolute = std::path::absolute(self.output.as_deref()?).ok()?;
         let there = absolute.ancestors().find(|folder| folder.exists())?;
-        super::machine::free_space(there)
+        super::session::machine::free_space(there)
     }
 
     /// Not known.
@@ -65,7 +65,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return shallow::run(args, session, &scene);
     }
     #[cfg(feature = "vdb")]
-    return scene::run(args, session, scene);
+    return snow::run(args, session, scene);
     #[cfg(not(feature = "vdb"))]
     super::needs_openvdb(&args.scene).before()
 }

@@ -6,9 +6,9 @@ use frazil::scene::Scene;
 use frazil::scene::shallow::{Inputs, Report, check};
 
 use super::{Args, size};
-use crate::cli::exit::{Failure, Phase};
 use crate::cli::output;
 use crate::cli::session::Session;
+use crate::cli::session::exit::{Failure, Phase};
 
 /// Checks the scene.
 pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure> {

@@ -10,7 +10,7 @@ use frazil::{Context, Error, Result};
 
 use super::sources::{Part, Wet};
 use super::tint::Tint;
-use crate::cli::exit::Failure;
+use crate::cli::session::exit::Failure;
 
 /// The colour of meshes (linear red, green, blue): leather, which snow is seen beside.
 const BROWN: [f32; 3] = [0.35, 0.16, 0.08];

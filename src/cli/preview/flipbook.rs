@@ -11,9 +11,9 @@ use super::drawing::{Drawing, Look, View};
 use super::in_order::in_order;
 use super::sources::{Part, Sources};
 use crate::cli::each::Each;
-use crate::cli::exit::{Failure, Phase};
-use crate::cli::progress::FrameProgress;
 use crate::cli::session::Session;
+use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::shot::progress::FrameProgress;
 
 /// Most frames that are made at once: each holds its snow as triangles, and a limit of memory holds for each of them.
 const MOST_AT_ONCE: usize = 4;

@@ -18,8 +18,8 @@ use frazil::io::mesh::extension;
 use frazil::render::{Camera, Light, Plane, Size};
 use frazil::scene::FrameChoice;
 
-use super::exit::{Failure, Phase};
 use super::session::Session;
+use super::session::exit::{Failure, Phase};
 use super::{options, output};
 use drawing::Look;
 use flipbook::Flipbook;

@@ -236,7 +236,7 @@ fn of_file(path: &Path, clip: Option<&str>, frame: Option<f64>, fps: f64) -> Res
         #[cfg(not(feature = "vdb"))]
         "vdb" => return crate::cli::needs_openvdb(path),
         "ply" if io::particles::ply::holds_points(path)? => return Ok(vec![points_of(path)?]),
-        _ if crate::cli::cloud::is_named(path) => return Ok(vec![points_of(path)?]),
+        _ if crate::cli::points::is_named(path) => return Ok(vec![points_of(path)?]),
         _ if is_gltf(path) && clip.is_none() && frame.is_none() => bare(Character::at_rest(path)?),
         _ if is_gltf(path) => {
             let play = Play { clip: clip.map(String::from), ..Play::default() };

@@ -1,8 +1,8 @@
 //! `frazil vdb union`, `difference`, `intersection`.
 
 use super::VdbOutput;
-use crate::cli::exit::{Failure, Phase};
 use crate::cli::session::Session;
+use crate::cli::session::exit::{Failure, Phase};
 use frazil::vdb::{FloatGrid, file, level_set};
 use frazil::{Context, Result};
 use std::path::PathBuf;

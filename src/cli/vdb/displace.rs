@@ -1,8 +1,8 @@
 //! `frazil vdb displace`.
 
 use super::VdbOutput;
-use crate::cli::exit::{Failure, Phase};
 use crate::cli::session::Session;
+use crate::cli::session::exit::{Failure, Phase};
 use frazil::snow::NoiseParams;
 use frazil::snow::base_layer::displace;
 use frazil::vdb::file;

@@ -1,9 +1,9 @@
 //! `frazil vdb offset` and `smooth`.
 
 use super::VdbOutput;
-use crate::cli::exit::{Failure, Phase};
 use crate::cli::options::finite;
 use crate::cli::session::Session;
+use crate::cli::session::exit::{Failure, Phase};
 use clap::ValueEnum;
 use frazil::vdb::file;
 use frazil::vdb::level_set::{self, Scheme};

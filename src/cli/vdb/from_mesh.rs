@@ -1,9 +1,9 @@
 //! `frazil vdb from-mesh`.
 
 use super::VdbOutput;
-use crate::cli::exit::{Failure, Phase};
 use crate::cli::options::{MeshSpace, positive, warn_of_corners};
 use crate::cli::session::Session;
+use crate::cli::session::exit::{Failure, Phase};
 use frazil::motion::{Keys, Rigid};
 use frazil::sweep::{self, Body, Settings};
 use std::path::PathBuf;

@@ -11,9 +11,9 @@ mod rebuild;
 mod sweep;
 mod to_mesh;
 
-use super::exit::{Failure, Phase};
 use super::output;
 use super::session::Session;
+use super::session::exit::{Failure, Phase};
 use clap::{Subcommand, ValueEnum};
 use frazil::geometry::TriMesh;
 use frazil::geometry::mesh::{BY_OPTION, too_far};

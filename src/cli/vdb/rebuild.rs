@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use super::{Packing, check_name};
-use crate::cli::exit::{Failure, Phase};
 use crate::cli::output;
 use crate::cli::session::Session;
+use crate::cli::session::exit::{Failure, Phase};
 use frazil::io::files::atomic;
 use frazil::io::files::sequence::Pattern;
 use frazil::scene::{FrameChoice, Rebuild, RebuildGrains};

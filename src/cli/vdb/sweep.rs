@@ -1,9 +1,9 @@
 //! `frazil vdb sweep`.
 
 use super::VdbOutput;
-use crate::cli::exit::{Failure, Phase};
 use crate::cli::options::{MeshSpace, Origin, positive, triple};
 use crate::cli::session::Session;
+use crate::cli::session::exit::{Failure, Phase};
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::io::files::sequence::Pattern;
 use frazil::motion::{Key, Keys, MeshSequence, Morph, Motion, Placed, Rigid};

@@ -1,10 +1,10 @@
 //! `frazil vdb to-mesh`.
 
 use super::check_name;
-use crate::cli::exit::{Failure, Phase};
 use crate::cli::options::finite;
 use crate::cli::output;
 use crate::cli::session::Session;
+use crate::cli::session::exit::{Failure, Phase};
 use frazil::vdb::{file, level_set};
 use serde_json::json;
 use std::path::PathBuf;

@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::estimate::{disk, memory};
 use super::inputs::area;
-use super::liquid_over_time::Course;
-use super::{Inputs, ML, Shallow, disk, memory};
+use super::stage::liquid_over_time::Course;
+use super::{Inputs, ML, Shallow};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::scene::{Scene, Value};
 use crate::shallow::Law;
-use crate::shallow::grid::TOP;
+use crate::shallow::columns::grid::TOP;
 use crate::shallow::pipes::Border;
 use crate::shallow::sources::Kind;
 

@@ -2,34 +2,21 @@
 //! ([`Inputs`]), what a check says of it ([`check`]), memory and disk space that it takes among it, the stage `liquid` (`stage.rs`), and
 //! what a picture of it shows besides ([`Around`]).
 
-mod attached;
 mod check;
-mod disk;
+mod estimate;
 mod inputs;
 mod keys;
-mod liquid_over_time;
-mod memory;
-mod mesh;
-mod obstacles;
 mod plan;
-mod points;
-mod pours;
-mod rules;
-mod saved_liquid;
-mod scalars;
 mod stage;
 mod surroundings;
-mod terrain;
-#[cfg(feature = "vdb")]
-mod volume;
 
 use std::path::{Path, PathBuf};
 
 pub use check::{Report, check};
 pub use inputs::Inputs;
+pub use inputs::scalars::Carried;
 pub(super) use keys::{KEYS, MANY_KEYS};
 pub use plan::plan;
-pub use scalars::Carried;
 pub use surroundings::Around;
 
 use super::schema::{Value, Values};
@@ -207,7 +194,7 @@ impl Shallow {
             points: Point::all_of(values),
             obstacles: (0..values.count("object")).filter_map(|index| Obstacle::of(values, index)).collect(),
             staining: value("stains").and_then(Value::flag).filter(|stains| *stains).map(|_| Staining {
-                scalar: scalars::staining(values),
+                scalar: inputs::scalars::staining(values),
                 half_life: values.settled("shallow", None, "stain_half_life"),
                 ..Staining::default()
             }),
@@ -251,7 +238,7 @@ impl Pour {
             radius: number("radius"),
             volume: number("volume_ml") * ML,
             frame: value("frame").and_then(Value::whole).map(|frame| frame as i32),
-            carries: scalars::brought(values, "pour", index),
+            carries: inputs::scalars::brought(values, "pour", index),
         }
     }
 }
@@ -284,7 +271,7 @@ impl Point {
             pulse: (frequency > 0.0 && share > 0.0).then_some(sources::Pulse { frequency, share }),
         };
         let follows = values.settled(table, Some(index), "follows");
-        let carries = scalars::brought(values, table, index);
+        let carries = inputs::scalars::brought(values, table, index);
         Self { name: (table, index), point, carries, follows, from: frame("from"), until: frame("until") }
     }
 
@@ -355,7 +342,7 @@ fn params(values: &Values) -> Params {
         },
         section: Section::default(),
         friction: if text("friction") == Some("walls") { Friction::Walls } else { Friction::Ground },
-        thickening: scalars::thickening(values),
+        thickening: inputs::scalars::thickening(values),
         falls: value("falls").and_then(Value::flag).filter(|falls| *falls).map(|_| Falls {
             height: values.settled("shallow", None, "falls_height"),
             interval: values.settled("shallow", None, "falls_interval"),

@@ -1,7 +1,7 @@
 //! What a picture of a liquid shows besides it: the terrain, and what stands or moves on it.
 
-use super::obstacles;
-use super::terrain::Terrain;
+use super::inputs::obstacles;
+use super::inputs::terrain::Terrain;
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::TriMesh;

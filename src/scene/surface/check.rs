@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::Inputs;
-use super::disk::FrameSize;
+use super::estimate::disk::FrameSize;
+use super::estimate::memory::Most;
 use super::inputs::all_files;
-use super::memory::Most;
-use super::time::read;
+use super::inputs::particle_times::read;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;

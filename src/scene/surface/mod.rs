@@ -3,29 +3,14 @@
 
 #[cfg(feature = "vdb")]
 mod check;
-#[cfg(feature = "vdb")]
-mod disk;
-#[cfg(feature = "vdb")]
-mod frame_report;
+mod estimate;
 #[cfg(feature = "vdb")]
 mod inputs;
 mod keys;
 #[cfg(feature = "vdb")]
-mod memory;
-#[cfg(feature = "vdb")]
 mod plan;
 #[cfg(feature = "vdb")]
-mod saved_arrays;
-#[cfg(feature = "vdb")]
-mod sculpts;
-#[cfg(feature = "vdb")]
-mod time;
-#[cfg(feature = "vdb")]
 mod track;
-#[cfg(feature = "vdb")]
-mod tracked_shot;
-#[cfg(feature = "vdb")]
-mod vertex_paths;
 
 use std::path::PathBuf;
 

@@ -184,7 +184,7 @@ fn reach(distance: f64, speed: f64, pull: f64) -> f64 {
 mod tests {
     use super::*;
 
-    use crate::shallow::grid::{BOTTOMLESS, Grid, Heights};
+    use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
     use crate::shallow::terrain::Solids;
 
     /// Cells of a millimetre; so many units in a metre.

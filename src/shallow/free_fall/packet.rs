@@ -1,7 +1,7 @@
 //! A packet of liquid in the air.
 
 use crate::shallow::columns::Columns;
-use crate::shallow::grid::TOP;
+use crate::shallow::columns::grid::TOP;
 use crate::shallow::scalars::MOST;
 
 /// Bytes of a packet in a saved state.

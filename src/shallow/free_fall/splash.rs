@@ -93,7 +93,7 @@ fn around(columns: &Columns, landing: &Landing, mut with: impl FnMut(u32)) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shallow::grid::{BOTTOMLESS, Grid, Heights};
+    use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
     use crate::shallow::terrain::Solids;
 
     #[test]

@@ -5,11 +5,11 @@
 use std::ops::Range;
 
 use super::cliffs::beside;
-use super::rules::Rules;
+use super::pipe_rules::Rules;
 use super::slopes::{self, Rises};
+use crate::shallow::columns::stacks::Stacks;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
 use crate::shallow::pipes::{Border, Links};
-use crate::shallow::stacks::Stacks;
 
 /// A side of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,15 +6,15 @@
 
 pub(super) mod cliffs;
 pub(super) mod joints;
-pub(super) mod rules;
+pub(in crate::shallow) mod pipe_rules;
 mod slopes;
 
 use std::ops::Range;
 
+use super::columns::per_column::{Array, PerColumn};
 use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
-use crate::shallow::per_column::{Array, PerColumn};
 use joints::{Finder, Side};
-use rules::Rules;
+use pipe_rules::Rules;
 
 /// What lies beyond the border of the domain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -222,8 +222,8 @@ impl Links {
 
 #[cfg(test)]
 mod tests {
+    use super::super::columns::grid::{BOTTOMLESS, Grid, Heights};
     use super::*;
-    use crate::shallow::grid::{BOTTOMLESS, Grid, Heights};
     use crate::shallow::terrain::Solids;
 
     fn columns(size: [usize; 2], cell: impl Fn([usize; 2]) -> Vec<[i32; 2]>) -> Columns {

@@ -3,7 +3,7 @@
 //! A column that was there before keeps its liquid, on its base that rises or sinks. What has no room there is pushed up, into the next
 //! column with room; so is the liquid of a column that is gone, from where it stood. What finds no room above goes down.
 
-use crate::shallow::grid::BOTTOMLESS;
+use crate::shallow::columns::grid::BOTTOMLESS;
 use crate::shallow::scalars::MOST;
 use crate::shallow::scalars::shares::take;
 
@@ -188,7 +188,7 @@ pub(super) fn dry(index: usize, base: i32, ceiling: i32) -> New {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shallow::grid::TOP;
+    use crate::shallow::columns::grid::TOP;
 
     /// Remaps columns of (base, depth) to such of [base, ceiling]; returns the depths and what is left.
     fn remap(old: &[(i32, i32)], new: &[[i32; 2]]) -> (Vec<i32>, Rest) {

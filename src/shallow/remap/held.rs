@@ -3,7 +3,7 @@
 //! Shares are whole units that depend on no order, so that a mirrored scene gets the mirrored shares.
 
 use crate::shallow::columns::Columns;
-use crate::shallow::grid::BOTTOMLESS;
+use crate::shallow::columns::grid::BOTTOMLESS;
 use crate::shallow::scalars::MOST;
 use crate::shallow::scalars::amounts::Account;
 use crate::shallow::scalars::shares::{part, take};

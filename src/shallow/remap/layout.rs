@@ -5,10 +5,10 @@ use super::cells::{Cell, Old, dry};
 use super::dirty::Dirty;
 use super::held::Held;
 use super::origins::Origins;
+use crate::shallow::columns::grid::{BOTTOMLESS, TOP};
+use crate::shallow::columns::stacks::Stacks;
 use crate::shallow::columns::{Columns, NONE, STRIP, Strip, strip_mut, strip_of};
-use crate::shallow::grid::{BOTTOMLESS, TOP};
 use crate::shallow::scalars::MOST;
-use crate::shallow::stacks::Stacks;
 use crate::shallow::terrain::solids::Solid;
 
 /// Several bases of a cell that move by more than so many cells are not those of the same column.

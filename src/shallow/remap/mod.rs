@@ -18,13 +18,13 @@ use std::ops::Range;
 
 use super::Shallow;
 use super::columns::STRIP;
-use super::identity::Identity;
+use super::columns::stacks::Stacks;
 use super::pipes::joints::Finder;
-use super::pipes::rules::Rules;
+use super::pipes::pipe_rules::Rules;
 use super::pipes::{Ends, Links};
-use super::stacks::Stacks;
 use super::terrain::Solids;
 use super::terrain::ground::Ground;
+use super::terrain::identity::Identity;
 use super::terrain::shapes::Shape;
 use super::terrain::solids::Solid;
 use crate::error::{Error, Result};

@@ -3,9 +3,9 @@
 use super::*;
 use crate::context::{Context, Pool};
 use crate::shallow::Params;
+use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights, TOP};
 use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::free_fall::Falls;
-use crate::shallow::grid::{BOTTOMLESS, Grid, Heights, TOP};
 use crate::shallow::params::{Friction, Pace};
 use crate::shallow::pipes::{Border, Pipes};
 

@@ -26,9 +26,9 @@ use std::ops::{Range, RangeInclusive};
 
 use xxhash_rust::xxh3::xxh3_128;
 
+use super::columns::grid::{BOTTOMLESS, TOP};
 use super::columns::{Columns, STRIP};
 use super::free_fall::{LIP, PACKET, Packet, Waiting};
-use super::grid::{BOTTOMLESS, TOP};
 use super::pipes::Border;
 use super::remap::Parcel;
 use super::solver::active::runs;

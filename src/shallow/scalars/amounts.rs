@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::shares::{LEVELS, Levels, MOST, integer, level, share};
 use super::{Law, Scalar};
-use crate::shallow::per_column::{Array, PerColumn};
+use crate::shallow::columns::per_column::{Array, PerColumn};
 
 /// Decay is counted after so much of a half-life, or a step, if that is longer: in shorter steps thin films would lose less than half an amount, which is
 /// none.

@@ -11,8 +11,8 @@ use std::ops::Range;
 use super::active::Active;
 use super::flux::{Step, greater, lesser};
 use crate::numeric::cpu::dispatch;
+use crate::shallow::columns::per_column::{Array, PerColumn};
 use crate::shallow::columns::{NONE, STRIP, resize_part, strip_from, strip_of};
-use crate::shallow::per_column::{Array, PerColumn};
 
 /// (c dt / dx)^2 of a fast pipe: below 1/2, the bound of stability.
 pub const FAST_WAVES: f32 = 0.35;

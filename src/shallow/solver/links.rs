@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::fast_films;
 use super::flux::{Kind, Step, flux_of, lesser, split};
 use super::overflow_edges::{Fall, Lips, edge};
-use super::parts::LinkPart;
+use super::rows::band_views::LinkPart;
 use crate::shallow::pipes::Links;
 use crate::shallow::scalars::MOST as SCALARS;
 

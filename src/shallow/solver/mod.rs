@@ -1,50 +1,43 @@
 //! The state of the liquid, and one step of it (thesis 4.1.2, Alg. 4.1).
 //!
-//! A step goes over the rows once (`rows.rs`): fluxes (`flux.rs`, `solver/fast_films.rs`, `links.rs`), their scaling (`scale.rs`), and transfers (`transfer.rs`), on the
-//! strips that are wet or beside wet ones, unless all rests there (`active.rs`, `rest.rs`), by one band of rows for each thread (`bands.rs`,
-//! `parts.rs`). Columns that are full up to their ceiling are a network of their own, found first (`solver/pressurised/network.rs`, `solver/pressurised/heads.rs`, `solver/limiter.rs`); then friction
+//! A step goes over the rows once (`rows.rs`): fluxes (`flux.rs`, `solver/fast_films.rs`, `links.rs`), their scaling (`solver/transfers/scale.rs`), and transfers (`solver/transfers/whole_units.rs`), on the
+//! strips that are wet or beside wet ones, unless all rests there (`active.rs`, `rest.rs`), by one band of rows for each thread (`solver/rows/bands.rs`,
+//! `solver/rows/band_views.rs`). Columns that are full up to their ceiling are a network of their own, found first (`solver/pressurised/network.rs`, `solver/pressurised/heads.rs`, `solver/transfers/limiter.rs`); then friction
 //! beside pipes, if it is wanted (`walls`). What the liquid carries follows transfers (`carry.rs`).
 
 pub(super) mod active;
-pub(super) mod bands;
-mod buffers;
-mod carry;
 pub mod fast_films;
 pub mod flux;
 pub(super) mod lateral_friction;
-mod limiter;
 pub mod links;
 pub(super) mod overflow_edges;
-mod parts;
 mod pressurised;
 pub mod rest;
-mod room;
-mod row_positions;
-mod rows;
-mod scale;
+pub(in crate::shallow) mod rows;
 pub mod stop;
-mod transfer;
+mod transfers;
+pub(in crate::shallow) mod viscosity_by_scalar;
 
 use std::ops::Range;
 
+use super::columns::per_column::{Array, PerColumn};
 use super::columns::{Columns, NONE, STRIP, strip_mut};
-use super::per_column::{Array, PerColumn};
 use super::pipes::cliffs::Cliffs;
 use super::pipes::{Links, Pipes};
 use super::scalars::amounts::{Account, Amounts, Changes};
 use super::scalars::shares::{Levels, MOST};
 use active::{Active, runs};
-use bands::Bands;
 use fast_films::{Fast, Films};
 use flux::Step;
 use lateral_friction::{Liquid, Walls};
 use links::LinkFlow;
 use overflow_edges::Lips;
-use parts::Part;
 pub(super) use pressurised::network::SLACK;
 use pressurised::network::{Network, State};
 use rest::{Bounds, Still};
 use rows::Ground;
+use rows::band_views::Part;
+use rows::bands::Bands;
 use stop::Stop;
 
 /// Depths and fluxes, by column index.

@@ -22,37 +22,25 @@
 //! Where a group of four lacks one link, of two cells side by side, its two triangles overlap ([`Check::doubled`]): the liquid of these
 //! columns is at different layers there.
 
-mod boundary;
-pub(in crate::shallow) mod cells;
-mod full_quartets;
-mod indices;
-pub mod ledges;
-mod links;
-pub mod minimum_heights;
-pub(in crate::shallow) mod normals;
-pub(in crate::shallow) mod odd_quartets;
-mod room;
+pub(in crate::shallow) mod buffers;
+pub mod heights;
+pub(in crate::shallow) mod quartets;
+pub mod rim;
 mod self_check;
-pub(in crate::shallow) mod shown;
-mod silhouette;
-mod skirts;
-mod strips;
-pub(in crate::shallow) mod vertices;
-mod wall_quartets;
 
 use super::columns::{Columns, NONE, STRIP};
 use super::scalars::MOST;
 use crate::error::{Error, Result};
-use boundary::{Around, Walls};
-use ledges::Ledges;
-use links::Scene;
-use normals::Normals;
-use odd_quartets::Search;
-pub use room::bound;
+pub use buffers::capacity::bound;
+use buffers::normals::Normals;
+use buffers::vertices::Vertices;
+use quartets::links::Scene;
+use quartets::odd::Search;
+use quartets::strips::Found;
+use rim::boundary::{Around, Walls};
+use rim::ledges::Ledges;
+use rim::skirts::Skirts;
 pub use self_check::{Check, check};
-use skirts::Skirts;
-use strips::Found;
-use vertices::Vertices;
 
 /// The liquid in columns.
 #[derive(Debug, Clone, Copy, Default)]
@@ -64,7 +52,7 @@ pub struct Depths<'a> {
     /// Whether each strip may have a wet column; without it all are searched.
     pub active: Option<&'a [bool]>,
     /// Least depth at which each index is shown where it is wet (units), at most from base to ceiling; in place of [`Layout::least_depth`].
-    /// May be empty. See [`minimum_heights::Lifts`].
+    /// May be empty. See [`heights::minimum_heights::Lifts`].
     pub least: &'a [i32],
     /// How far below its base each index is shown where it is dry (units), at most to the underside of its solid; in place of
     /// [`Layout::least_depth`]. May be empty.
@@ -184,11 +172,11 @@ impl Surface {
     /// Makes room for whatever liquid these columns may hold: from then on [`Surface::build`] allocates nothing for them.
     pub fn reserve(&mut self, columns: &Columns) {
         let layers = columns.strips().iter().map(|strip| strip.layer as usize + 1).max().unwrap_or(0);
-        links::find_above(columns, &mut self.above);
+        quartets::links::find_above(columns, &mut self.above);
         self.found.reset(columns);
         self.normals.reset(columns);
-        shown::reserve(columns, &mut self.heights);
-        self.walls.reserve(room::Walls::of(columns).pairs, layers);
+        heights::shown::reserve(columns, &mut self.heights);
+        self.walls.reserve(buffers::capacity::Walls::of(columns).pairs, layers);
         let [nx, nz] = columns.grid.size;
         self.search.reserve(layers, (nx - 1) * (nz - 1), bound(columns).indices / 3);
         self.around.reserve();
@@ -234,15 +222,15 @@ impl Surface {
             return Err(Error::argument("the ledges are those of other columns"));
         }
         if self.above.len() != len / STRIP {
-            links::find_above(columns, &mut self.above);
+            quartets::links::find_above(columns, &mut self.above);
         }
         let scene = Scene { columns, depth: depths.depth, above: &self.above };
         self.found.reset(columns);
         self.walls.clear();
-        full_quartets::find_wet(scene, depths.active, &mut self.found);
-        full_quartets::find_full(scene, &mut self.found);
+        quartets::full::find_wet(scene, depths.active, &mut self.found);
+        quartets::full::find_full(scene, &mut self.found);
         let mut triangles = self.found.full_triangles;
-        triangles += odd_quartets::find_groups(scene, &mut self.found, &mut self.walls, &mut self.search);
+        triangles += quartets::odd::find_groups(scene, &mut self.found, &mut self.walls, &mut self.search);
         let columns_used = self.found.number(columns);
         let extras = self.walls.number(columns_used);
         self.found.has_means |= extras > 0;
@@ -274,10 +262,17 @@ impl Surface {
         target.check(&counts)?;
         let scene = Scene { columns, depth: depths.depth, above: &self.above };
         let (found, walls, flipped) = (&self.found, &self.walls.list, layout.left_handed);
-        let at = indices::write_triangles(scene, found, walls, &self.search, flipped, &mut target.indices);
+        let at = buffers::indices::write_triangles(
+            scene,
+            found,
+            walls,
+            &self.search,
+            flipped,
+            &mut target.indices,
+        );
         self.skirts.write_triangles(found, at, flipped, &mut target.indices);
         self.normals.reset(columns);
-        shown::find_heights(columns, found, depths, layout, &mut self.heights);
+        heights::shown::find_heights(columns, found, depths, layout, &mut self.heights);
         let vertices =
             Vertices::new(scene, found, walls, &self.heights, depths, layout, target.normals.is_some());
         vertices.write(&mut self.normals, &mut self.around, target);

@@ -1,6 +1,6 @@
 //! Checks a mesh against the links of the columns, one by one.
 
-use super::links::Scene;
+use super::quartets::links::Scene;
 use super::{Columns, NONE};
 
 /// What [`check`] counts.

@@ -4,7 +4,7 @@
 //! prefers a side: mirroring the scene or turning it by 90 degrees gives the same bits unless a line meets an edge exactly.
 
 use super::lines::{LANES, ROUNDOFF, WHOLE, greater, integer_of, lesser, whole};
-use crate::shallow::grid::{Heights, TOP};
+use crate::shallow::columns::grid::{Heights, TOP};
 
 /// Corner of a triangle (m).
 pub type Corner = [f64; 3];

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::shapes::Shape;
 use super::solids::{Solid, unite};
-use crate::shallow::grid::{Grid, Heights};
+use crate::shallow::columns::grid::{Grid, Heights};
 
 /// Solids of cells, one after another.
 #[derive(Debug, Clone, Default)]
@@ -158,7 +158,7 @@ impl Ground {
 mod tests {
     use super::*;
     use crate::geometry::DVec3;
-    use crate::shallow::grid::BOTTOMLESS;
+    use crate::shallow::columns::grid::BOTTOMLESS;
 
     const GRID: Grid = Grid { cell: 1.0, origin: [0.0; 2], size: [6, 5] };
 

@@ -2,7 +2,7 @@
 
 use super::Solids;
 use crate::error::{Error, Result};
-use crate::shallow::grid::{BOTTOMLESS, Grid, Heights};
+use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 
 /// One solid a cell from heights (m) at the centres of the cells, row by row along x (`Grid::index`). Heights beyond the range become
 /// its ends.

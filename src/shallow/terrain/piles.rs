@@ -1,7 +1,7 @@
 //! Crossings of lines, cell by cell, and the solids between them.
 
 use super::solids::Solid;
-use crate::shallow::grid::BOTTOMLESS;
+use crate::shallow::columns::grid::BOTTOMLESS;
 
 /// The crossings of the lines of a box of cells: height (units) x 2 + 1 if the triangle faces up.
 #[derive(Debug, Default)]

@@ -4,7 +4,7 @@ use super::Solids;
 use super::solids::{Solid, unite};
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
-use crate::shallow::grid::{BOTTOMLESS, Grid, Heights, TOP};
+use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights, TOP};
 
 /// Places of a batch.
 const BATCH: u64 = 1 << 14;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::solids::Solid;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
-use crate::shallow::grid::{Grid, Heights};
+use crate::shallow::columns::grid::{Grid, Heights};
 
 /// How far axes of a cuboid may be from unit vectors that are perpendicular to each other.
 const SKEW: f64 = 1e-6;

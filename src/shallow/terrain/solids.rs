@@ -1,8 +1,8 @@
 //! Solid intervals along the vertical lines of cells.
 
-use crate::shallow::grid::{Grid, Heights};
+use crate::shallow::columns::grid::{Grid, Heights};
 
-/// A solid interval (units): from its bottom ([`super::super::grid::BOTTOMLESS`]: it reaches down for ever) to its top.
+/// A solid interval (units): from its bottom ([`crate::shallow::columns::grid::BOTTOMLESS`]: it reaches down for ever) to its top.
 pub type Solid = [i32; 2];
 
 /// The solid intervals of every cell, from the lowest up; they neither touch nor overlap.
@@ -68,7 +68,7 @@ pub fn unite(cell: &mut Vec<Solid>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shallow::grid::BOTTOMLESS;
+    use crate::shallow::columns::grid::BOTTOMLESS;
 
     #[test]
     fn intervals_that_touch_become_one() {

@@ -1,7 +1,7 @@
 //! Solids of triangles, open or closed, that may overlap: a point is solid where the winding number is above 0.
 //!
 //! Going down a vertical line from above, where the winding number is 0, a triangle that faces up adds 1 and one that faces down takes 1.
-//! So solids that overlap unite, an open sheet that faces up is solid down to [`BOTTOMLESS`](crate::shallow::grid::BOTTOMLESS), and one that faces down is nothing.
+//! So solids that overlap unite, an open sheet that faces up is solid down to [`BOTTOMLESS`](crate::shallow::columns::grid::BOTTOMLESS), and one that faces down is nothing.
 //! Which lines meet a triangle is decided exactly (`crossings.rs`), so no closed surface leaks.
 //!
 //! Heights of crossings, which are right to within 2^-8 units, are rounded to units first, those outside of the range to its ends, and
@@ -21,7 +21,7 @@ use super::solids::Solid;
 use crate::error::{Error, Result};
 use crate::geometry::Vec3;
 use crate::numeric::cpu::{FlushDenormals, dispatch};
-use crate::shallow::grid::{Grid, Heights};
+use crate::shallow::columns::grid::{Grid, Heights};
 
 /// So many lines of a triangle are asked without a look at its edges.
 const FEW: u32 = 3;
@@ -337,7 +337,7 @@ impl Near {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shallow::grid::BOTTOMLESS;
+    use crate::shallow::columns::grid::BOTTOMLESS;
 
     const GRID: Grid = Grid { cell: 0.5, origin: [-2.0, -2.0], size: [8, 8] };
 

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::numeric::cpu::FlushDenormals;
 use crate::shallow::Shallow;
 use crate::shallow::frame::{check_length, too_many_steps};
-use crate::shallow::solver::bands::attended;
+use crate::shallow::solver::rows::bands::attended;
 use crate::shallow::solver::stop::Stop;
 use crate::shallow::system::Report;
 use crate::shallow::time_step;

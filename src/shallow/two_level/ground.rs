@@ -1,8 +1,8 @@
 //! The ground of both sizes of cells.
 
 use super::Cells;
-use crate::shallow::grid::{BOTTOMLESS, Grid};
-use crate::shallow::pipes::rules::Apart;
+use crate::shallow::columns::grid::{BOTTOMLESS, Grid};
+use crate::shallow::pipes::pipe_rules::Apart;
 use crate::shallow::terrain::Solids;
 use crate::shallow::terrain::solids::{Solid, unite};
 
@@ -82,7 +82,7 @@ fn mean(four: [&[Solid]; 4]) -> Vec<Solid> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shallow::grid::Heights;
+    use crate::shallow::columns::grid::Heights;
 
     #[test]
     fn coarse_ground_is_the_mean_of_each_layer() {

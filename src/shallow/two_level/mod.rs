@@ -17,7 +17,7 @@ pub mod surface;
 use std::ops::Range;
 
 use super::Shallow;
-use super::grid::Grid;
+use super::columns::grid::Grid;
 use super::params::Params;
 use super::remap::Moved;
 use super::sources::FlowPoint;

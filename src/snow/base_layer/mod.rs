@@ -4,15 +4,15 @@
 
 mod columns;
 mod crumbs;
-mod edit;
-pub(in crate::snow) mod filling;
+mod far_bodies;
 mod grids;
 pub mod initial;
 mod marks;
 mod noise;
-mod reach;
+mod press;
+pub(in crate::snow) mod removed_volume;
 mod state;
-mod wanted;
+mod sweep_region;
 
 use std::borrow::Borrow;
 use std::collections::{BTreeSet, HashMap, HashSet};
@@ -20,9 +20,9 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use rayon::prelude::*;
 
 pub(in crate::snow) use columns::filled;
+pub use far_bodies::Reach;
 pub use grids::{Changes, Grids};
 pub use noise::displace;
-pub use reach::Reach;
 
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
@@ -34,10 +34,10 @@ use crate::sweep::{
 };
 use crate::vdb::{FloatGrid, GridClass, MetaValue, Probe, distances};
 use columns::Columns;
-use edit::{Edit, Scale};
 use marks::Mark;
 use noise::Displacement;
-use wanted::snow_masks;
+use press::{Edit, Scale};
+use sweep_region::snow_masks;
 
 /// How objects press into the snow.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -352,7 +352,7 @@ impl BaseLayer {
             .collect::<Result<_>>()?;
         let band = Band { inside: self.half_width, outside };
         let snowy =
-            |origins: &[Origin]| Ok(self.grids.surface.probe(origins)?.iter().map(edit::has_snow).collect());
+            |origins: &[Origin]| Ok(self.grids.surface.probe(origins)?.iter().map(press::has_snow).collect());
         let bounds = [relative(self.low, 0), relative(self.high, 0)];
         Voxeliser::new(ctx, parts.concat(), lattice, band, bounds, snowy)
     }
@@ -407,7 +407,7 @@ impl BaseLayer {
             .zip(&snow)
             .filter_map(|(piece, snow)| {
                 ctx.advance();
-                if ctx.check().is_err() { None } else { edit::subtract(piece, snow, scale) }
+                if ctx.check().is_err() { None } else { press::subtract(piece, snow, scale) }
             })
             .collect())
     }

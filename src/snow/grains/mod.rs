@@ -27,7 +27,7 @@ pub mod heap;
 mod params;
 #[doc(hidden)]
 pub mod solver;
-mod starts;
+mod start_positions;
 mod state;
 mod surroundings;
 
@@ -43,13 +43,13 @@ use birth::claims::Claims;
 use birth::sourcing::Sourcing;
 use heap::{Division, Heap};
 use solver::layout::locate;
-use starts::Starts;
+use start_positions::Starts;
 use surroundings::{Bounds, Obstacles, TIES, have_stayed};
 
 pub use birth::sourcing::{Base, PACKING, Removal, removals};
 pub use colliders::ground::Ground;
 pub use params::Params;
-pub use starts::Start;
+pub use start_positions::Start;
 pub(super) use surroundings::HOLES;
 pub use surroundings::{FASTEST_OBJECT, Object, Surroundings};
 

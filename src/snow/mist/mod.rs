@@ -4,22 +4,14 @@
 //! heavier than the air around, so that gravity acts there alone. Mist reads grains and never changes them; what it holds is not
 //! taken from theirs, and dissipates.
 
-mod coarse;
-#[cfg(feature = "vdb")]
-mod corners;
 mod forces;
 #[cfg(feature = "vdb")]
 mod grids;
 mod params;
-#[cfg(feature = "vdb")]
-mod shares;
 mod sources;
-mod sow;
 mod state;
 #[cfg(feature = "vdb")]
 mod surroundings;
-mod turbulence;
-mod wind;
 
 use rayon::prelude::*;
 
@@ -28,13 +20,13 @@ use crate::error::{Error, Result};
 use crate::flow::{Coord, FARTHEST, Flow, Keeping, Kept, Solids, Tiles, tiles};
 use sources::Seed;
 
+pub use forces::wind::Wind;
 #[cfg(feature = "vdb")]
 pub use grids::Grids;
 pub use params::{FASTEST_WIND, Params};
 pub use sources::{Source, Start};
 #[cfg(feature = "vdb")]
 pub use surroundings::{Surroundings, Walls};
-pub use wind::Wind;
 
 /// Share of the faces whose air may be faster than a sub-step allows, where it is pressed through gaps as narrow as a cell: its path
 /// is then cut off at [`FARTHEST`] cells. A dozen such cells of two million would nearly double the sub-steps of a sleigh's mist.
@@ -174,7 +166,7 @@ impl Mist {
 
     /// Adds mist: density and velocity (m/s) at a cell, none where the density is 0.
     pub fn add(&mut self, tiles: &[Coord], of: impl Fn([i32; 3]) -> (f32, [f32; 3])) {
-        let seeds = sow::seeds(tiles, of);
+        let seeds = sources::new_mist::seeds(tiles, of);
         self.flow.resize(&self.wanted(&seeds));
         self.sow(&seeds);
     }
@@ -279,7 +271,7 @@ impl Mist {
         if let Some(wind) = wind {
             wind.blow(ctx, &mut self.flow, dt)?;
         }
-        turbulence::stir(ctx, &mut self.flow, &self.params, time, dt)?;
+        forces::turbulence::stir(ctx, &mut self.flow, &self.params, time, dt)?;
         if self.params.confinement > 0.0 {
             self.flow.confine(ctx, (self.params.confinement * dt) as f32)?;
         }

@@ -11,9 +11,9 @@ use crate::context::Context;
 use crate::distance::nearest::{Search, search};
 use crate::distance::triangle::Triangle;
 use crate::error::Result;
+use crate::geometry::Coord;
 use crate::numeric::blocks::{DIM, VOXELS, Values, offset};
 use crate::numeric::lanes::LANES;
-use crate::surface::particles::grid::Coord;
 use crate::surface::track::deep_detail::reach_in;
 
 /// Signed distances in blocks of 8 x 8 x 8 nodes.

@@ -11,9 +11,10 @@ use super::SUPPORT;
 use super::kernel::{Near, values};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::Coord;
 use crate::geometry::DVec3;
 use crate::numeric::lanes::LANES;
-use crate::surface::particles::grid::{Cells, Coord};
+use crate::surface::particles::grid::Cells;
 
 /// Nodes along the edge of a patch.
 pub const SIDE: i32 = 4;

@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 
 use super::implicit::{Implicit, NODES, SIDE};
-use super::marching_cubes::cases;
+use crate::geometry::Coord;
+use crate::geometry::marching_cubes::cases;
 use crate::geometry::{DVec3, TriMesh};
-use crate::surface::particles::grid::Coord;
 
 /// No vertex.
 const NONE: u8 = u8::MAX;

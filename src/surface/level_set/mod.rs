@@ -3,8 +3,7 @@
 pub(in crate::surface) mod band;
 pub(in crate::surface) mod implicit;
 pub(in crate::surface) mod isosurface;
-pub(in crate::surface) mod kernel;
-pub(in crate::surface) mod marching_cubes;
+mod kernel;
 #[cfg(feature = "vdb")]
 pub(in crate::surface) mod openvdb;
 pub(in crate::surface) mod sampler;

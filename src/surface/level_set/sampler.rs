@@ -1,8 +1,8 @@
 //! Tricubic interpolation of signed distances (Catmull-Rom splines on each axis), with its gradient.
 
 use super::band::Distances;
+use crate::geometry::Coord;
 use crate::geometry::DVec3;
-use crate::surface::particles::grid::Coord;
 
 /// Reads distances near one place after the other; nodes are kept while the place stays in its cell.
 pub struct Sampler<'a> {

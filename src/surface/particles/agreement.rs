@@ -3,9 +3,10 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::grid::{Coord, cell_of};
+use super::grid::cell_of;
 use super::paths::Paths;
 use crate::error::Result;
+use crate::geometry::Coord;
 use crate::geometry::DVec3;
 use crate::surface::Particles;
 use crate::surface::report::StepReport;
@@ -205,7 +206,7 @@ fn around(cell: Coord) -> [Coord; 27] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::balls::shell;
+    use crate::surface::test_particles::shell;
 
     const DT: f64 = 1.0 / 24.0;
 

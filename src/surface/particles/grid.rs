@@ -3,10 +3,7 @@
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::geometry::DVec3;
-
-/// Coordinate of a cell.
-pub type Coord = [i32; 3];
+use crate::geometry::{Coord, DVec3};
 
 /// The cell that holds a place (cells).
 pub fn cell_of(place: &DVec3) -> Coord {

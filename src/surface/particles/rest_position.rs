@@ -3,12 +3,13 @@
 use rayon::prelude::*;
 
 use super::affine_fit::{Near, sums};
-use super::grid::{Cells, Coord};
+use super::grid::Cells;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::Coord;
 use crate::geometry::DVec3;
+use crate::mesh_repair::Source;
 use crate::surface::Particles;
-use crate::surface::repair::Source;
 use crate::surface::topology::change::Change;
 use crate::surface::tracker::Tracker;
 
@@ -88,7 +89,7 @@ impl Rest {
     }
 
     /// The same for the vertices of a mesh after a change, at the time of the particles `now`, as far as
-    /// [`Traced`](crate::surface::Traced) needs it: for those of new triangles. None for all others.
+    /// [`Traced`](crate::mesh_repair::Traced) needs it: for those of new triangles. None for all others.
     ///
     /// # Errors
     /// As [`Rest::places`].
@@ -256,7 +257,7 @@ fn heaviest_origin(seen: &mut [Seen], most: f64) -> Option<usize> {
 mod tests {
     use super::*;
     use crate::context::Pool;
-    use crate::surface::balls::numbered;
+    use crate::surface::test_particles::numbered;
 
     /// A block of n^3 places, one apart, from a corner on.
     fn block(corner: DVec3, n: i32) -> impl Iterator<Item = DVec3> {

@@ -47,7 +47,7 @@ impl Drift {
 mod tests {
     use super::*;
     use crate::context::{Context, Pool};
-    use crate::surface::balls::{numbered, own_surface, shell};
+    use crate::surface::test_particles::{numbered, own_surface, shell};
     use crate::surface::{Params, Particles, Tracker};
 
     /// Frames in which the liquid is drawn out, and those in which it rests.

@@ -24,10 +24,10 @@ mod strain;
 
 use rayon::prelude::*;
 
-use super::repair::Source;
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::DVec3;
+use crate::mesh_repair::Source;
 use fans::Fans;
 
 /// Longest edge that is left alone (targets). The halves of one that is split have 0.75: far from what collapses.

@@ -7,7 +7,7 @@ use super::shape::{least_angle, normal};
 use crate::context::Pool;
 use crate::error::Error;
 use crate::geometry::check::topology::Topology;
-use crate::surface::balls;
+use crate::geometry::test_meshes;
 use crate::surface::remesh::*;
 
 /// The drift of a vertex of which nothing is known: so large that no edge rests, and equal to itself as NaN is not.
@@ -136,7 +136,7 @@ impl Body {
 
 /// A unit sphere of 8 x 4^levels triangles.
 pub(super) fn sphere(levels: u32) -> Body {
-    let (places, triangles) = balls::sphere(levels);
+    let (places, triangles) = test_meshes::sphere(levels);
     Body::of(places, triangles)
 }
 

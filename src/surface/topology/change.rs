@@ -7,15 +7,16 @@ use super::particle_count::Crowd;
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
 use crate::error::Result;
+use crate::geometry::Coord;
 use crate::geometry::DVec3;
 use crate::geometry::check::topology::around;
 use crate::geometry::mesh::used;
+use crate::mesh_repair::{CellSet, Pierces, Rebuilt, Shape, Source, ladder, overlaps};
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::sampler::Sampler;
-use crate::surface::particles::grid::{Coord, cell_of};
+use crate::surface::particles::grid::cell_of;
 use crate::surface::remesh::{Improvable, Improvements, Size, improve};
-use crate::surface::repair::{CellSet, Pierces, Rebuilt, Shape, Source, ladder, overlaps};
 use crate::surface::track::project::foot;
 
 /// A mesh, and where it no longer fits.
@@ -285,7 +286,7 @@ mod tests {
     use super::*;
     use crate::context::Pool;
     use crate::geometry::check::faults::Faults;
-    use crate::surface::balls::{own_surface, two_balls};
+    use crate::surface::test_particles::{own_surface, two_balls};
     use crate::surface::{Params, Tracker};
 
     #[test]

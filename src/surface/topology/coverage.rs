@@ -12,10 +12,11 @@ use super::uncovered_parts::Parts;
 use crate::context::Context;
 use crate::distance::triangle::Triangle;
 use crate::error::Result;
+use crate::geometry::Coord;
 use crate::geometry::DVec3;
 use crate::surface::level_set::implicit::{Implicit, SIDE};
 use crate::surface::level_set::isosurface::Isosurface;
-use crate::surface::particles::grid::{Coord, cell_of};
+use crate::surface::particles::grid::cell_of;
 
 /// A place of the surface is covered if a triangle of feet is so near (spacings; a cell at least).
 const SLACK: f64 = 0.5;

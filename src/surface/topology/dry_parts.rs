@@ -6,7 +6,7 @@ use crate::geometry::DVec3;
 use crate::geometry::check::topology;
 use crate::geometry::check::topology::bodies;
 use crate::geometry::mesh::{renumbered, used};
-use crate::surface::repair::Source;
+use crate::mesh_repair::Source;
 
 impl Change {
     /// Takes away the parts of the mesh with a volume over 0 that hold too few particles, and what hollows are in them. Returns how many
@@ -82,7 +82,7 @@ impl Change {
 mod tests {
     use super::*;
     use crate::context::{Context, Pool};
-    use crate::surface::balls::{numbered, own_surface, shell};
+    use crate::surface::test_particles::{numbered, own_surface, shell};
     use crate::surface::{Params, Particles, Tracker};
 
     const FRAMES: i32 = 28;

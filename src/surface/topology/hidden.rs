@@ -21,14 +21,15 @@ use super::particle_count::{Bounds, is_within};
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
 use crate::error::Result;
+use crate::geometry::Coord;
 use crate::geometry::DVec3;
 use crate::geometry::check::topology::{bodies, parts};
+use crate::mesh_repair::{CellSet, Shape};
 use crate::numeric::blocks::{VOXELS, offset};
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::sampler::Sampler;
-use crate::surface::particles::grid::{Coord, cell_of};
-use crate::surface::repair::{CellSet, Shape};
+use crate::surface::particles::grid::cell_of;
 
 /// How much farther from phi = 0 than detail reaches the mesh must be (spacings; a cell at least).
 const SLACK: f64 = 0.5;
@@ -359,7 +360,7 @@ mod tests {
     use crate::context::Pool;
     use crate::geometry::check::faults::Faults;
     use crate::geometry::{TriMesh, Vec3};
-    use crate::surface::balls::{numbered, own_surface, shell, two_balls};
+    use crate::surface::test_particles::{numbered, own_surface, shell, two_balls};
     use crate::surface::{Params, Tracker};
 
     fn context() -> Context {

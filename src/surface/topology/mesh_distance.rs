@@ -11,13 +11,13 @@ use crate::distance::lattice::Lattice;
 use crate::distance::nearest::{Search, search as find};
 use crate::distance::triangle::Triangle;
 use crate::error::Result;
+use crate::geometry::Coord;
 use crate::geometry::DVec3;
+use crate::mesh_repair::{CellSet, GridEdge, Inside, Shape, end};
 use crate::numeric::blocks::{DIM, VOXELS, Values, offset};
 use crate::numeric::lanes::LANES;
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::{Implicit, SIDE};
-use crate::surface::particles::grid::Coord;
-use crate::surface::repair::{CellSet, GridEdge, Inside, Shape, end};
 
 /// How far from the mesh Gamma is known (cells): the thesis' fixed cells reach sqrt(3).
 const KNOWN: f32 = 2.0;

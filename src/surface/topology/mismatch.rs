@@ -7,11 +7,12 @@ use super::hidden::Everywhere;
 use super::uncovered_parts::is_near;
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::Coord;
 use crate::geometry::DVec3;
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::params::Params;
-use crate::surface::particles::grid::{Coord, cell_of};
+use crate::surface::particles::grid::cell_of;
 use crate::surface::tracker::{Covered, Next, Tracker};
 
 impl Tracker {
@@ -94,7 +95,7 @@ impl Tracker {
 mod tests {
     use super::*;
     use crate::context::Pool;
-    use crate::surface::balls::{numbered, own_surface, shell};
+    use crate::surface::test_particles::{numbered, own_surface, shell};
 
     #[test]
     fn a_vertex_that_jumps_alone_has_a_step_to_come_back() {

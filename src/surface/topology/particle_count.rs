@@ -4,10 +4,11 @@
 //! all others less than half a spacing from it. So those beside a part count too, if any lies inside.
 
 use super::mesh_distance::between;
+use crate::geometry::Coord;
 use crate::geometry::check::deviation::NearestTree;
 use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh};
-use crate::surface::particles::grid::{Coord, cell_of};
+use crate::surface::particles::grid::cell_of;
 
 /// A direction along which no edges of made meshes run.
 const ASLANT: DVec3 = DVec3::new(0.5773, 0.6533, 0.4896);

@@ -3,10 +3,11 @@
 use rayon::prelude::*;
 
 use super::particle_count::{Bounds, Crowd, are_inside, seen_from};
+use crate::geometry::Coord;
 use crate::geometry::DVec3;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::isosurface::Isosurface;
-use crate::surface::particles::grid::{Coord, cell_of};
+use crate::surface::particles::grid::cell_of;
 
 /// A part of the particles' surface on which no vertex of the mesh lies.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -12,11 +12,12 @@ use rayon::prelude::*;
 
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::Coord;
 use crate::geometry::DVec3;
 use crate::surface::Particles;
 use crate::surface::params::Params;
 use crate::surface::particles::affine_fit::{Map, Near, Sums, sums};
-use crate::surface::particles::grid::{Cells, Coord};
+use crate::surface::particles::grid::Cells;
 use crate::surface::particles::paths::Paths;
 use crate::surface::tracker::validate_step;
 

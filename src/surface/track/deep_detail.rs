@@ -3,9 +3,10 @@
 
 use std::collections::BTreeMap;
 
+use crate::geometry::Coord;
 use crate::geometry::DVec3;
 use crate::numeric::blocks::DIM;
-use crate::surface::particles::grid::{Coord, cell_of};
+use crate::surface::particles::grid::cell_of;
 use crate::surface::tracker::{DRIFT, REACH, Tracker, WIDER};
 
 /// Blocks of the band, ascending, and how far it reaches in each (cells).
@@ -72,7 +73,7 @@ pub fn covers(deep: &[(Coord, f32)], other: &[(Coord, f32)]) -> bool {
 mod tests {
     use super::*;
     use crate::context::{Context, Pool};
-    use crate::surface::balls::{numbered, own_surface, shell};
+    use crate::surface::test_particles::{numbered, own_surface, shell};
     use crate::surface::{Params, Particles};
 
     #[test]

@@ -10,7 +10,7 @@ use crate::geometry::check::deviation::NearestTree;
 use crate::geometry::check::topology::{around, bodies};
 use crate::geometry::mesh::{renumbered, used};
 use crate::geometry::{DVec3, TriMesh, Vec3};
-use crate::surface::repair::{Source, weights};
+use crate::mesh_repair::{Source, weights};
 use crate::surface::topology::change::Change;
 
 /// Places of a task.
@@ -248,7 +248,7 @@ impl Patch {
 mod tests {
     use super::*;
     use crate::context::Pool;
-    use crate::surface::balls::{own_surface, two_balls};
+    use crate::surface::test_particles::{own_surface, two_balls};
     use crate::surface::{Params, Tracker};
 
     #[test]

@@ -5,10 +5,11 @@ use std::collections::HashSet;
 
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::Coord;
 use crate::geometry::check::faults::meeting_pairs;
 use crate::geometry::mesh::{renumbered, used};
 use crate::geometry::{DVec3, TriMesh};
-use crate::surface::particles::grid::{Coord, cell_of};
+use crate::surface::particles::grid::cell_of;
 
 /// How often the displacements of triangles that meet are halved, and in how many rounds they are taken back whole after that; then all are.
 const HALVINGS: usize = 5;
@@ -189,7 +190,7 @@ fn each(low: Coord, high: Coord) -> impl Iterator<Item = Coord> {
 mod tests {
     use super::*;
     use crate::context::Pool;
-    use crate::surface::balls::{own_surface, two_balls};
+    use crate::surface::test_particles::{own_surface, two_balls};
     use crate::surface::{Outlook, Params, Tracker};
 
     /// Two cubes with a gap of 1 between them.

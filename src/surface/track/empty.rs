@@ -77,7 +77,7 @@ mod tests {
     use crate::geometry::DVec3;
     use crate::geometry::check::faults::Faults;
     use crate::surface::Params;
-    use crate::surface::balls::{numbered, own_surface, shell};
+    use crate::surface::test_particles::{numbered, own_surface, shell};
 
     const DT: f64 = 0.04;
 

@@ -108,7 +108,7 @@ mod tests {
     use super::*;
     use crate::context::Pool;
     use crate::surface::Params;
-    use crate::surface::balls::{own_surface, two_balls};
+    use crate::surface::test_particles::{own_surface, two_balls};
 
     const DT: f64 = 0.04;
 

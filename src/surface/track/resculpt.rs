@@ -41,7 +41,7 @@ mod tests {
     use crate::context::Pool;
     use crate::geometry::{DVec3, Vec3};
     use crate::surface::Params;
-    use crate::surface::balls::{numbered, own_surface, shell};
+    use crate::surface::test_particles::{numbered, own_surface, shell};
 
     /// Height of the bump (m); particles lie 1 m apart.
     const HEIGHT: f64 = 0.8;

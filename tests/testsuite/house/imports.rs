@@ -4,21 +4,52 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each room with what it may use besides itself, `error` and `context`.
-const LAW: [(&str, &[&str]); 15] = [
+const LAW: [(&str, &[&str]); 16] = [
     ("numeric", &[]),
     ("geometry", &["numeric"]),
     ("io", &["numeric", "geometry"]),
     ("vdb", &["numeric", "geometry", "io"]),
     ("motion", &["numeric", "geometry", "io"]),
     ("distance", &["numeric", "geometry"]),
+    ("mesh_repair", &["numeric", "geometry", "distance"]),
     ("sweep", &["numeric", "geometry", "vdb", "motion", "distance"]),
     ("flow", &["numeric", "geometry"]),
     ("render", &["numeric", "geometry", "io", "vdb"]),
     ("snow", &["numeric", "geometry", "vdb", "motion", "sweep", "flow"]),
-    ("surface", &["numeric", "geometry", "vdb", "distance"]),
+    ("surface", &["numeric", "geometry", "vdb", "distance", "mesh_repair"]),
     ("shallow", &["numeric", "geometry"]),
-    ("scene", &["numeric", "geometry", "io", "vdb", "motion", "sweep", "flow", "snow", "surface", "shallow"]),
-    ("capi", &["numeric", "geometry", "io", "vdb", "motion", "sweep", "flow", "snow", "surface", "shallow"]),
+    (
+        "scene",
+        &[
+            "numeric",
+            "geometry",
+            "io",
+            "vdb",
+            "motion",
+            "mesh_repair",
+            "sweep",
+            "flow",
+            "snow",
+            "surface",
+            "shallow",
+        ],
+    ),
+    (
+        "capi",
+        &[
+            "numeric",
+            "geometry",
+            "io",
+            "vdb",
+            "motion",
+            "mesh_repair",
+            "sweep",
+            "flow",
+            "snow",
+            "surface",
+            "shallow",
+        ],
+    ),
     ("cli", &[]),
 ];
 
@@ -27,7 +58,7 @@ const UNSAFE: [&str; 9] = [
     "src/numeric/cpu.rs",
     "src/numeric/lanes.rs",
     "src/context/pool.rs",
-    "src/shallow/solver/transfer.rs",
+    "src/shallow/solver/transfers/whole_units.rs",
     "src/snow/grains/solver/collide.rs",
     "src/snow/grains/solver/layout.rs",
     "src/snow/grains/solver/rows.rs",

@@ -12,8 +12,9 @@ use crate::common::shapes;
 use crate::program::{self, CUBE, complains, fails, frazil, works};
 use frazil::numeric::blocks::{Block, BlockEdit};
 use frazil::vdb::file::{Compression, WriteOptions};
-use frazil::vdb::guard::Guard;
-use frazil::vdb::{FloatGrid, MetaValue, file, layout, level_set};
+use frazil::vdb::reading::guard::Guard;
+use frazil::vdb::reading::layout;
+use frazil::vdb::{FloatGrid, MetaValue, file, level_set};
 use frazil::{Context, Pool, io};
 
 /// A file of the outside data.

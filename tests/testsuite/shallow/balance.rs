@@ -1,6 +1,6 @@
 //! Liquid is neither lost nor made, whatever dries up and gets wet.
 
-use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;

@@ -2,8 +2,8 @@
 
 use frazil::Context;
 use frazil::Pool;
+use frazil::shallow::columns::grid::BOTTOMLESS;
 use frazil::shallow::free_fall::Falls;
-use frazil::shallow::grid::BOTTOMLESS;
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;
@@ -239,12 +239,12 @@ fn turned_and_mirrored_scenes_are_the_same() {
     let height = |x: usize, z: usize| 0.02 + 1e-4 * ((x * 13 + z * 7) % 17) as f64 + 2e-4 * x as f64;
     let run = |turn: Turn| {
         let turned = turn.size(size);
-        let grid = frazil::shallow::grid::Grid {
+        let grid = frazil::shallow::columns::grid::Grid {
             cell,
             origin: turned.map(|count| -0.5 * count as f64 * cell),
             size: turned,
         };
-        let heights = frazil::shallow::grid::Heights::between(0.0, 0.125).unwrap();
+        let heights = frazil::shallow::columns::grid::Heights::between(0.0, 0.125).unwrap();
         let mut cells = vec![Vec::new(); grid.cells()];
         for index in 0..size[0] * size[1] {
             let [x, z] = [index % size[0], index / size[0]];

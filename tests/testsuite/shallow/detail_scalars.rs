@@ -1,7 +1,7 @@
 //! What liquid in cells of two sizes carries: none of it is lost, what is uniform stays so, and states have it.
 
 use frazil::geometry::DVec3;
-use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind};

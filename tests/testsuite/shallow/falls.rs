@@ -1,9 +1,9 @@
 //! Liquid that falls freely: where it goes, where it lands, and that none of it is lost on the way.
 
 use frazil::geometry::DVec3;
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::free_fall::mesh::{Balls, Target, bound};
 use frazil::shallow::free_fall::{Droplet, Falls};
-use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;

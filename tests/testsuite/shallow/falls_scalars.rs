@@ -1,7 +1,7 @@
 //! What falls freely carries its scalars with it: none of them is lost in the air, and they land with the liquid.
 
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::free_fall::Falls;
-use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::sources::Kind;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Law, Params, Scalar, Shallow};

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use frazil::Context;
-use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::terrain::Solids;

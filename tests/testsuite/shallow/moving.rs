@@ -1,7 +1,7 @@
 //! Terrain that moves takes its liquid along, and none is lost.
 
 use frazil::geometry::DVec3;
-use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights, TOP};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights, TOP};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::sources::{FlowPoint, Kind};

@@ -1,6 +1,6 @@
 //! Read-back and snapshots: volumes against sums by hand, points on layers, and velocities from all sides.
 
-use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;

@@ -1,7 +1,7 @@
 //! What the liquid carries: amounts add up to the last one, and concentrations stay between those that came in.
 
 use frazil::geometry::DVec3;
-use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind};

@@ -2,7 +2,7 @@
 
 use frazil::Context;
 use frazil::geometry::{TriMesh, Vec3};
-use frazil::shallow::grid::{Grid, Heights};
+use frazil::shallow::columns::grid::{Grid, Heights};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::stains::Absorbing;
 use frazil::shallow::terrain::triangles;

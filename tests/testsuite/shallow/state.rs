@@ -1,6 +1,6 @@
 //! Saved states: what is restored flows on to the same bytes, and what is damaged changes nothing.
 
-use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::params::Pace;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind, Pulse};

@@ -4,9 +4,9 @@ use super::surface_mesh::{Mesh, build_with, columns, ground, pool, units};
 use crate::common::bodies::Dice;
 use crate::common::rough_ground::{Kind, rough};
 use frazil::geometry::Vec3;
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, TOP};
 use frazil::shallow::columns::{Columns, NONE};
-use frazil::shallow::grid::{BOTTOMLESS, Grid, TOP};
-use frazil::shallow::surface::minimum_heights::{Distance, Fitted, Lifts};
+use frazil::shallow::surface::heights::minimum_heights::{Distance, Fitted, Lifts};
 use frazil::shallow::surface::{Depths, Layout, Surface};
 use frazil::shallow::terrain::Solids;
 

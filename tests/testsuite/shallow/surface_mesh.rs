@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use frazil::shallow::columns::Columns;
-use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights, TOP};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights, TOP};
 use frazil::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target, bound};
 use frazil::shallow::terrain::Solids;
 

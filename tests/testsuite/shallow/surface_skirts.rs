@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use frazil::geometry::Vec3;
 use frazil::shallow::columns::Columns;
-use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
-use frazil::shallow::surface::ledges::Ledges;
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
+use frazil::shallow::surface::rim::ledges::Ledges;
 use frazil::shallow::surface::{Depths, Layout, Surface};
 use frazil::shallow::terrain::{Solids, triangles};
 

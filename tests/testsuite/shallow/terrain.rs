@@ -1,7 +1,7 @@
 //! Terrain to columns: the solids of meshes against exact winding numbers, and against each other where their makers differ.
 
 use frazil::geometry::{DVec3, TriMesh, Vec3};
-use frazil::shallow::grid::{Grid, Heights};
+use frazil::shallow::columns::grid::{Grid, Heights};
 use frazil::shallow::terrain::solids::Solid;
 use frazil::shallow::terrain::{Solids, height, sampler, shapes::Shape, triangles};
 

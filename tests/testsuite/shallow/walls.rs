@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use frazil::shallow::grid::{BOTTOMLESS, Grid, Heights};
+use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
 use frazil::shallow::params::{Friction, Pace, Section};
 use frazil::shallow::terrain::Solids;

@@ -2,7 +2,7 @@
 
 use frazil::geometry::DVec3;
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
-use frazil::snow::volumes::{fog, united};
+use frazil::snow::render_volumes::{fog, united};
 use frazil::vdb::file::to_bytes;
 use frazil::vdb::{FloatGrid, GridClass, MetaValue, level_set};
 use frazil::{Context, Pool};

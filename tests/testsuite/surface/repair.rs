@@ -6,7 +6,7 @@ use frazil::geometry::check::faults::Faults;
 use frazil::geometry::check::topology::Topology;
 use frazil::geometry::mesh::coincident;
 use frazil::geometry::{TriMesh, Vec3};
-use frazil::surface::{RepairReport, Repaired, Source, repair};
+use frazil::mesh_repair::{RepairReport, Repaired, Source, repair};
 
 use crate::common::bodies::{icosphere, models};
 use crate::common::broken_meshes::{self, Broken};

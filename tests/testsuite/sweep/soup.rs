@@ -4,9 +4,9 @@
 use std::sync::Arc;
 
 use frazil::geometry::{DVec3, TriMesh, Vec3};
+use frazil::mesh_repair::repair;
 use frazil::motion::{Key, Keys, Morph, Motion, Placed, Rigid, Space, Up};
 use frazil::snow::base_layer::initial::{self, Cover, Ground};
-use frazil::surface::repair;
 use frazil::sweep::{self, Body, Settings};
 use frazil::{Context, Pool};
 

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use frazil::geometry::DVec3;
 use frazil::geometry::points::{Column, Points, Values};
 use frazil::vdb::file::{Compression, WriteOptions};
-use frazil::vdb::guard::Guard;
+use frazil::vdb::reading::guard::Guard;
 use frazil::vdb::{FloatGrid, MetaValue, file, points};
 use frazil::{Context, Error, Pool};
 

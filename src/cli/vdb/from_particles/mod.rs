@@ -4,12 +4,12 @@ mod colliders;
 mod shape;
 
 use super::{Packing, check_name};
-use crate::cli::cloud::points_of_vdb;
 use crate::cli::each::Each;
-use crate::cli::exit::{Failure, Phase};
 use crate::cli::options::{MeshSpace, positive, triple};
 use crate::cli::output;
+use crate::cli::points::points_of_vdb;
 use crate::cli::session::Session;
+use crate::cli::session::exit::{Failure, Phase};
 use colliders::Colliders;
 use frazil::geometry::mesh::attributes::{Number, On};
 use frazil::geometry::points::{Attribute, Values};

@@ -69,7 +69,7 @@ pub(in crate::scene::snow) fn of_volumes(scene: &Scene, inputs: &Inputs, grains:
 /// Voxels of the united surface along a cell's edge.
 pub(in crate::scene::snow) fn division(scene: &Scene, inputs: &Inputs) -> usize {
     let cell = inputs.snow.cell;
-    snow::volumes::united::division(cell, params(scene, cell).radius)
+    snow::render_volumes::united::division(cell, params(scene, cell).radius)
 }
 
 /// Estimates the memory (bytes) of the stage grains, with so many of them: it has the base before and after a frame, and

@@ -21,7 +21,7 @@ use crate::scene::snow::estimate::memory;
 use crate::scene::snow::keys::volumes::Needs;
 use crate::scene::{Scene, VolumesOutput};
 use crate::snow::base_layer::Grids;
-use crate::snow::volumes::{fog, united};
+use crate::snow::render_volumes::{fog, united};
 use crate::vdb::file::{WriteOptions, to_bytes};
 use crate::vdb::{FloatGrid, level_set};
 

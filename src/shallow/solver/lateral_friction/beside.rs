@@ -271,7 +271,7 @@ impl Beyond<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shallow::grid::TOP;
+    use crate::shallow::columns::grid::TOP;
 
     /// Cells of 1,000 units.
     fn step() -> Step {

@@ -22,8 +22,8 @@ use super::active::Active;
 use super::fast_films::Fast;
 use super::flux::Step;
 use super::pressurised::network::Network;
+use crate::shallow::columns::grid::TOP;
 use crate::shallow::columns::{Columns, STRIP, strip_of};
-use crate::shallow::grid::TOP;
 use crate::shallow::pipes::{Links, Pipes};
 use lines::Lines;
 
@@ -74,7 +74,7 @@ pub struct Liquid<'a> {
     pub is_divided: bool,
 }
 
-/// Numbers by column index, with some before the first and behind the last. Each list begins at another place of a page (`per_column.rs`).
+/// Numbers by column index, with some before the first and behind the last. Each list begins at another place of a page (`columns/per_column.rs`).
 #[derive(Debug, Clone, Default)]
 struct Numbers {
     before: usize,

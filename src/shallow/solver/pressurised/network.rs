@@ -9,18 +9,18 @@ use std::ops::Range;
 
 use super::gradients::Gradients;
 use super::heads::{EQUAL, Node, section};
+use crate::shallow::columns::grid::TOP;
+use crate::shallow::columns::per_column::{Array, PerColumn};
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
-use crate::shallow::grid::TOP;
-use crate::shallow::per_column::{Array, PerColumn};
 use crate::shallow::pipes::Pipes;
-use crate::shallow::solver::bands::Filling;
 use crate::shallow::solver::flux::Step;
 use crate::shallow::solver::lateral_friction::Walls;
-use crate::shallow::solver::limiter;
-use crate::shallow::solver::limiter::Party;
 use crate::shallow::solver::links::LinkFlow;
 use crate::shallow::solver::overflow_edges::{Fall, Lips, edge};
+use crate::shallow::solver::rows::bands::Filling;
 use crate::shallow::solver::stop::Stop;
+use crate::shallow::solver::transfers::limiter;
+use crate::shallow::solver::transfers::limiter::Party;
 
 /// A column is full when it misses at most its room over this.
 pub const SLACK: i32 = 128;

@@ -4,9 +4,9 @@
 use super::stitches::Stitches;
 use crate::shallow::columns::Columns;
 use crate::shallow::scalars::MOST;
-use crate::shallow::surface::normals::upright;
-use crate::shallow::surface::shown::height_of;
-use crate::shallow::surface::vertices::SURFACE_SPEED;
+use crate::shallow::surface::buffers::normals::upright;
+use crate::shallow::surface::buffers::vertices::SURFACE_SPEED;
+use crate::shallow::surface::heights::shown::height_of;
 use crate::shallow::surface::{Depths, Layout, Target, Up};
 use crate::shallow::two_level::Detail;
 

@@ -12,7 +12,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::numeric::blocks::{BlockEdit, DIM, Origin, VOXELS};
-use crate::snow::base_layer::{filled, filling};
+use crate::snow::base_layer::{filled, removed_volume};
 use crate::vdb::{FloatGrid, Probe};
 
 use super::claims::Claims;
@@ -144,7 +144,7 @@ fn volumes(before: &FloatGrid, after: &FloatGrid, origins: &[Origin]) -> Result<
 /// Volume (cells) that a block lost.
 fn lost(old: &Probe<'_>, new: &Probe<'_>, cell: f32) -> f64 {
     let volume = |probe: &Probe<'_>| match probe {
-        Probe::Leaf(leaf) => filling::volume(leaf.values, cell),
+        Probe::Leaf(leaf) => removed_volume::volume(leaf.values, cell),
         Probe::Tile { value, .. } => f64::from(filled(*value, cell)) * VOXELS as f64,
     };
     match (old, new) {

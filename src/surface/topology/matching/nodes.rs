@@ -6,7 +6,7 @@ use super::solve::{NONE, Row};
 use super::{Node, PIECE};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::surface::particles::grid::Coord;
+use crate::geometry::Coord;
 
 /// What happens to a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,0 +1,153 @@
+//! Minimum heights of shallow liquid: how far its films are lifted so that the ground's mesh does not show through them.
+
+use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::handle::change;
+use crate::capi::ffi::views::{Sized32, fill, sized};
+use crate::capi::mesh::triangles::no_flags;
+use crate::capi::runtime::context::{enter_light, frz_context};
+use crate::capi::shallow::liquid::{Spill, frz_shallow};
+use crate::capi::shallow::terrain::{Terrain, cells_in};
+use crate::shallow::surface::heights::minimum_heights::{Distance, Fitted, Lifts};
+
+/// What a thin film keeps from the ground's mesh, in edges of a cell, each finite and 0 or more.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_shallow_distance {
+    /// sizeof(frz_shallow_distance).
+    pub struct_size: u32,
+    /// 0.
+    pub flags: u32,
+    /// How far the surface is over wet ground at least; 0.05 is usual.
+    pub least: f64,
+    /// How far it is over the mesh's vertices; 0.01 is usual.
+    pub margin: f64,
+    /// How far its rim is below them and below dry ground; 0.1 is usual. More than the margin.
+    pub rim: f64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_shallow_distance {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_shallow_distance";
+}
+
+impl frz_shallow_distance {
+    fn defaults() -> Self {
+        let Distance { least, margin, rim } = Distance::default();
+        Self { struct_size: 0, flags: 0, least, margin, rim }
+    }
+}
+
+/// What became of the mesh's vertices that face up, of those that a call looked at.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_shallow_fitted {
+    /// sizeof(frz_shallow_fitted), set by the caller.
+    pub struct_size: u32,
+    /// Nothing.
+    pub reserved: u32,
+    /// Count of them.
+    pub upward: u64,
+    /// Of these, those that are more than a cell above the ground around: they may be above the surface.
+    pub discarded: u64,
+    /// Of the others, those that lie too close under a ceiling.
+    pub capped: u64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_shallow_fitted {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_shallow_fitted";
+}
+
+impl From<Fitted> for frz_shallow_fitted {
+    fn from(fitted: Fitted) -> Self {
+        Self {
+            struct_size: 0,
+            reserved: 0,
+            upward: fitted.upward as u64,
+            discarded: fitted.discarded as u64,
+            capped: fitted.capped as u64,
+        }
+    }
+}
+
+/// Minimum heights of a liquid.
+#[derive(Default)]
+pub(in crate::capi) struct Lifted {
+    lifts: Lifts,
+    /// Whether they are of the ground as it is.
+    pub is_current: bool,
+}
+
+impl Lifted {
+    /// Least and sunk depths, if they are of the ground as it is.
+    pub(in crate::capi) fn known(&self) -> Option<(&[i32], &[i32])> {
+        self.is_current.then(|| (self.lifts.least(), self.lifts.sunk()))
+    }
+
+    /// The same, or the failure of a surface that wants them.
+    pub(in crate::capi) fn current(&self) -> Outcome<(&[i32], &[i32])> {
+        self.known().ok_or_else(|| no_lifts("since the ground or a body moved"))
+    }
+}
+
+/// The failure of a surface for which there are no minimum heights.
+pub(in crate::capi) fn no_lifts(when: &str) -> Failure {
+    Failure::argument(format!(
+        "FRZ_SHALLOW_LIFTED: frz_shallow_find_lifts has found no minimum heights {when}"
+    ))
+}
+
+/// Finds the minimum heights of all columns, or of those that have changed, from the mesh that the liquid was made with, in real time (frz_shallow), for
+/// surfaces with FRZ_SHALLOW_LIFTED. They change what is shown, and nothing of the flow. It looks at all triangles once; after
+/// frz_shallow_update_terrain or _set_bodies have moved something it is called again, before the next such surface.
+///
+/// distance: NULL for the usual one. Another one than before needs all columns.
+/// bounds: double[4], least x, least z, greatest x and greatest z (m) of all that has moved since the last call, triangles and bodies, where they were
+///     and where they are. NULL, and the first time: all columns.
+/// fitted: receives what became of the vertices, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_find_lifts(
+    context: *mut frz_context,
+    shallow: *mut frz_shallow,
+    distance: *const frz_shallow_distance,
+    bounds: *const f64,
+    fitted: *mut frz_shallow_fitted,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            if !fitted.is_null() {
+                fill(fitted, None, Fitted::default().into())?;
+            }
+            let distance = match distance.is_null() {
+                true => frz_shallow_distance::defaults(),
+                false => sized(distance, frz_shallow_distance::defaults())?,
+            };
+            no_flags(distance.flags, 0)?;
+            let frz_shallow_distance { least, margin, rim, .. } = distance;
+            let _call = enter_light(context)?;
+            let mut spill = change(shallow)?;
+            let Spill { shallow, terrain, lifted: Lifted { lifts, is_current }, .. } = &mut *spill;
+            let cells = cells_in(&shallow.columns().grid, bounds)?;
+            let Terrain::Mesh(mesh) = terrain else {
+                return Err(Failure::argument(
+                    "the liquid was not made with a mesh: it needs no minimum heights",
+                ));
+            };
+            let (columns, distance) = (shallow.columns(), Distance { least, margin, rim });
+            let (positions, triangles) = (&mesh.positions, &mesh.triangles);
+            let found = if lifts.least().is_empty() {
+                lifts.reserve(columns.strips().len(), positions.len());
+                lifts.find(columns, positions, triangles, distance)?
+            } else {
+                lifts.update(columns, positions, triangles, distance, cells)?
+            };
+            *is_current = true;
+            if fitted.is_null() { Ok(()) } else { fill(fitted, None, found.into()) }
+        }
+    })
+}

@@ -1,0 +1,451 @@
+//! The surface of shallow liquid as a mesh, written into a host's buffers.
+
+pub mod ledges;
+pub mod minimum_heights;
+
+use std::cell::RefCell;
+
+use super::liquid::{Spill, frz_shallow};
+use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::handle::{change, read};
+use crate::capi::ffi::views::{Sized32, fill, frz_span, sized};
+use crate::capi::mesh::triangles::no_flags;
+use crate::capi::runtime::context::{enter_light, frz_context};
+use crate::shallow::columns::Columns;
+use crate::shallow::scalars::MOST;
+use crate::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target, Up, bound};
+
+/// Flag of a layout: Z is up. The axes are then (x, -z, y) of those with Y up.
+pub const FRZ_SHALLOW_Z_UP: u32 = 1;
+
+/// Flag of a layout: left-handed axes, as of Unity (Y up) and Unreal (Z up): the horizontal axis that is not x points the other way, and
+/// faces are clockwise seen from above.
+pub const FRZ_SHALLOW_LEFT_HANDED: u32 = 2;
+
+/// Flag of a layout: films are shown at their minimum heights, which frz_shallow_find_lifts has found since the ground or a body moved last, in place
+/// of frz_shallow_layout.least_depth.
+pub const FRZ_SHALLOW_LIFTED: u32 = 4;
+
+/// Flag of a layout: where the ground ends over nothing, the surface goes on to its edge and comes down to it, in place of ending in the middle of the
+/// last cell, open below. frz_shallow_find_ledges has found where since the ground or a body moved last.
+pub const FRZ_SHALLOW_SKIRTED: u32 = 8;
+
+/// How a surface is written.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_shallow_layout {
+    /// sizeof(frz_shallow_layout).
+    pub struct_size: u32,
+    /// FRZ_SHALLOW_Z_UP, FRZ_SHALLOW_LEFT_HANDED, FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, several of them or 0, which is usual: Y up, right-handed.
+    pub flags: u32,
+    /// The host's units of length in a metre, over 0: 1 is usual, 100 for centimetres. For positions, depths and velocities.
+    pub scale: f64,
+    /// Least height of the surface over wet ground (m), 0 or more, against flicker where the ground is drawn too. 0 is usual; 0.05 of
+    /// a cell in the thesis.
+    pub least_depth: f64,
+    /// Depth (m) from which frz_shallow_target.opacities are 1, over 0; 0.01 is usual.
+    pub opaque_depth: f64,
+    /// Depth (m) from which a wet vertex is at its full height, so that none jumps as its column wets or dries, 0 or more; 0 is usual: at once. With
+    /// FRZ_SHALLOW_LIFTED 0.02 of a cell does well.
+    pub fade_depth: f64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_shallow_layout {
+    const SIZES: &'static [usize] =
+        &[std::mem::offset_of!(frz_shallow_layout, fade_depth), size_of::<Self>()];
+    const NAME: &'static str = "frz_shallow_layout";
+}
+
+impl frz_shallow_layout {
+    fn defaults() -> Self {
+        let defaults = Layout::default();
+        Self {
+            struct_size: 0,
+            flags: 0,
+            scale: defaults.scale,
+            least_depth: defaults.least_depth,
+            opaque_depth: defaults.opaque_depth,
+            fade_depth: defaults.fade_depth,
+        }
+    }
+
+    /// The library's own layout, of which some flags may be set.
+    fn layout(&self) -> Outcome<Layout> {
+        no_flags(
+            self.flags,
+            FRZ_SHALLOW_Z_UP | FRZ_SHALLOW_LEFT_HANDED | FRZ_SHALLOW_LIFTED | FRZ_SHALLOW_SKIRTED,
+        )?;
+        Ok(Layout {
+            scale: self.scale,
+            up: if self.flags & FRZ_SHALLOW_Z_UP != 0 { Up::Z } else { Up::Y },
+            left_handed: self.flags & FRZ_SHALLOW_LEFT_HANDED != 0,
+            least_depth: self.least_depth,
+            opaque_depth: self.opaque_depth,
+            fade_depth: self.fade_depth,
+        })
+    }
+}
+
+/// Buffers that a surface is written into. Those with data NULL are not wanted, and it begins zeroed: all of them. They may be mapped memory
+/// of a graphics device: each is written from its beginning, in order, and never read. Elements are packed (a stride of 0, or their size) and
+/// aligned to their numbers; no two buffers overlap. They may be longer than the surface; what is behind it is not touched.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_shallow_target {
+    /// sizeof(frz_shallow_target).
+    pub struct_size: u32,
+    /// Bits of an index: 16, for at most 65536 vertices, or 32. 0 without indices.
+    pub index_bits: u32,
+    /// float[3] a vertex: where it is (m x scale).
+    pub positions: frz_span,
+    /// float[3] a vertex: a unit vector.
+    pub normals: frz_span,
+    /// float a vertex: depth (m x scale); 0 where it is dry.
+    pub depths: frz_span,
+    /// float a vertex: depth over frz_shallow_layout.opaque_depth, at most 1.
+    pub opacities: frz_span,
+    /// float[3] a vertex: velocity at the surface (m/s x scale), 1.5 times the mean one, level.
+    pub velocities: frz_span,
+    /// uint32_t a vertex: the layer of its column.
+    pub layers: frz_span,
+    /// uint32_t a vertex: the index of its column; 0xffffffff for one beside a wall or on the ground's edge,
+    /// which has none.
+    pub columns: frz_span,
+    /// uint16_t or uint32_t for each corner of each triangle: a vertex. Triangles face up.
+    pub indices: frz_span,
+    /// float a vertex, of each scalar that frz_shallow_set_scalars has set: its concentration; of one that is dry or has no column, the mean of the wet
+    /// ones around.
+    pub scalars: [frz_span; 4],
+}
+
+// SAFETY: numbers and pointers.
+unsafe impl Sized32 for frz_shallow_target {
+    const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_shallow_target, scalars), size_of::<Self>()];
+    const NAME: &'static str = "frz_shallow_target";
+}
+
+pub(in crate::capi) const NO_SPAN: frz_span = frz_span { data: std::ptr::null_mut(), count: 0, stride: 0 };
+
+/// A buffer: its name, the bytes of an element, and whether there is one for each vertex.
+pub(in crate::capi) type Buffer<'a> = (&'static str, &'a frz_span, usize, bool);
+
+/// Refuses buffers that overlap, and indices of an unknown size.
+pub(in crate::capi) fn check_buffers(buffers: &[Buffer<'_>], index_bits: u32) -> Outcome {
+    let ends = |span: &frz_span, bytes: usize| {
+        let first = span.data as usize;
+        [first, first.saturating_add(span.count.saturating_mul(bytes))]
+    };
+    for (at, (name, span, bytes, _)) in buffers.iter().enumerate() {
+        let [first, end] = ends(span, *bytes);
+        for (other, before, bytes, _) in &buffers[..at] {
+            let [other_first, other_end] = ends(before, *bytes);
+            if first < other_end && other_first < end && !span.data.is_null() && !before.data.is_null() {
+                return Err(Failure::argument(format!("{name} and {other} overlap")));
+            }
+        }
+    }
+    let has_indices = buffers.iter().any(|(name, span, ..)| *name == "indices" && !span.data.is_null());
+    if !has_indices || [16, 32].contains(&index_bits) {
+        return Ok(());
+    }
+    Err(Failure::argument(format!("index_bits = {index_bits} is not 16 or 32")))
+}
+
+/// Refuses buffers that are too small.
+pub(in crate::capi) fn check_room(buffers: &[Buffer<'_>], counts: &Counts) -> Outcome {
+    for (name, span, _, is_of_vertices) in buffers {
+        let needed = if *is_of_vertices { counts.vertices } else { counts.indices };
+        if !span.data.is_null() {
+            span.check_room(name, needed)?;
+        }
+    }
+    Ok(())
+}
+
+impl frz_shallow_target {
+    const NONE: Self = Self {
+        struct_size: 0,
+        index_bits: 0,
+        positions: NO_SPAN,
+        normals: NO_SPAN,
+        depths: NO_SPAN,
+        opacities: NO_SPAN,
+        velocities: NO_SPAN,
+        layers: NO_SPAN,
+        columns: NO_SPAN,
+        indices: NO_SPAN,
+        scalars: [NO_SPAN; MOST],
+    };
+
+    /// The buffers.
+    fn buffers(&self) -> [Buffer<'_>; 12] {
+        let [a, b, c, d] = &self.scalars;
+        [
+            ("positions", &self.positions, 12, true),
+            ("normals", &self.normals, 12, true),
+            ("depths", &self.depths, 4, true),
+            ("opacities", &self.opacities, 4, true),
+            ("velocities", &self.velocities, 12, true),
+            ("layers", &self.layers, 4, true),
+            ("columns", &self.columns, 4, true),
+            ("scalars", a, 4, true),
+            ("scalars", b, 4, true),
+            ("scalars", c, 4, true),
+            ("scalars", d, 4, true),
+            ("indices", &self.indices, self.index_bits as usize / 8, false),
+        ]
+    }
+
+    /// The library's own buffers.
+    ///
+    /// # Safety
+    /// The spans must describe memory that can be written and that nothing else uses, for `'a`.
+    unsafe fn target<'a>(&self) -> Outcome<Target<'a>> {
+        check_buffers(&self.buffers(), self.index_bits)?;
+        // SAFETY: the caller's promise, and they do not overlap.
+        unsafe {
+            let indices = match self.index_bits {
+                16 => self.indices.numbers("indices", 1)?.map_or(Indices::None, Indices::U16),
+                _ => self.indices.numbers("indices", 1)?.map_or(Indices::None, Indices::U32),
+            };
+            Ok(Target {
+                positions: self.positions.numbers("positions", 3)?,
+                normals: self.normals.numbers("normals", 3)?,
+                depths: self.depths.numbers("depths", 1)?,
+                opacities: self.opacities.numbers("opacities", 1)?,
+                velocities: self.velocities.numbers("velocities", 3)?,
+                layers: self.layers.numbers("layers", 1)?,
+                columns: self.columns.numbers("columns", 1)?,
+                carried: {
+                    let mut carried = [const { None }; MOST];
+                    for (to, span) in carried.iter_mut().zip(&self.scalars) {
+                        *to = span.numbers("scalars", 1)?;
+                    }
+                    carried
+                },
+                indices,
+            })
+        }
+    }
+}
+
+/// Size of a surface.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_shallow_size {
+    /// sizeof(frz_shallow_size), set by the caller.
+    pub struct_size: u32,
+    /// Nothing.
+    pub reserved: u32,
+    /// Count of vertices.
+    pub vertices: u64,
+    /// Count of indices: three for each triangle.
+    pub indices: u64,
+}
+
+// SAFETY: numbers.
+unsafe impl Sized32 for frz_shallow_size {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_shallow_size";
+}
+
+impl From<Counts> for frz_shallow_size {
+    fn from(counts: Counts) -> Self {
+        Self { struct_size: 0, reserved: 0, vertices: counts.vertices as u64, indices: counts.indices as u64 }
+    }
+}
+
+/// The library's own layout from a host's, with its flags; the usual one for NULL.
+///
+/// # Safety
+/// As [`sized`].
+pub(in crate::capi) unsafe fn layout(pointer: *const frz_shallow_layout) -> Outcome<(Layout, u32)> {
+    if pointer.is_null() {
+        return Ok((Layout::default(), 0));
+    }
+    // SAFETY: the caller's promise.
+    let given = unsafe { sized(pointer, frz_shallow_layout::defaults()) }?;
+    Ok((given.layout()?, given.flags))
+}
+
+/// What a surface is made of and into.
+pub(in crate::capi) struct Wanted {
+    layout: Layout,
+    given: frz_shallow_target,
+    size: *mut frz_shallow_size,
+    /// Whether minimum heights are wanted.
+    pub(in crate::capi) is_lifted: bool,
+    /// Whether it comes down at ledges.
+    pub(in crate::capi) is_skirted: bool,
+}
+
+impl Wanted {
+    /// What a host wants.
+    ///
+    /// # Safety
+    /// The pointers must be NULL or the caller's.
+    pub(in crate::capi) unsafe fn new(
+        layout: *const frz_shallow_layout,
+        target: *const frz_shallow_target,
+        size: *mut frz_shallow_size,
+    ) -> Outcome<Self> {
+        // SAFETY: the caller's promise.
+        unsafe {
+            if !size.is_null() {
+                fill(size, None, Counts::default().into())?;
+            }
+            let (layout, flags) = self::layout(layout)?;
+            let given = sized(target, frz_shallow_target::NONE)?;
+            let has = |flag: u32| flags & flag != 0;
+            let (is_lifted, is_skirted) = (has(FRZ_SHALLOW_LIFTED), has(FRZ_SHALLOW_SKIRTED));
+            Ok(Self { layout, given, size, is_lifted, is_skirted })
+        }
+    }
+
+    /// Whether velocities are wanted.
+    pub(in crate::capi) fn velocities(&self) -> bool {
+        !self.given.velocities.data.is_null()
+    }
+
+    /// Whether the concentrations of a scalar are wanted.
+    pub(in crate::capi) fn scalar(&self, scalar: usize) -> bool {
+        !self.given.scalars[scalar].data.is_null()
+    }
+
+    /// Writes the surface and its size.
+    ///
+    /// # Safety
+    /// As in [`Wanted::new`], and the spans must describe memory that can be written.
+    pub(in crate::capi) unsafe fn write(
+        &self,
+        surface: &mut Surface,
+        columns: &Columns,
+        depths: &Depths<'_>,
+    ) -> Outcome {
+        let surface = RefCell::new(surface);
+        // SAFETY: the caller's promise.
+        unsafe {
+            self.write_with(
+                |layout, target| surface.borrow_mut().build(columns, depths, layout, target),
+                || surface.borrow_mut().count(columns, depths),
+            )
+        }
+    }
+
+    /// Writes a surface and its size, by what builds one and what counts it.
+    ///
+    /// # Safety
+    /// As [`Wanted::write`].
+    pub(in crate::capi) unsafe fn write_with(
+        &self,
+        build: impl FnOnce(&Layout, &mut Target<'_>) -> crate::Result<Counts>,
+        count: impl FnOnce() -> crate::Result<Counts>,
+    ) -> Outcome {
+        // SAFETY: the caller's promise.
+        let mut target = unsafe { self.given.target() }?;
+        let built = build(&self.layout, &mut target);
+        // What is too small is found out behind, so that a surface that fits is searched once.
+        let (counts, fits) = match built {
+            Ok(counts) => (counts, Ok(())),
+            Err(error) => {
+                let counts = count()?;
+                match check_room(&self.given.buffers(), &counts) {
+                    Ok(()) => return Err(error.into()),
+                    short => (counts, short),
+                }
+            }
+        };
+        if !self.size.is_null() {
+            // SAFETY: the caller's promise.
+            unsafe { fill(self.size, None, counts.into()) }?;
+        }
+        fits
+    }
+}
+
+/// Fills a layout with the usual values.
+///
+/// layout: receives them.
+/// size: sizeof(frz_shallow_layout).
+///
+/// Any thread.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_layout_init(layout: *mut frz_shallow_layout, size: usize) -> frz_status {
+    // SAFETY: the layout is NULL or has so many bytes.
+    guard(|| unsafe { fill(layout, Some(size), frz_shallow_layout::defaults()) })
+}
+
+/// Reports the most that the surface of any liquid on this ground can have, so that buffers are made once. It holds until the ground
+/// or a body moves. On ground with uneven ceilings it is several times what a liquid comes to. With FRZ_SHALLOW_SKIRTED what
+/// frz_shallow_find_ledges reports comes on top.
+///
+/// size: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+///
+/// Any number of threads may read a shallow liquid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_surface_bound(
+    shallow: *const frz_shallow,
+    size: *mut frz_shallow_size,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's.
+        unsafe {
+            fill(size, None, Counts::default().into())?;
+            fill(size, None, bound(read(shallow)?.shallow.columns()).into())
+        }
+    })
+}
+
+/// Writes the liquid's surface as triangles, in real time (frz_shallow): the wet columns and the dry ones around them. It ends at the
+/// middles of the outermost cells. Vertices come in the order of their columns' indices, those beside walls behind them, and those on the ground's
+/// edges last.
+///
+/// layout: NULL for the usual one.
+/// target: the buffers. FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed. With all data
+///     NULL it is the size only that is asked for.
+/// size: receives the size of the surface, all zeroes after other failures; may be NULL. Its struct_size is set by the caller.
+///
+/// One thread at a time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn frz_shallow_surface(
+    context: *mut frz_context,
+    shallow: *mut frz_shallow,
+    layout: *const frz_shallow_layout,
+    target: *const frz_shallow_target,
+    size: *mut frz_shallow_size,
+) -> frz_status {
+    guard(|| {
+        // SAFETY: the pointers are NULL or the caller's; so is what the spans describe.
+        unsafe {
+            let wanted = Wanted::new(layout, target, size)?;
+            let _call = enter_light(context)?;
+            let mut spill = change(shallow)?;
+            let Spill { shallow, surface, velocities, concentrations, lifted, ledged, .. } = &mut *spill;
+            let (least, sunk) = if wanted.is_lifted { lifted.current()? } else { Default::default() };
+            let ledges = ledged.wanted(wanted.is_skirted, "since the ground or a body moved")?;
+            for (scalar, numbers) in concentrations.iter_mut().enumerate() {
+                let len = if wanted.scalar(scalar) { shallow.columns().len() } else { 0 };
+                numbers.resize(len, 0.0);
+                if len > 0 {
+                    shallow.concentrations(scalar, numbers)?;
+                }
+            }
+            if wanted.velocities() {
+                velocities.resize(shallow.columns().len(), [0.0; 2]);
+                shallow.velocities(velocities)?;
+            }
+            let velocity: &[[f32; 2]] = if wanted.velocities() { velocities } else { &[] };
+            let depths = Depths {
+                depth: shallow.depths(),
+                velocity,
+                active: Some(shallow.active()),
+                least,
+                sunk,
+                carried: concentrations.each_ref().map(|numbers| &numbers[..]),
+                ledges,
+            };
+            wanted.write(surface, shallow.columns(), &depths)
+        }
+    })
+}

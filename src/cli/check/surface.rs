@@ -1,0 +1,79 @@
+//! What a scene with a mesh that follows a liquid will do: counts, sizes, disk, and what looks wrong.
+
+use std::fmt::Write;
+
+use frazil::scene::Scene;
+use frazil::scene::surface::{Inputs, Report, check};
+
+use super::{Args, size};
+use crate::cli::output;
+use crate::cli::session::Session;
+use crate::cli::session::exit::{Failure, Phase};
+
+/// Checks the scene.
+pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure> {
+    if args.preview.is_some() {
+        let what = format!("{}: --preview is for snow, not for [surface]", args.scene.display());
+        return Err(Failure::refused(what));
+    }
+    // A mesh may have to be repaired.
+    session.ctx.set_memory_limit(session.max_memory());
+    let inputs = Inputs::load(&session.ctx, scene).before()?;
+    session.ctx.set_memory_limit(u64::MAX);
+    let mut report = check(&session.ctx, scene, &inputs).before()?;
+    let limit = session.max_memory();
+    if let Err(error) = report.check_memory(limit) {
+        // A run reads no frame ahead, so that it cannot know.
+        let what = format!("{error}; a run begins all the same, and ends where one part needs more");
+        report.warnings.push(what);
+    }
+    let free = args.free_space();
+    if let Some(free) = free.filter(|free| report.disk_bytes > *free) {
+        let (needed, free) = (size(report.disk_bytes), size(free));
+        report.warnings.push(format!("the files need about {needed}, but only {free} are free"));
+    }
+    let text = if args.json {
+        format!("{:#}\n", serde_json::to_value(&report).expect("plain values become JSON"))
+    } else {
+        in_words(&report, limit, free)
+    };
+    output::print(&text).during()
+}
+
+fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
+    let mut out = String::new();
+    let [first, last] = report.frames;
+    let count = i64::from(last) - i64::from(first) + 1;
+    let seconds = count as f64 / report.fps;
+    let _ = writeln!(out, "frames    {first}-{last}: {count}, {seconds:.2} s at {} a second", report.fps);
+    let [least, most] = report.particles;
+    let counts = if least == most { least.to_string() } else { format!("{least} to {most}") };
+    let told = match (report.has_ids, report.has_velocities) {
+        (true, true) => "ids and velocities",
+        (true, false) => "ids, no velocities",
+        (false, true) => "no ids, velocities",
+        (false, false) => "neither ids nor velocities",
+    };
+    let _ = writeln!(
+        out,
+        "liquid    {} files of {counts} particles, {:.6} m apart; {told}",
+        report.files, report.spacing_m
+    );
+    let [low, high] = report.particles_bounds_m.map(|p| format!("({:.2}, {:.2}, {:.2})", p[0], p[1], p[2]));
+    let _ = writeln!(out, "          from {low} to {high} over the shot");
+    let [width, height, depth] = report.size_m;
+    let _ = writeln!(
+        out,
+        "mesh      {} vertices, {} triangles, edges of {:.5} m",
+        report.vertices, report.triangles, report.edge_m
+    );
+    let _ = writeln!(out, "          {width:.3} x {height:.3} x {depth:.3} m (x, y, z) at the first frame");
+    let free = free.map_or(String::new(), |free| format!(" of {} free", size(free)));
+    let _ = writeln!(out, "memory    about {} of {}", size(report.memory_bytes), size(limit));
+    let each = size(report.frame_bytes);
+    let _ = writeln!(out, "disk      about {}{free}; {each} a frame", size(report.disk_bytes));
+    report.warnings.iter().for_each(|warning| {
+        let _ = writeln!(out, "warning   {warning}");
+    });
+    out
+}

@@ -1,0 +1,41 @@
+//! The meshes that `frazil mesh compare` compares.
+
+use std::path::Path;
+
+use frazil::geometry::{PolygonMesh, TriMesh};
+use frazil::motion::{Character, is_gltf};
+
+use crate::cli::options::{Origin, warn_if_far};
+
+/// A mesh in triangles, and its faces as the file has them: those of bent polygons may be cut otherwise in another frame.
+pub struct Model {
+    /// In triangles.
+    pub mesh: TriMesh,
+    /// As the file has them, without what they carry.
+    pub faces: PolygonMesh,
+}
+
+impl Model {
+    /// Reads that of a file, less an origin.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read(path: &Path, origin: &Origin) -> frazil::Result<Self> {
+        if !is_gltf(path) {
+            let read = origin.read(path)?;
+            let mesh = TriMesh { triangles: read.triangles(), positions: read.positions.clone() };
+            warn_if_far(path, &mesh);
+            return Ok(Self { mesh, faces: PolygonMesh { uvs: None, arrays: Vec::new(), ..read } });
+        }
+        let mesh = Character::at_rest_from(path, origin.at)?;
+        warn_if_far(path, &mesh);
+        let mut faces = PolygonMesh { positions: mesh.positions.clone(), ..PolygonMesh::default() };
+        mesh.triangles.iter().for_each(|triangle| faces.push(*triangle));
+        Ok(Self { mesh, faces })
+    }
+
+    /// Whether another model has the same vertices and faces, wherever they are.
+    pub fn has_faces_of(&self, other: &Self) -> bool {
+        self.faces.has_faces_of(&other.faces)
+    }
+}

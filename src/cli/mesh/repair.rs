@@ -1,0 +1,364 @@
+//! `frazil mesh repair`: meshes that are open, cross themselves or are inside out in parts become solids.
+
+use std::path::{Path, PathBuf};
+
+use frazil::geometry::mesh::attributes::On;
+use frazil::geometry::{DVec3, DetailedMesh, MeshArray, TriMesh};
+use frazil::io;
+use frazil::io::files::atomic;
+use frazil::io::files::sequence::Pattern;
+use frazil::io::mesh::extension;
+use frazil::io::usd;
+use frazil::mesh_repair::{Prepared, Repaired, carry_attributes, repair};
+use frazil::motion::{Character, is_gltf};
+use frazil::scene::{FrameChoice, Frames};
+use frazil::{Error, Result};
+use serde_json::{Value, json};
+
+use super::{Counted, form};
+use crate::cli::convert::{Losses, VELOCITY, check_output, prim_name, vectors};
+use crate::cli::options::{MeshSpace, positive, warn_if_far};
+use crate::cli::output;
+use crate::cli::session::Session;
+use crate::cli::session::exit::{Failure, Phase};
+
+/// Make solids of meshes that are open, cross themselves, or are inside out in parts.
+///
+/// The solid is where, with each part turned outward, a point lies inside of at least one: parts that overlap become one, and cavities
+/// are filled. The mesh is rebuilt in the cells of a grid where it is at fault; all other triangles stay as they are, with all that they
+/// carry. What is written has metres, with Y up.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  frazil mesh repair boot.obj -o solid.obj
+  frazil mesh repair boot.obj -o solid.ply --cell 0.01 --json
+  frazil mesh repair body.%04d.obj -o solid.%04d.ply --frames 1-2")]
+pub struct Args {
+    /// Mesh (.obj, .ply, .stl), character at rest (.glb, .gltf), or a sequence of meshes (body.%04d.obj).
+    input: PathBuf,
+    /// File to write (.obj, .ply, .stl, .usda), or a pattern of files.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Edge of the cells (m) [default: the median edge of the first mesh, but between a 400th and a 40th of its longest side].
+    #[arg(long, value_name = "M", value_parser = positive)]
+    cell: Option<f64>,
+    /// Frames of a sequence; each mesh is repaired by itself.
+    #[arg(long, value_name = "A-B|A-BxN", allow_hyphen_values = true)]
+    frames: Option<FrameChoice>,
+    /// Frames a second, for .usda.
+    #[arg(long, default_value = "24", value_parser = positive)]
+    fps: f64,
+    #[command(flatten)]
+    space: MeshSpace,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
+    check_output(&args.output)?;
+    let frames = args.frames()?;
+    output::check_writable(&args.output).before()?;
+    for frame in frames.iter() {
+        let from = of_frame(&args.input, frame);
+        // A gap in a sequence is known before any work.
+        io::files::source::open(&from).before()?;
+        output::refuse_input(&of_frame(&args.output, frame), [from.as_path()]).before()?;
+    }
+    let mut chosen = args.cell.map(Cell::given);
+    let mut told: Vec<Value> = Vec::new();
+    for frame in frames.iter() {
+        session.ctx.check().during()?;
+        let (from, to) = (of_frame(&args.input, frame), of_frame(&args.output, frame));
+        let detail = args.read(&from);
+        // Fail early if the first file lacks it.
+        let detail = if told.is_empty() { detail.before()? } else { detail.during()? };
+        if told.is_empty() {
+            args.warn_of_losses(&from, &detail).before()?;
+        }
+        let cell = *chosen.get_or_insert_with(|| Cell::of(&detail.mesh));
+        let repaired = match repaired(session, &from, &detail.mesh, cell.edge) {
+            Err(error @ Error::File { .. }) if told.is_empty() => return Err(Failure::refused(error)),
+            repaired => repaired.during()?,
+        };
+        if let Some(what) = warning(&repaired) {
+            log::warn!("{}: {what}", from.display());
+        }
+        let mut report = report(&detail.mesh, &repaired, cell);
+        report["file"] = json!(from.display().to_string());
+        report["output"] = json!(to.display().to_string());
+        if args.frames.is_some() {
+            report["frame"] = json!(frame);
+        }
+        let detail = if is_as_it_was(&detail.mesh, &repaired) {
+            detail
+        } else {
+            let Repaired { mesh, vertices, sources, .. } = repaired;
+            let carry = || Ok(carry_attributes(&detail, mesh, &vertices, &sources, None));
+            session.ctx.phase("carry", carry).during()?
+        };
+        args.write(&to, frame, &detail).during()?;
+        if !args.json {
+            output::print(&in_words(&report, cell)).during()?;
+        }
+        told.push(report);
+    }
+    session.record("meshes", json!(told));
+    if !args.json {
+        return Ok(());
+    }
+    let all = if args.frames.is_some() { json!(told) } else { told.into_iter().next().unwrap_or_default() };
+    output::print(&format!("{all:#}\n")).during()
+}
+
+/// The file of a frame, of one file or of a sequence.
+fn of_frame(path: &Path, frame: i32) -> PathBuf {
+    Pattern::parse(path).map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
+}
+
+/// What encloses nothing.
+const NOTHING: &str = "nothing in the mesh encloses a volume";
+
+/// Repairs the mesh of a file.
+fn repaired(session: &Session, path: &Path, mesh: &TriMesh, cell: f64) -> Result<Repaired> {
+    if cell <= 0.0 {
+        return Err(Error::file(path, NOTHING));
+    }
+    #[cfg(feature = "vdb")]
+    session.ctx.set_memory_limit(session.max_memory());
+    repair(&session.ctx, mesh, cell).map_err(|error| match error {
+        Error::Argument(what) => Error::file(path, what),
+        other => other,
+    })
+}
+
+/// What to say of a repair besides what was done: what is lost, and corners of which it is not clear which are one.
+fn warning(repaired: &Repaired) -> Option<String> {
+    let report = &repaired.report;
+    let count = report.prepared.ambiguous_vertices;
+    let unclear = format!(
+        "{count} corners on open edges lie within rounding of others, but which of them are one is not clear: they are left as they are"
+    );
+    let all: Vec<String> =
+        (count > 0).then_some(unclear).into_iter().chain(report.losses.warning(report.cell)).collect();
+    (!all.is_empty()).then(|| all.join("; "))
+}
+
+/// Whether a mesh had no need of a repair.
+fn is_as_it_was(mesh: &TriMesh, repaired: &Repaired) -> bool {
+    let count = mesh.triangles.len();
+    let Repaired { mesh: after, report, .. } = repaired;
+    report.prepared == Prepared::default()
+        && report.rebuilt_cells == 0
+        && report.kept_triangles == count
+        && after.triangles.len() == count
+}
+
+/// The edge of the cells.
+#[derive(Clone, Copy)]
+struct Cell {
+    /// m; 0 for a mesh without any extent.
+    edge: f64,
+    /// Why it is that.
+    why: &'static str,
+}
+
+/// Parts of a mesh's longest side that cells are at least and at most.
+const PARTS: [f64; 2] = [400.0, 40.0];
+
+impl Cell {
+    fn given(edge: f64) -> Self {
+        Self { edge, why: "" }
+    }
+
+    /// Of a mesh, in three digits, so that what is said can be given again.
+    fn of(mesh: &TriMesh) -> Self {
+        let mut lengths = Vec::with_capacity(3 * mesh.triangles.len());
+        let (mut low, mut high) = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
+        for triangle in 0..mesh.triangles.len() {
+            let [a, b, c] = mesh.corners(triangle);
+            lengths.extend([b - a, c - b, a - c].map(|edge| edge.norm()));
+            low = low.inf(&a).inf(&b).inf(&c);
+            high = high.sup(&a).sup(&b).sup(&c);
+        }
+        if lengths.is_empty() {
+            return Self::given(0.0);
+        }
+        let middle = lengths.len() / 2;
+        let median = *lengths.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let [least, most] = PARTS.map(|part| (high - low).amax() / part);
+        let (edge, why) = if median < least {
+            (least, ", a 400th of the longest side")
+        } else if median > most {
+            (most, ", a 40th of the longest side")
+        } else {
+            (median, ", the median edge")
+        };
+        Self { edge: format!("{edge:.2e}").parse().unwrap_or(edge), why }
+    }
+}
+
+impl Args {
+    fn frames(&self) -> std::result::Result<FrameChoice, Failure> {
+        let refused = |path: &Path, what: &str| Err(Failure::refused(format!("{}: {what}", path.display())));
+        match (Pattern::parse(&self.input), &self.frames) {
+            (Some(_), None) => refused(&self.input, "a sequence needs --frames A-B"),
+            (Some(_), Some(frames)) if frames.count() > 1 && Pattern::parse(&self.output).is_none() => {
+                refused(&self.output, "several frames need a pattern such as solid.%04d.ply")
+            }
+            (Some(_), Some(frames)) => Ok(frames.clone()),
+            (None, Some(_)) => Err(Failure::refused("--frames is of no use with one mesh")),
+            (None, None) => Ok(FrameChoice::from(Frames { first: 1, last: 1 })),
+        }
+    }
+
+    fn keeps_space(&self) -> bool {
+        self.space.space().keeps_vectors()
+    }
+
+    /// A mesh in metres with Y up, with all that it carries; of a character only the mesh.
+    fn read(&self, path: &Path) -> Result<DetailedMesh> {
+        let mut detail = if is_gltf(path) {
+            let mesh = Character::at_rest_from(path, self.space.origin.at)?;
+            DetailedMesh { mesh, ..DetailedMesh::default() }
+        } else {
+            self.space.origin.read(path)?.into_detailed()
+        };
+        if !self.keeps_space() {
+            self.space.bring(&mut detail.mesh);
+            // In another space velocities would be others.
+            detail.arrays.retain(|array| !VELOCITY.contains(&&*array.name));
+        }
+        warn_if_far(path, &detail.mesh);
+        Ok(detail)
+    }
+
+    fn warn_of_losses(&self, path: &Path, detail: &DetailedMesh) -> Result<()> {
+        let losses = Losses { output: &self.output, keeps_space: self.keeps_space(), is_sequence: false };
+        losses.warn(path, detail.uvs.as_ref())
+    }
+
+    fn write(&self, path: &Path, frame: i32, detail: &DetailedMesh) -> Result<()> {
+        let DetailedMesh { mesh, uvs, arrays } = detail;
+        if extension(path) != "usda" {
+            let arrays: Vec<&MeshArray> = arrays.iter().collect();
+            let carried = io::mesh::Carried { uvs: uvs.as_ref(), arrays: &arrays, ..Default::default() };
+            return io::mesh::write_carried(path, mesh, &carried);
+        }
+        // USD has velocities of its own.
+        let velocities = vectors(arrays, VELOCITY).unwrap_or_default();
+        let is_other = |array: &&MeshArray| {
+            velocities.is_empty() || array.on != On::Vertices || !VELOCITY.contains(&&*array.name)
+        };
+        let others: Vec<&MeshArray> = arrays.iter().filter(is_other).collect();
+        let name = prim_name(&self.input);
+        let mesh = usd::MeshFrame {
+            name: &name,
+            points: &mesh.positions,
+            velocities: &velocities,
+            triangles: &mesh.triangles,
+            uvs: uvs.as_ref(),
+            arrays: &others,
+        };
+        let text = usd::clip("meshes", frame, self.fps, usd::Units::OWN, &[mesh]);
+        atomic::write_bytes(path, text.as_bytes())
+    }
+}
+
+/// What was done to a mesh.
+fn report(mesh: &TriMesh, repaired: &Repaired, cell: Cell) -> Value {
+    let Repaired { mesh: after, report, .. } = repaired;
+    let done = &report.prepared;
+    json!({
+        "solid_already": is_as_it_was(mesh, repaired),
+        "joined_vertices": done.joined_vertices,
+        "dropped_triangles": done.dropped_triangles,
+        "turned_triangles": done.turned_triangles,
+        "turned_parts": done.turned_parts,
+        "closed_holes": done.holes,
+        "closing_triangles": done.added_triangles,
+        "asked_cell_m": cell.edge,
+        "cell_m": report.cell,
+        "flagged_cells": report.flagged_cells,
+        "rebuilt_cells": report.rebuilt_cells,
+        "rung": report.rung,
+        "triangles_before": mesh.triangles.len(),
+        "kept_triangles": report.kept_triangles,
+        "made_triangles": after.triangles.len() - report.kept_triangles,
+        "triangles": after.triangles.len(),
+        "slivers": report.slivers,
+        "area_before_m2": report.losses.areas[0],
+        "area_m2": report.losses.areas[1],
+        "longest_side_before_m": report.losses.sides[0],
+        "longest_side_m": report.losses.sides[1],
+        "lost": report.losses.warning(report.cell).is_some(),
+        "ambiguous_vertices": done.ambiguous_vertices,
+        "volume_before_m3": mesh.volume(),
+        "volume_m3": after.volume(),
+    })
+}
+
+/// What is done before anything is rebuilt.
+const DONE: [Counted; 5] = [
+    (
+        "joined_vertices",
+        [
+            "vertex joined with another that is the same corner",
+            "vertices joined with others that are the same corners",
+        ],
+    ),
+    (
+        "dropped_triangles",
+        [
+            "triangle left out: without area, doubled, or alone",
+            "triangles left out: without area, doubled, or alone",
+        ],
+    ),
+    (
+        "turned_triangles",
+        ["triangle turned round as its neighbours are", "triangles turned round as their neighbours are"],
+    ),
+    ("turned_parts", ["part turned outward", "parts turned outward"]),
+    ("closed_holes", ["hole closed", "holes closed"]),
+];
+
+/// How far cells were rebuilt beyond those at fault and what they need.
+const RUNGS: [&str; 4] = [
+    "",
+    ", with a ring around",
+    ", with all of the parts that they touch",
+    ", with all that the mesh passes through",
+];
+
+/// A repair in words: only what was done.
+fn in_words(report: &Value, cell: Cell) -> String {
+    let count = |key: &str| report[key].as_u64().unwrap_or(0);
+    let number = |key: &str| report[key].as_f64().unwrap_or(0.0);
+    let [file, output] = ["file", "output"].map(|key| report[key].as_str().unwrap_or_default());
+    if report["solid_already"] == json!(true) {
+        return format!("{file} is a solid already: written as it is\n");
+    }
+    let what = if report["lost"] == json!(true) { "a solid now, but not all of it" } else { "a solid now" };
+    let mut out = format!("{file}: {what}, in {output}\n");
+    for (key, forms) in DONE.into_iter().filter(|(key, _)| count(key) > 0) {
+        out += &format!("  {:>8} {}\n", count(key), form(count(key), forms));
+    }
+    let (used, Cell { edge, why }) = (number("cell_m"), cell);
+    let why = if used < edge { format!(": {edge} m would have left nothing") } else { why.to_string() };
+    let rung = RUNGS.get(report["rung"].as_u64().unwrap_or(0) as usize).copied().unwrap_or_default();
+    out += &format!(
+        "  cells of {used} m{why}\n  {:>8} {} flagged, {} rebuilt{rung}\n",
+        count("flagged_cells"),
+        form(count("flagged_cells"), ["cell", "cells"]),
+        count("rebuilt_cells")
+    );
+    let (kept, before, made) = (count("kept_triangles"), count("triangles_before"), count("made_triangles"));
+    out += &format!("  {kept:>8} of {before} triangles kept, {made} made\n");
+    if count("slivers") > 0 {
+        let forms = ["of these is a sliver", "of these are slivers"];
+        out += &format!("  {:>8} {}\n", count("slivers"), form(count("slivers"), forms));
+    }
+    let (volume, after) = (number("volume_before_m3"), number("volume_m3"));
+    out + &format!("  volume {volume:.6} m3 before, {after:.6} m3 now\n")
+}

@@ -1,0 +1,226 @@
+//! Points in files, for `frazil info` and `frazil convert`.
+
+use std::path::{Path, PathBuf};
+
+use frazil::geometry::points::Values;
+use frazil::geometry::{DVec3, Points};
+use frazil::io::files::atomic;
+use frazil::io::files::sequence::Pattern;
+use frazil::io::mesh::extension;
+use frazil::io::particles::ply;
+use frazil::io::particles::{self, Cloud};
+use frazil::io::usd::points;
+use frazil::motion::Space;
+use frazil::scene::{FrameChoice, Frames};
+use frazil::{Error, Result};
+use serde_json::{Map, Value, json};
+
+use super::each::Each;
+use super::output;
+use super::session::Session;
+use super::session::exit::{Failure, Phase};
+
+/// What `frazil info` says of points, without the name of their grid.
+pub fn described(points: &Points) -> Map<String, Value> {
+    let mut out = Map::new();
+    out.insert("points".into(), json!(points.count()));
+    out.insert("voxel_m".into(), json!(points.voxel_size));
+    let bounds = points.bounds().map(|(low, high)| (<[f64; 3]>::from(low), <[f64; 3]>::from(high)));
+    out.insert("bounds_m".into(), json!(bounds));
+    for attribute in &points.attributes {
+        let mut entry =
+            json!({ "type": attribute.values.type_name(), "uniform": attribute.values.is_uniform() });
+        if let Some((low, high)) = attribute.values.range() {
+            let is_whole = !matches!(attribute.values, Values::Float(_) | Values::Vector(_));
+            let plain = |numbers: Vec<f64>| match numbers[..] {
+                [number] if is_whole => json!(number as i64),
+                [number] => json!(number),
+                _ => json!(numbers),
+            };
+            (entry["min"], entry["max"]) = (plain(low), plain(high));
+        }
+        out.insert(format!("attribute {}", attribute.name), entry);
+    }
+    out
+}
+
+/// Points of a file that is not .vdb, for `frazil info`.
+pub fn info(path: &Path, origin: DVec3) -> Result<Vec<Value>> {
+    let mut cloud = particles::read(path)?;
+    Space { origin, ..Space::OWN }.bring(&mut cloud);
+    // Its voxels are of no use where the file has none.
+    let size = cloud.voxel_size.unwrap_or(1.0);
+    let known = cloud.voxel_size.is_some();
+    let points = cloud.into_points(Some(size)).map_err(|error| Error::file(path, error.to_string()))?;
+    let mut entry = Map::from_iter([("type".to_string(), json!("points"))]);
+    entry.extend(described(&points));
+    if !known {
+        entry.remove("voxel_m");
+    }
+    Ok(vec![Value::Object(entry)])
+}
+
+/// Whether a file's name is one of points, which .ply need not be.
+pub fn is_named(path: &Path) -> bool {
+    let extension = extension(path);
+    extension == "vdb" || extension != "ply" && particles::is_named(path)
+}
+
+/// Whether `frazil convert` has points to convert: a file of points in or out, or a .ply without faces.
+pub fn is_one(input: &Path, output: &Path, frames: Option<&FrameChoice>) -> Result<bool> {
+    if [input, output].into_iter().any(is_named) {
+        return Ok(true);
+    }
+    if extension(input) != "ply" || !["ply", "usda"].contains(&extension(output).as_str()) {
+        return Ok(false);
+    }
+    let one = match (Pattern::parse(input), frames) {
+        // The first frame that is there tells.
+        (Some(pattern), Some(frames)) => {
+            frames.iter().map(|frame| pattern.path(frame)).find(|path| path.is_file())
+        }
+        _ => Some(input.to_path_buf()).filter(|path| path.is_file()),
+    };
+    one.map_or(Ok(false), |one| ply::holds_points(&one))
+}
+
+/// Points of a file, and whether their voxels are more than a way to hold them.
+struct Read {
+    points: Points,
+    has_voxels: bool,
+}
+
+/// What `frazil convert` does with points.
+pub struct Conversion<'a> {
+    /// File or pattern.
+    pub input: &'a Path,
+    /// File or pattern.
+    pub output: &'a Path,
+    /// Frames of patterns.
+    pub frames: Option<&'a FrameChoice>,
+    /// Frames a second.
+    pub fps: f64,
+    /// Edge of a voxel (m).
+    pub voxel: Option<f64>,
+    /// How the input's space becomes metres with Y up.
+    pub space: Space,
+}
+
+impl Conversion<'_> {
+    /// Converts every frame.
+    pub fn run(&self, session: &Session) -> std::result::Result<(), Failure> {
+        let [input, output] = [self.input, self.output].map(Pattern::parse);
+        let is_written = ["vdb", "usda"].contains(&extension(self.output).as_str());
+        if !is_written && !particles::is_written(self.output) {
+            let what = "the output for points must be a .vdb, .ply, .usda, .bgeo or .xyz file";
+            return Err(Failure::refused(format!("{}: {what}", self.output.display())));
+        }
+        if extension(self.input) != "vdb" && !particles::is_named(self.input) {
+            let what = "points are read from .vdb, .bgeo, .vtk, .vtu, .xyz and .ply files";
+            return Err(Failure::refused(format!("{}: {what}", self.input.display())));
+        }
+        if input.is_some() && self.frames.is_none() {
+            let what = format!("{}: a sequence needs --frames A-B", self.input.display());
+            return Err(Failure::refused(what));
+        }
+        if input.is_none() && self.frames.is_some_and(|frames| frames.count() > 1) {
+            return Err(Failure::refused("several --frames are of no use with one file of points"));
+        }
+        let frames = self.frames.cloned().unwrap_or_else(|| FrameChoice::from(Frames { first: 1, last: 1 }));
+        if output.is_none() && frames.count() > 1 {
+            let what =
+                format!("{}: several frames need a pattern such as grains.%04d.ply", self.output.display());
+            return Err(Failure::refused(what));
+        }
+        let place = |pattern: &Option<Pattern>, path: &Path, frame: i32| -> PathBuf {
+            pattern.as_ref().map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
+        };
+        output::check_writable(self.output).before()?;
+        for frame in frames.iter() {
+            let from = place(&input, self.input, frame);
+            output::refuse_input(&place(&output, self.output, frame), [from.as_path()]).before()?;
+        }
+        let (mut each, mut made, mut count) = (Each::default(), 0, 0);
+        for frame in frames.iter() {
+            session.ctx.check().during()?;
+            let one = || {
+                let read = self.read(&place(&input, self.input, frame))?;
+                self.write(&place(&output, self.output, frame), frame, &read, session)?;
+                Ok(read.points.count())
+            };
+            if let Some(points) = each.take(frame, one())? {
+                (made, count) = (made + 1, count + points);
+            }
+        }
+        session.record("frames", json!(made));
+        session.record("points", json!(count));
+        each.finish()
+    }
+
+    fn read(&self, path: &Path) -> Result<Read> {
+        let mut cloud = match extension(path).as_str() {
+            "vdb" => {
+                let points = points_of_vdb(path)?;
+                if self.space == Space::OWN {
+                    // Bit by bit, which another split into voxels need not be.
+                    return Ok(Read { points, has_voxels: true });
+                }
+                Cloud::from(points)
+            }
+            _ => particles::read(path)?,
+        };
+        self.space.bring(&mut cloud);
+        let voxel = self.voxel.or(cloud.voxel_size);
+        // Only .vdb files need voxels.
+        let any = (extension(self.output) != "vdb").then_some(1.0);
+        if voxel.or(any).is_none() {
+            let what = "does not say how large the voxels of its points are: give --voxel";
+            return Err(Error::file(path, what));
+        }
+        let points =
+            cloud.into_points(voxel.or(any)).map_err(|error| Error::file(path, error.to_string()))?;
+        Ok(Read { points, has_voxels: voxel.is_some() })
+    }
+
+    #[cfg_attr(not(feature = "vdb"), expect(unused_variables, reason = "grids are made by threads"))]
+    fn write(&self, path: &Path, frame: i32, read: &Read, session: &Session) -> Result<()> {
+        let Read { points, has_voxels } = read;
+        match extension(path).as_str() {
+            #[cfg(feature = "vdb")]
+            "vdb" => {
+                use frazil::vdb::{file::WriteOptions, points};
+                points::write(&session.ctx, path, NAME, points, &WriteOptions::default())
+            }
+            #[cfg(not(feature = "vdb"))]
+            "vdb" => super::needs_openvdb(path),
+            "usda" => {
+                let stem = self.input.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+                let name = stem.split(['%', '#', '$', '.']).next().unwrap_or_default();
+                atomic::write_bytes(path, points::frame(name, frame, self.fps, points).as_bytes())
+            }
+            _ => particles::write(path, points, *has_voxels),
+        }
+    }
+}
+
+/// Name of the grid of points in files that we write.
+#[cfg(feature = "vdb")]
+const NAME: &str = "grains";
+
+/// Points of a .vdb file.
+///
+/// # Errors
+/// A file that holds only what changed since another frame.
+#[cfg(feature = "vdb")]
+pub fn points_of_vdb(path: &Path) -> Result<Points> {
+    use frazil::scene::{changes_since, partial};
+    match changes_since(path)? {
+        Some(since) => Err(Error::file(path, partial(since))),
+        None => frazil::vdb::points::read(path, None),
+    }
+}
+
+#[cfg(not(feature = "vdb"))]
+fn points_of_vdb(path: &Path) -> Result<Points> {
+    super::needs_openvdb(path)
+}

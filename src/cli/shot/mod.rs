@@ -1,0 +1,79 @@
+//! What the commands that make shots have in common.
+
+pub(in crate::cli) mod progress;
+pub(in crate::cli) mod shallow;
+#[cfg(feature = "vdb")]
+pub(in crate::cli) mod snow;
+#[cfg(feature = "vdb")]
+pub(in crate::cli) mod surface;
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+use frazil::scene::run::{Plan, Report, Run};
+use frazil::scene::{FrameChoice, Override, Scene};
+
+use super::output;
+use super::session::Session;
+use super::session::exit::{Failure, Phase};
+use progress::FrameProgress;
+
+/// Where a shot goes, and which part of it is made.
+#[derive(clap::Args)]
+pub struct ShotArgs {
+    /// Folder for the output; made if it is not there.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Write these frames only; frames before them are computed when no file has them.
+    #[arg(long, value_name = "A-B|A-BxN|A,B,C", allow_hyphen_values = true)]
+    pub frames: Option<FrameChoice>,
+    /// Keep the frames before N, whatever they were made with, and make all others of these stages again.
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub from: Option<i32>,
+    /// Put a setting over the scene's, for instance snow.noise.seed=2 or object.1.file=hero.glb.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<Override>,
+}
+
+impl ShotArgs {
+    /// The frames that are wanted.
+    pub fn frames(&self, scene: &Scene) -> Result<FrameChoice, Failure> {
+        let shot_frames = scene.shot().frames;
+        let frames = self.frames.clone().unwrap_or_else(|| shot_frames.into());
+        if frames.first() < shot_frames.first || frames.last() > shot_frames.last {
+            return Err(Failure::refused(format!(
+                "--frames {}-{} is not within the shot's {shot_frames}",
+                frames.first(),
+                frames.last()
+            )));
+        }
+        if let Some(from) = self.from.filter(|from| !shot_frames.contains(*from)) {
+            return Err(Failure::refused(format!("--from {from} is not within the shot's {shot_frames}")));
+        }
+        Ok(frames)
+    }
+
+    /// Makes the frames of a plan; `seen` is called with the report of each, by one thread at a time.
+    pub fn make(
+        &self,
+        session: &Session,
+        plan: &Plan<'_>,
+        stages: &[String],
+        frames: &FrameChoice,
+        seen: impl FnMut(&Report) + Send,
+    ) -> Result<(), Failure> {
+        let run = Run::prepare(&session.ctx, plan, &self.output, stages, frames, self.from).before()?;
+        output::check_folder(&self.output).before()?;
+        let (made, there) = (run.to_make(), run.there());
+        let shown = Mutex::new((FrameProgress::new(&session.ctx, made, there, session.is_quiet()), seen));
+        run.make(&session.ctx, |stage, frame, report| {
+            let mut shown = shown.lock().expect("nobody panics with this lock");
+            (shown.1)(report);
+            shown.0.finished(stage, frame);
+        })
+        .during()?;
+        session.record("frames", made.into());
+        session.record("frames_there", there.into());
+        Ok(())
+    }
+}

@@ -1,0 +1,271 @@
+//! Advection: values are carried along the flow (semi-Lagrangian: Stam 1999). Velocities get MacCormack's correction of the blur that
+//! this leaves (Selle, Fedkiw, Kim, Liu and Rossignac 2008), within the range of the values around the place that a value came
+//! from. The density, which has sharp edges, is interpolated by cubic functions instead, within the same range: MacCormack's waves
+//! run behind an edge, and as the range cuts them off there, it holds edges back (by about a cell).
+//!
+//! The path of each cell's centre is traced once (midpoint rule), backward and, for the correction, forward; a face takes the
+//! mean of its two cells' paths. All four fields follow these, one after the other: velocities in two passes each, the first guess with
+//! its bounds, then the correction.
+
+use rayon::prelude::*;
+
+use super::conserve::{self, Keeping};
+use super::paths::{At, Live, Paths, Ways, trace};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::flow::Flow;
+use crate::flow::outer_grid::Reader;
+use crate::flow::pressure::stencil::row_of;
+use crate::flow::scratch::Room;
+use crate::flow::tiles::{Field, Tile, Tiles};
+use crate::flow::window::Window;
+use crate::numeric::cpu::dispatch;
+use crate::numeric::lanes::Lanes;
+
+/// How values are carried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Scheme {
+    /// First order: stable, blurs.
+    SemiLagrangian,
+    /// Velocities by MacCormack's scheme, of second order, and density by cubic interpolation; no new extremes.
+    #[default]
+    Bounded,
+    /// The same without bounds: for measurements of the order.
+    Unbounded,
+}
+
+/// How a flow is carried in a step.
+pub struct Way<'a> {
+    /// Velocity (m/s) of the air outside all tiles.
+    pub ambient: [f32; 3],
+    /// Cells that a value at 1 m/s moves: the time over the cell's edge (s/m).
+    pub scale: f32,
+    pub scheme: Scheme,
+    /// The air around, as it is after the step.
+    pub around: Option<&'a Flow>,
+    /// How the density keeps its mass; none: it does so as far as the scheme does.
+    pub keeping: Option<Keeping>,
+}
+
+/// Carries velocity (m/s, at lower faces) and density along for a step. The rim keeps what it holds, but for the upper faces of
+/// cells.
+///
+/// # Errors
+/// Cancel; the fields are then of no use.
+pub fn advect(
+    ctx: &Context,
+    tiles: &Tiles,
+    (velocity, density): (&mut [Field; 3], &mut Field),
+    way: &Way<'_>,
+    room: &mut Room,
+) -> Result<()> {
+    let Way { ambient, scheme, .. } = *way;
+    let (mut back, mut ahead, [hat, below, above]) = room.paths(tiles);
+    let extents = trace(ctx, tiles, velocity, way, [&mut back, &mut ahead])?;
+    let paths = Paths { tiles, back: back.map(|field| &*field), ahead: ahead.map(|field| &*field), extents };
+    for axis in 0..3 {
+        let outside = ambient[axis];
+        let around = way.around.map(|around| around.faces(axis));
+        let field = (&mut velocity[axis], outside);
+        let room = [&mut *hat, &mut *below, &mut *above];
+        carry_faces(ctx, &paths, axis, field, around.as_ref(), room, scheme)?;
+    }
+    let wanted = way.keeping.map(|_| conserve::carried(ctx, &paths, density)).transpose()?;
+    carry_density(ctx, &paths, density, &mut hat[..tiles.active()], scheme)?;
+    if let (Some(keeping), Some(wanted)) = (way.keeping, wanted) {
+        conserve::restore(tiles, density, &wanted, keeping);
+    }
+    Ok(())
+}
+
+/// Carries a velocity on an axis along the paths. `hat` is room for the first guess, `below` and `above` for its distances from the
+/// least and the greatest value around the place that it came from.
+///
+/// # Errors
+/// Cancel.
+fn carry_faces(
+    ctx: &Context,
+    paths: &Paths<'_>,
+    axis: usize,
+    (field, outside): (&mut Field, f32),
+    around: Option<&Reader<'_>>,
+    [hat, below, above]: [&mut [Tile]; 3],
+    scheme: Scheme,
+) -> Result<()> {
+    let at = At::Faces(axis);
+    let is_bounded = scheme == Scheme::Bounded;
+    let bounds = below.par_iter_mut().zip(above.par_iter_mut());
+    let tiles = hat.par_iter_mut().zip(bounds).enumerate().with_min_len(16);
+    tiles.try_for_each_init(Window::default, |window, (slot, (hat, (below, above)))| {
+        ctx.check()?;
+        let live = paths.live(slot, at);
+        if live.as_ref().is_none_or(|live| !live.is_whole()) {
+            // Of what lies around, the guess is what it has become there.
+            *hat = match around {
+                Some(around) if slot >= paths.tiles.active() => {
+                    around.read(window, paths.tiles.coords()[slot])
+                }
+                _ => field[slot],
+            };
+        }
+        if let Some(live) = live {
+            window.fill(field, &paths.tiles.neighbours()[slot], &paths.back_span(slot, at), outside);
+            let bounds = is_bounded.then_some([below, above]);
+            guess_tile(&live, &paths.ways(slot, at, &paths.back), window, hat, bounds);
+        }
+        Ok::<_, Error>(())
+    })?;
+    if scheme == Scheme::SemiLagrangian {
+        field.copy_from_slice(hat);
+        return Ok(());
+    }
+    let (hat, below, above) = (&*hat, &*below, &*above);
+    let tiles = field.par_iter_mut().enumerate().with_min_len(16);
+    tiles.try_for_each_init(Window::default, |window, (slot, values)| {
+        ctx.check()?;
+        let Some(live) = paths.live(slot, at) else { return Ok(()) };
+        window.fill(hat, &paths.tiles.neighbours()[slot], &paths.ahead_span(slot, at), outside);
+        let bounds = is_bounded.then(|| [&below[slot], &above[slot]]);
+        correct_tile(&live, &paths.ways(slot, at, &paths.ahead), window, &hat[slot], bounds, values);
+        Ok(())
+    })
+}
+
+/// Carries the density along the paths, by way of `to`.
+///
+/// # Errors
+/// Cancel.
+fn carry_density(
+    ctx: &Context,
+    paths: &Paths<'_>,
+    density: &mut Field,
+    to: &mut [Tile],
+    scheme: Scheme,
+) -> Result<()> {
+    let holds = |tile: &Tile| tile.iter().any(|value| *value != 0.0);
+    let holds: Vec<bool> = density.par_iter().with_min_len(64).map(holds).collect();
+    let tiles = to.par_iter_mut().enumerate().with_min_len(16);
+    tiles.try_for_each_init(Window::default, |window, (slot, to)| {
+        ctx.check()?;
+        let near = &paths.tiles.neighbours()[slot];
+        // Into a tile among others without density paths bring none.
+        if !near.iter().any(|near| holds.get(*near as usize) == Some(&true)) {
+            to.fill(0.0);
+            return Ok(());
+        }
+        window.fill(density, near, &paths.back_span(slot, At::Centres).for_cubic(), 0.0);
+        density_tile(&paths.ways(slot, At::Centres, &paths.back), window, scheme, to);
+        Ok::<_, Error>(())
+    })?;
+    density.copy_from_slice(to);
+    Ok(())
+}
+
+fn density_tile(ways: &Ways<'_>, window: &Window, scheme: Scheme, to: &mut Tile) {
+    dispatch!(density_rows(ways: &Ways<'_>, window: &Window, scheme: Scheme, to: &mut Tile))
+}
+
+#[inline(always)]
+fn density_rows(ways: &Ways<'_>, window: &Window, scheme: Scheme, to: &mut Tile) {
+    for row in 0..64 {
+        let ways = ways.row(row);
+        let values = match scheme {
+            Scheme::SemiLagrangian => window.sample(row, &ways),
+            Scheme::Unbounded => window.sample_cubic(row, &ways)[0],
+            Scheme::Bounded => {
+                let [values, least, most] = window.sample_cubic(row, &ways);
+                values.max(least).min(most)
+            }
+        };
+        to[row * 8..][..8].copy_from_slice(&values.0);
+    }
+}
+
+fn guess_tile(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: Option<[&mut Tile; 2]>) {
+    dispatch!(guess_rows(
+        live: &Live,
+        ways: &Ways<'_>,
+        window: &Window,
+        hat: &mut Tile,
+        bounds: Option<[&mut Tile; 2]>
+    ))
+}
+
+/// First guesses, and their bounds.
+#[inline(always)]
+fn guess_rows(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: Option<[&mut Tile; 2]>) {
+    let Some([below, above]) = bounds else {
+        for row in live.rows() {
+            let values = window.sample(row, &ways.row(row));
+            hat[row * 8..][..live.lanes()].copy_from_slice(&values.0[..live.lanes()]);
+        }
+        return;
+    };
+    for row in live.rows() {
+        let [values, low, high] = window.sample_bounded(row, &ways.row(row));
+        hat[row * 8..][..live.lanes()].copy_from_slice(&values.0[..live.lanes()]);
+        below[row * 8..][..8].copy_from_slice(&(values - low).0);
+        above[row * 8..][..8].copy_from_slice(&(high - values).0);
+    }
+}
+
+fn correct_tile(
+    live: &Live,
+    ways: &Ways<'_>,
+    window: &Window,
+    hat: &Tile,
+    bounds: Option<[&Tile; 2]>,
+    values: &mut Tile,
+) {
+    dispatch!(correct_rows(
+        live: &Live,
+        ways: &Ways<'_>,
+        window: &Window,
+        hat: &Tile,
+        bounds: Option<[&Tile; 2]>,
+        values: &mut Tile
+    ))
+}
+
+/// Corrects first guesses by half of what the way forth and back changes.
+#[inline(always)]
+fn correct_rows(
+    live: &Live,
+    ways: &Ways<'_>,
+    window: &Window,
+    hat: &Tile,
+    bounds: Option<[&Tile; 2]>,
+    values: &mut Tile,
+) {
+    let rows = |tile: &Tile, row: usize| Lanes(row_of(tile, row));
+    for row in live.rows() {
+        let there = window.sample(row, &ways.row(row));
+        let guess = rows(hat, row);
+        let mut change = Lanes::all(0.5) * (rows(values, row) - there);
+        if let Some([below, above]) = bounds {
+            change = limited(change, rows(below, row), rows(above, row));
+        }
+        values[row * 8..][..live.lanes()].copy_from_slice(&(guess + change).0[..live.lanes()]);
+    }
+}
+
+/// A correction within its bounds: one that leaves the range of the values around the place that a value came from ends there.
+/// Nothing jumps: where it was dropped at the bound, the least difference between two flows grew fourfold in ten steps.
+#[inline(always)]
+fn limited(change: Lanes, below: Lanes, above: Lanes) -> Lanes {
+    let zero = Lanes::all(0.0);
+    // Rounding may leave a distance a little under 0.
+    change.max(zero - below.max(zero)).min(above.max(zero))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corrections_stay_in_their_bounds() {
+        let within = |change| limited(Lanes::all(change), Lanes::all(1.0), Lanes::all(2.0)).0[0];
+        assert_eq!([-3.0, -1.0, -0.5, 1.5, 2.5, 5.0].map(within), [-1.0, -1.0, -0.5, 1.5, 2.0, 2.0]);
+        assert_eq!(limited(Lanes::all(0.1), Lanes::all(0.0), Lanes::all(-1e-9)).0, [0.0; 8]);
+    }
+}

@@ -1,0 +1,234 @@
+//! Conserves the mass of an advected density: what advection loses is put back where it was lost, and what it gains is removed where it
+//! was gained.
+//!
+//! Every corner of the tiles has a hat: a weight of 1 there that falls linearly to 0 at the corners beside it, so that all hats
+//! together weigh each point once. Along its path each cell carries its mass to a point, and thus into the eight hats around it:
+//! that is the mass that each hat should hold. After advection the hat holds a different mass. The density is then multiplied by factors that
+//! the corners give and that are linear between them: by what each hat should hold over what it holds, so that the mass of all
+//! hats together is right to rounding, and no density farther than a tile from a loss changes.
+
+use rayon::prelude::*;
+
+use super::paths::{Extent, Paths};
+use crate::context::Context;
+use crate::error::Result;
+use crate::flow::pressure::stencil::row_of;
+use crate::flow::tiles::{Field, Tile, Tiles, neighbour_at};
+use crate::flow::window::{max, min};
+use crate::numeric::cpu::dispatch;
+use crate::numeric::lanes::Lanes;
+
+/// What becomes of a density besides being carried along.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Keeping {
+    /// Share 0..=1 of the mass that stays.
+    pub share: f32,
+    /// A density below this fades within some steps; its mass goes to what is beside it.
+    pub least: f32,
+}
+
+/// Greatest factor by which density grows in a step: mist of which nearly all was cut off must not come back in what is left.
+const MOST_GAIN: f64 = 1.2;
+/// Passes in which a hat that would have to grow by more than that hands the excess on to the hats beside it. What is left after them is spread
+/// over all of the density.
+const PASSES: usize = 6;
+/// In a step a density below `least` loses this share of what it lacks to `least`. It fades slowly on purpose: when it ended at once, flows
+/// that differed by rounding only soon differed by as much as `least`.
+const FADING: f32 = 0.125;
+/// Rounds of factors. Those that are linear between corners bring a hat only part of the way where the ones beside it need the
+/// contrary; the last round makes the sum of all hats right.
+const ROUNDS: usize = 2;
+/// Factors of hats, and the one of all of the density, that differ from 1 by less are rounding: still air must stay so.
+const ROUNDING: [f64; 2] = [2.0e-6, 1.0e-7];
+/// Hats on an axis that a tile's mass may go to: those of the corners 8 cells before its first one, at it, 8 and 16 behind it.
+const HATS: usize = 4;
+/// Masses in the hats around a tile (cells).
+pub type Masses = [f32; HATS * HATS * HATS];
+
+/// The mass (cells) that each corner's hat should hold when the density was carried along; corners are named by the slot of the
+/// tile whose first cell they bound.
+///
+/// # Errors
+/// Cancel.
+pub fn carried(ctx: &Context, paths: &Paths<'_>, density: &Field) -> Result<Vec<f64>> {
+    let of_tile = |(slot, tile): (usize, &Tile)| {
+        ctx.check()?;
+        let ahead = paths.ahead.map(|field| &field[slot]);
+        Ok(masses(tile, Some(&ahead), &paths.extents[slot][1]))
+    };
+    let masses: Result<Vec<Masses>> = density.par_iter().enumerate().with_min_len(16).map(of_tile).collect();
+    Ok(in_hats(paths.tiles, &masses?))
+}
+
+/// Lets a share of the density stay and what is thin fade, and puts the mass back that hats should hold.
+pub fn restore(tiles: &Tiles, density: &mut Field, wanted: &[f64], keeping: Keeping) {
+    let thin_out = |value: &mut f32| {
+        let kept = *value * keeping.share;
+        *value = min(kept, max(kept - FADING * (keeping.least - kept), 0.0));
+    };
+    density.par_iter_mut().with_min_len(64).for_each(|tile| tile.iter_mut().for_each(thin_out));
+    let wanted: Vec<f64> = wanted.iter().map(|mass| mass * f64::from(keeping.share)).collect();
+    for _ in 0..ROUNDS {
+        let held: Vec<Masses> =
+            density.par_iter().with_min_len(16).map(|tile| masses(tile, None, &[[0.0; 2]; 3])).collect();
+        let held = in_hats(tiles, &held);
+        multiply(tiles, density, &factors(tiles, wanted.clone(), &held));
+    }
+}
+
+/// Multiplies a density by the factors of the corners.
+fn multiply(tiles: &Tiles, density: &mut Field, factors: &[f32]) {
+    density.par_iter_mut().enumerate().with_min_len(16).for_each(|(slot, tile)| {
+        let near = &tiles.neighbours()[slot];
+        let corner = |at: usize| {
+            let offset = [at >> 2, at >> 1 & 1, at & 1].map(|x| x as i32);
+            factors[near[neighbour_at(offset)] as usize]
+        };
+        let corners: [f32; 8] = std::array::from_fn(corner);
+        if corners.iter().any(|factor| *factor != 1.0) {
+            scale(tile, &corners);
+        }
+    });
+}
+
+/// The masses of a tile in the hats around it, along paths with an extent.
+fn masses(tile: &Tile, ahead: Option<&[&Tile; 3]>, extent: &Extent) -> Masses {
+    let holds = tile.iter().any(|value| *value != 0.0);
+    if holds { masses_of(tile, ahead, extent) } else { [0.0; HATS * HATS * HATS] }
+}
+
+fn masses_of(tile: &Tile, ahead: Option<&[&Tile; 3]>, extent: &Extent) -> Masses {
+    dispatch!(masses_of_rows(tile: &Tile, ahead: Option<&[&Tile; 3]>, extent: &Extent) -> Masses)
+}
+
+#[inline(always)]
+fn masses_of_rows(tile: &Tile, ahead: Option<&[&Tile; 3]>, extent: &Extent) -> Masses {
+    const CENTRES: Lanes = Lanes([0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5]);
+    let zero = Lanes::all(0.0);
+    // The hats that any cell reaches on each axis.
+    let ranges = extent.map(|[least, most]| {
+        let low = ((0.5 + least) / 8.0).floor() as i32 + 1;
+        let high = ((7.5 + most) / 8.0).floor() as i32 + 3;
+        low.clamp(0, 3) as usize..high.clamp(1, 4) as usize
+    });
+    let weights = |at: Lanes, range: &std::ops::Range<usize>| -> [Lanes; HATS] {
+        let mut weights = [zero; HATS];
+        for hat in range.clone() {
+            let off = at * Lanes::all(0.125) - Lanes::all(hat as f32 - 1.0);
+            weights[hat] = (Lanes::all(1.0) - off.max(zero - off)).max(zero);
+        }
+        weights
+    };
+    let of_row = |row: usize| {
+        let density = Lanes(row_of(tile, row));
+        let middle = [Lanes::all((row >> 3) as f32 + 0.5), Lanes::all((row & 7) as f32 + 0.5), CENTRES];
+        let at = |axis: usize| match ahead {
+            Some(ahead) => middle[axis] + Lanes(row_of(ahead[axis], row)),
+            None => middle[axis],
+        };
+        let [x, y, z] = [0, 1, 2].map(|axis| weights(at(axis), &ranges[axis]));
+        (x.map(|x| density * x), y, z)
+    };
+    let mut sums = [zero; HATS * HATS * HATS];
+    for four in 0..16 {
+        // A row and its mirror images: in an order that mirrored fields share.
+        let (x, y) = (four >> 2, four & 3);
+        let rows = [[x, y], [7 - x, 7 - y], [x, 7 - y], [7 - x, y]].map(|[x, y]| x << 3 | y);
+        if rows.iter().all(|row| row_of(tile, *row).iter().all(|value| *value == 0.0)) {
+            continue;
+        }
+        let rows = rows.map(of_row);
+        for i in ranges[0].clone() {
+            for j in ranges[1].clone() {
+                let lines = rows.each_ref().map(|(x, y, _)| x[i] * y[j]);
+                for k in ranges[2].clone() {
+                    let [a, b, c, d] = [0, 1, 2, 3].map(|row| lines[row] * rows[row].2[k]);
+                    let sum = &mut sums[(i * HATS + j) * HATS + k];
+                    *sum = *sum + ((a + b) + (c + d));
+                }
+            }
+        }
+    }
+    sums.map(|Lanes([a, b, c, d, e, f, g, h])| ((a + h) + (b + g)) + ((c + f) + (d + e)))
+}
+
+/// The mass in each corner's hat, from that of the active tiles around it.
+fn in_hats(tiles: &Tiles, masses: &[Masses]) -> Vec<f64> {
+    let holds: Vec<bool> =
+        masses.par_iter().with_min_len(64).map(|masses| masses.iter().any(|mass| *mass != 0.0)).collect();
+    let neighbours = tiles.neighbours();
+    let of_corner = |corner: usize| {
+        let mut sum = 0.0;
+        for hat in 0..HATS * HATS * HATS {
+            // Where the tile lies whose hat this is, reached over one that is beside both.
+            let off = [hat / (HATS * HATS), hat / HATS % HATS, hat % HATS].map(|hat| 1 - hat as i32);
+            let first = off.map(|x| x.max(-1));
+            let next = [0, 1, 2].map(|axis| off[axis] - first[axis]);
+            let Some(beside) = neighbours.get(neighbours[corner][neighbour_at(first)] as usize) else {
+                continue;
+            };
+            let slot = beside[neighbour_at(next)] as usize;
+            if holds.get(slot) == Some(&true) {
+                sum += f64::from(masses[slot][hat]);
+            }
+        }
+        sum
+    };
+    (0..tiles.count()).into_par_iter().with_min_len(16).map(of_corner).collect()
+}
+
+/// The corners' factors, for the masses that their hats should hold and do.
+fn factors(tiles: &Tiles, mut wanted: Vec<f64>, held: &[f64]) -> Vec<f32> {
+    let around = |values: &[f64], corner: usize| -> f64 {
+        let near = tiles.neighbours()[corner].iter();
+        near.filter_map(|near| values.get(*near as usize)).sum()
+    };
+    for _ in 0..PASSES {
+        let rest: Vec<f64> =
+            wanted.iter().zip(held).map(|(wanted, held)| (wanted - MOST_GAIN * held).max(0.0)).collect();
+        if rest.iter().all(|rest| *rest == 0.0) {
+            break;
+        }
+        let each = |corner: usize| {
+            let room = if rest[corner] > 0.0 { around(held, corner) } else { 0.0 };
+            if room > 0.0 { rest[corner] / room } else { 0.0 }
+        };
+        let each: Vec<f64> = (0..wanted.len()).into_par_iter().with_min_len(64).map(each).collect();
+        let next = |corner: usize| wanted[corner] - rest[corner] + held[corner] * around(&each, corner);
+        wanted = (0..wanted.len()).into_par_iter().with_min_len(64).map(next).collect();
+    }
+    let factor = |(wanted, held): (&f64, &f64)| match *held > 0.0 {
+        true => exact(wanted / held, ROUNDING[0]).min(MOST_GAIN),
+        false => 1.0,
+    };
+    let factors: Vec<f64> = wanted.iter().zip(held).map(factor).collect();
+    let all: f64 = factors.iter().zip(held).map(|(factor, held)| factor * held).sum();
+    let rest = exact(wanted.iter().sum::<f64>() / all, ROUNDING[1]).min(MOST_GAIN);
+    let rest = if rest.is_finite() { rest } else { 1.0 };
+    factors.iter().map(|factor| (factor * rest) as f32).collect()
+}
+
+/// A factor, 1 where it differs from that by rounding only.
+fn exact(factor: f64, rounding: f64) -> f64 {
+    if (factor - 1.0).abs() > rounding { factor } else { 1.0 }
+}
+
+fn scale(tile: &mut Tile, corners: &[f32; 8]) {
+    dispatch!(scale_rows(tile: &mut Tile, corners: &[f32; 8]))
+}
+
+/// Multiplies a tile's values by the factors of its corners, linear between them.
+#[inline(always)]
+fn scale_rows(tile: &mut Tile, corners: &[f32; 8]) {
+    let share = |at: usize| (at as f32 + 0.5) / 8.0;
+    let mix = |a: f32, b: f32, share: f32| a * (1.0 - share) + b * share;
+    for row in 0..64 {
+        let (x, y) = (share(row >> 3), share(row & 7));
+        let line =
+            |z: usize| mix(mix(corners[z], corners[4 + z], x), mix(corners[2 + z], corners[6 + z], x), y);
+        let (low, high) = (line(0), line(1));
+        for (z, value) in tile[row * 8..][..8].iter_mut().enumerate() {
+            *value *= mix(low, high, share(z));
+        }
+    }
+}

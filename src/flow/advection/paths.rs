@@ -1,0 +1,284 @@
+//! Paths of the air in a step: displacements of the cells' centres, to where the air came from and to where it goes.
+
+use rayon::prelude::*;
+
+use super::advect::Way;
+use crate::context::Context;
+use crate::error::Result;
+use crate::flow::tiles::{FACES, Field, Tile, Tiles};
+use crate::flow::window::{Span, Window, max, min};
+use crate::numeric::cpu::dispatch;
+use crate::numeric::lanes::Lanes;
+
+/// Largest displacement (cells) of a step; longer ones are cut off.
+pub const FARTHEST: f32 = 5.0;
+
+/// Where values are placed in their cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum At {
+    /// At the centres.
+    Centres,
+    /// At the lower faces on an axis.
+    Faces(usize),
+}
+
+/// Least and greatest displacement (cells) on each axis.
+pub type Extent = [[f32; 2]; 3];
+
+/// Displacements (cells) of the active cells' centres in a step.
+pub struct Paths<'a> {
+    pub tiles: &'a Tiles,
+    /// To where the air came from.
+    pub back: [&'a [Tile]; 3],
+    /// To where it goes.
+    pub ahead: [&'a [Tile]; 3],
+    /// Extents of each tile's paths, back and ahead.
+    pub extents: Vec<[Extent; 2]>,
+}
+
+impl Paths<'_> {
+    /// The values of a tile that the flow moves: all of an active one, the upper faces of active cells in the rim.
+    pub fn live(&self, slot: usize, at: At) -> Option<Live> {
+        if slot < self.tiles.active() {
+            return Some(Live { layer: None });
+        }
+        match at {
+            At::Faces(axis) if self.below(slot, axis) < self.tiles.active() => {
+                Some(Live { layer: Some(axis) })
+            }
+            _ => None,
+        }
+    }
+
+    fn below(&self, slot: usize, axis: usize) -> usize {
+        self.tiles.neighbours()[slot][FACES[2 * axis]] as usize
+    }
+
+    /// What the paths back of a tile's values reach.
+    pub fn back_span(&self, slot: usize, at: At) -> Span {
+        self.span(slot, at, 0)
+    }
+
+    /// What the paths ahead of a tile's values reach.
+    pub fn ahead_span(&self, slot: usize, at: At) -> Span {
+        self.span(slot, at, 1)
+    }
+
+    fn span(&self, slot: usize, at: At, side: usize) -> Span {
+        let below = match at {
+            At::Centres => None,
+            At::Faces(axis) => self.extents.get(self.below(slot, axis)),
+        };
+        let both = [self.extents.get(slot), below].into_iter().flatten().map(|extents| extents[side]);
+        let mut ways = [[f32::INFINITY, f32::NEG_INFINITY]; 3];
+        for extent in both {
+            for (way, [least, most]) in ways.iter_mut().zip(extent) {
+                *way = [min(least, way[0]), max(most, way[1])];
+            }
+        }
+        let mut cells = [8; 3];
+        if let (At::Faces(axis), true) = (at, slot >= self.tiles.active()) {
+            cells[axis] = 1;
+        }
+        Span::moved(cells, &ways)
+    }
+
+    /// The displacements of a tile's values.
+    pub fn ways<'a>(&self, slot: usize, at: At, paths: &[&'a [Tile]; 3]) -> Ways<'a> {
+        let tile = |slot: usize| {
+            let [x, y, z] = paths.map(|field| field.get(slot));
+            Some([x?, y?, z?])
+        };
+        let below = match at {
+            At::Centres => None,
+            At::Faces(axis) => tile(self.below(slot, axis)),
+        };
+        Ways { at, own: tile(slot), below }
+    }
+}
+
+/// The values of a tile that the flow moves.
+pub struct Live {
+    /// The axis on which only the first layer moves; none: all.
+    layer: Option<usize>,
+}
+
+impl Live {
+    /// The rows that are moved.
+    #[inline(always)]
+    pub fn rows(&self) -> impl Iterator<Item = usize> {
+        let (last, step) = match self.layer {
+            Some(0) => (8, 1),
+            Some(1) => (64, 8),
+            _ => (64, 1),
+        };
+        (0..last).step_by(step)
+    }
+
+    /// Whether all are moved.
+    pub fn is_whole(&self) -> bool {
+        self.layer.is_none()
+    }
+
+    /// How many values of a row are moved.
+    #[inline(always)]
+    pub fn lanes(&self) -> usize {
+        if self.layer == Some(2) { 1 } else { 8 }
+    }
+}
+
+/// The displacements of a tile's values: of its cells, or of faces, which take the mean of the two cells beside them, or those of
+/// the only one that is active.
+pub struct Ways<'a> {
+    at: At,
+    own: Option<[&'a Tile; 3]>,
+    below: Option<[&'a Tile; 3]>,
+}
+
+impl Ways<'_> {
+    /// The displacements of a row.
+    #[inline(always)]
+    pub fn row(&self, row: usize) -> [Lanes; 3] {
+        let step = match self.at {
+            At::Centres => return rows_of(self.own, row),
+            At::Faces(2) => return self.along_rows(row),
+            At::Faces(1) => 1,
+            At::Faces(_) => 8,
+        };
+        let is_first = if step == 8 { row < 8 } else { row & 7 == 0 };
+        let (lower, at) = if is_first { (self.below, row + 7 * step) } else { (self.own, row - step) };
+        match (self.own, lower) {
+            (Some(_), Some(_)) => means(rows_of(self.own, row), rows_of(lower, at)),
+            (Some(_), None) => rows_of(self.own, row),
+            _ => rows_of(lower, at),
+        }
+    }
+
+    /// The displacements of a row of faces on z.
+    #[inline(always)]
+    fn along_rows(&self, row: usize) -> [Lanes; 3] {
+        let below = rows_of(self.below, row).map(|values| values.0[7]);
+        if self.own.is_none() {
+            return below.map(Lanes::all);
+        }
+        let own = rows_of(self.own, row);
+        let mut lower = own;
+        for axis in 0..3 {
+            let first = if self.below.is_some() { below[axis] } else { own[axis].0[0] };
+            lower[axis] = own[axis].behind(first);
+        }
+        means(own, lower)
+    }
+}
+
+#[inline(always)]
+fn rows_of(tiles: Option<[&Tile; 3]>, row: usize) -> [Lanes; 3] {
+    let Some(tiles) = tiles else { return [Lanes::all(0.0); 3] };
+    tiles.map(|tile| Lanes(crate::flow::pressure::stencil::row_of(tile, row)))
+}
+
+#[inline(always)]
+fn means(a: [Lanes; 3], b: [Lanes; 3]) -> [Lanes; 3] {
+    [0, 1, 2].map(|axis| Lanes::all(0.5) * (a[axis] + b[axis]))
+}
+
+/// Traces the paths back and ahead through a velocity (m/s, at lower faces) in a step. Returns the extents of each tile's.
+///
+/// # Errors
+/// Cancel.
+pub fn trace(
+    ctx: &Context,
+    tiles: &Tiles,
+    velocity: &[Field; 3],
+    &Way { ambient, scale, .. }: &Way<'_>,
+    [back, ahead]: [&mut [&mut [Tile]; 3]; 2],
+) -> Result<Vec<[Extent; 2]>> {
+    let reach = reach(tiles, velocity, ambient, scale);
+    let ([a, b, c], [d, e, f]) = (back, ahead);
+    let six = (
+        a.par_iter_mut(),
+        b.par_iter_mut(),
+        c.par_iter_mut(),
+        d.par_iter_mut(),
+        e.par_iter_mut(),
+        f.par_iter_mut(),
+    );
+    let active = six.into_par_iter().enumerate().with_min_len(16);
+    let each = active.map_init(<[Window; 3]>::default, |windows, (slot, (a, b, c, d, e, f))| {
+        ctx.check()?;
+        let near = &tiles.neighbours()[slot];
+        // A cell's velocity is the mean of its two faces' on each axis; half of the way is half as far.
+        let most: [f32; 3] = std::array::from_fn(|axis| {
+            let above = reach.get(near[FACES[2 * axis + 1]] as usize).map_or(0.0, |reach| reach[axis]);
+            0.5 * max(reach[slot][axis], above)
+        });
+        for (axis, window) in windows.iter_mut().enumerate() {
+            let mut ways = most.map(|most| [-most, most]);
+            // Faces lie half a cell from centres; those above are read too.
+            ways[axis] = [-most[axis], most[axis] + 0.5];
+            window.fill(&velocity[axis], near, &Span::moved([8; 3], &ways), ambient[axis]);
+        }
+        let mut to = [a, b, c, d, e, f];
+        trace_tile(windows, scale, &mut to);
+        let extent = |side: usize| [0, 1, 2].map(|axis| extent_of(to[3 * side + axis]));
+        Ok([extent(0), extent(1)])
+    });
+    each.collect()
+}
+
+/// Greatest displacement (cells) on each axis in each tile.
+fn reach(tiles: &Tiles, velocity: &[Field; 3], ambient: [f32; 3], scale: f32) -> Vec<[f32; 3]> {
+    let of_tile = |slot: usize| {
+        [0, 1, 2].map(|axis| {
+            let [least, most] = extent_of(&velocity[axis][slot]);
+            let most = max(max(most, -least), ambient[axis].abs());
+            min(most * scale, FARTHEST)
+        })
+    };
+    (0..tiles.count()).into_par_iter().with_min_len(16).map(of_tile).collect()
+}
+
+/// The least and the greatest value of a tile.
+fn extent_of(tile: &Tile) -> [f32; 2] {
+    dispatch!(extent_of_rows(tile: &Tile) -> [f32; 2])
+}
+
+#[inline(always)]
+fn extent_of_rows(tile: &Tile) -> [f32; 2] {
+    let (mut low, mut high) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
+    for row in tile.chunks_exact(8) {
+        for lane in 0..8 {
+            low[lane] = min(row[lane], low[lane]);
+            high[lane] = max(row[lane], high[lane]);
+        }
+    }
+    [low.into_iter().fold(f32::INFINITY, min), high.into_iter().fold(f32::NEG_INFINITY, max)]
+}
+
+fn trace_tile(windows: &[Window; 3], scale: f32, to: &mut [&mut Tile; 6]) {
+    dispatch!(trace_rows(windows: &[Window; 3], scale: f32, to: &mut [&mut Tile; 6]))
+}
+
+#[inline(always)]
+fn trace_rows(windows: &[Window; 3], scale: f32, to: &mut [&mut Tile; 6]) {
+    let most = Lanes::all(FARTHEST);
+    let least = Lanes::all(-FARTHEST);
+    for row in 0..64 {
+        let (x, y) = (row >> 3, row & 7);
+        let low = windows.each_ref().map(|window| window.row(x, y, 0));
+        let high = [windows[0].row(x + 1, y, 0), windows[1].row(x, y + 1, 0), windows[2].row(x, y, 1)];
+        let half = [0, 1, 2].map(|axis| {
+            let way = (low[axis] + high[axis]) * Lanes::all(0.5 * scale);
+            Lanes::all(0.5) * way.max(least).min(most)
+        });
+        for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
+            let middle = half.map(|way| way * Lanes::all(sign));
+            for axis in 0..3 {
+                // A cell's centre is half a cell above its lower face.
+                let speed = windows[axis].sample_between(row, &middle, axis);
+                let way = (Lanes::all(sign * scale) * speed).max(least).min(most);
+                to[3 * side + axis][row * 8..][..8].copy_from_slice(&way.0);
+            }
+        }
+    }
+}

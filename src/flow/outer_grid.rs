@@ -1,0 +1,184 @@
+//! The air around the tiles: a flow whose cells are twice as wide, over the same place and some way around it, with another one
+//! around it, and so on. It gives the tiles the pressure and the velocity at their border, as if the air went on: one tile of
+//! padding does.
+//!
+//! Where both are, the fine velocity counts: its mean goes into the wide cells before their projection.
+
+use rayon::prelude::*;
+
+use super::Flow;
+use super::pressure::operator::Operator;
+use super::tiles::{Coord, FACES, Field, Tile, Tiles, padded};
+use super::window::{Span, Window};
+use crate::numeric::cpu::dispatch;
+
+/// How many times wider the cells around are.
+pub const WIDER: i32 = 2;
+/// How many flows lie around a flow, each around the one before.
+pub const LEVELS: u32 = 3;
+/// Tiles of wide cells around those that hold fine ones.
+const PADDING: i32 = 1;
+
+/// Sorted coordinates of the wide tiles around fine ones.
+pub fn tiles_around(fine: &[Coord]) -> Vec<Coord> {
+    let mut wide: Vec<Coord> = fine.iter().map(|coord| coord.map(|x| x.div_euclid(WIDER))).collect();
+    wide.sort_unstable();
+    wide.dedup();
+    padded(&wide, PADDING)
+}
+
+/// Wide cells along the edge of a fine tile.
+const PART: usize = 8 / WIDER as usize;
+/// Wide cells in a fine tile.
+const PARTS: usize = PART * PART * PART;
+
+/// The mean fine velocity, in the wide faces that fine faces of active cells cover.
+pub fn restrict(fine: &Flow, wide: &mut Flow) {
+    let (tiles, velocity) = (&fine.tiles, &fine.velocity);
+    for axis in 0..3 {
+        let means: Vec<[f32; PARTS]> =
+            velocity[axis].par_iter().with_min_len(16).map(|tile| means_of(tile, axis)).collect();
+        for (slot, means) in means.into_iter().enumerate() {
+            let is_active = slot < tiles.active();
+            let below = tiles.neighbours()[slot][FACES[2 * axis]] as usize;
+            if !is_active && below >= tiles.active() {
+                continue;
+            }
+            let coord = tiles.coords()[slot];
+            let Some(parent) = wide.tiles.find(coord.map(|x| x.div_euclid(WIDER))) else { continue };
+            let corner = coord.map(|x| x.rem_euclid(WIDER) as usize * PART);
+            let tile = &mut wide.velocity[axis][parent as usize];
+            for (index, mean) in means.into_iter().enumerate() {
+                let at = part(index);
+                // Of the rim, only the first faces bound active cells.
+                if is_active || at[axis] == 0 {
+                    tile[(corner[0] + at[0]) << 6 | (corner[1] + at[1]) << 3 | (corner[2] + at[2])] = mean;
+                }
+            }
+        }
+    }
+}
+
+/// Place of a wide cell in a fine tile.
+fn part(index: usize) -> [usize; 3] {
+    [index / (PART * PART), index / PART % PART, index % PART]
+}
+
+/// Means over the faces of the wide cells in a fine tile.
+fn means_of(tile: &Tile, axis: usize) -> [f32; PARTS] {
+    std::array::from_fn(|index| {
+        let at = part(index).map(|x| WIDER as usize * x);
+        let face = |a: usize, b: usize| {
+            let [x, y, z] = match axis {
+                0 => [0, a, b],
+                1 => [a, 0, b],
+                _ => [a, b, 0],
+            };
+            tile[(at[0] + x) << 6 | (at[1] + y) << 3 | (at[2] + z)]
+        };
+        // In an order that mirrored fields share.
+        0.25 * ((face(0, 0) + face(1, 1)) + (face(0, 1) + face(1, 0)))
+    })
+}
+
+/// Values of a wide field at the faces on an axis, or at the centres, of a fine tile.
+pub struct Reader<'a> {
+    /// Tiles of the field.
+    pub tiles: &'a Tiles,
+    /// The field.
+    pub field: &'a [Tile],
+    /// The axis of the faces; none: centres.
+    pub axis: Option<usize>,
+    /// Its value outside all tiles.
+    pub outside: f32,
+}
+
+/// Wide cells on an axis that the interpolation of a fine tile reads: those that it covers and one on each side.
+const READ: usize = PART + 2;
+
+/// For each of eight fine places on an axis: the first of the two wide cells read, counted from the first of [`READ`], and the
+/// weight of the second.
+type Weights = [(usize, f32); 8];
+
+/// Weights of linear interpolation; `is_centre`: values are at the centres on this axis.
+fn weights(is_centre: bool) -> Weights {
+    let half = if is_centre { 0.5 } else { 0.0 };
+    std::array::from_fn(|fine| {
+        let at = (fine as f32 + half) / WIDER as f32 - half + 1.0;
+        (at as usize, at - at.floor())
+    })
+}
+
+impl Reader<'_> {
+    /// Interpolates at the places of a fine tile's values.
+    pub fn read(&self, window: &mut Window, coord: Coord) -> Tile {
+        let parent = coord.map(|x| x.div_euclid(WIDER));
+        let mut out = [self.outside; 512];
+        let Some(slot) = self.tiles.find(parent) else { return out };
+        let corner = coord.map(|x| x.rem_euclid(WIDER) * PART as i32 - 1);
+        let span = Span::new(corner, corner.map(|x| x + READ as i32));
+        window.fill(self.field, &self.tiles.neighbours()[slot as usize], &span, self.outside);
+        let weights = [0, 1, 2].map(|axis| weights(self.axis != Some(axis)));
+        interpolate(window, corner, &weights, &mut out);
+        out
+    }
+}
+
+fn interpolate(window: &Window, corner: [i32; 3], weights: &[Weights; 3], out: &mut Tile) {
+    dispatch!(interpolate_rows(window: &Window, corner: [i32; 3], weights: &[Weights; 3], out: &mut Tile))
+}
+
+/// Along z, then y, then x.
+#[inline(always)]
+fn interpolate_rows(window: &Window, corner: [i32; 3], weights: &[Weights; 3], out: &mut Tile) {
+    let mix = |a: &[f32; 8], b: &[f32; 8], share: f32| -> [f32; 8] {
+        std::array::from_fn(|lane| (1.0 - share) * a[lane] + share * b[lane])
+    };
+    let mut lines = [[[0.0f32; 8]; READ]; READ];
+    for (x, lines) in lines.iter_mut().enumerate() {
+        for (y, line) in lines.iter_mut().enumerate() {
+            let [x, y] = [corner[0] + x as i32, corner[1] + y as i32];
+            let values: [f32; READ] = std::array::from_fn(|z| window.at(x, y, corner[2] + z as i32));
+            for (to, (first, share)) in line.iter_mut().zip(&weights[2]) {
+                *to = (1.0 - share) * values[*first] + share * values[first + 1];
+            }
+        }
+    }
+    let mut planes = [[[0.0f32; 8]; 8]; READ];
+    for (lines, plane) in lines.iter().zip(&mut planes) {
+        for (row, (first, share)) in plane.iter_mut().zip(&weights[1]) {
+            *row = mix(&lines[*first], &lines[first + 1], *share);
+        }
+    }
+    for (row, out) in out.chunks_exact_mut(8).enumerate() {
+        let (first, share) = weights[0][row >> 3];
+        out.copy_from_slice(&mix(&planes[first][row & 7], &planes[first + 1][row & 7], share));
+    }
+}
+
+/// The wide pressure, with the mean of their neighbours in cells that take no part.
+pub fn continued(operator: &Operator, pressure: &Field) -> Field {
+    let takes_part =
+        |slot: usize, cell: usize| operator.stencil(slot).is_none_or(|stencil| stencil.inverse[cell] > 0.0);
+    let tiles = &operator.tiles;
+    let mut out = pressure.clone();
+    out[..tiles.active()].par_iter_mut().enumerate().for_each(|(slot, tile)| {
+        if operator.stencil(slot).is_none() {
+            return;
+        }
+        for cell in (0..512usize).filter(|cell| !takes_part(slot, *cell)) {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for axis in 0..3 {
+                for upper in [false, true] {
+                    let (near, cell) = tiles.beside(slot, cell, axis, upper);
+                    if (near as usize) < tiles.active() && takes_part(near as usize, cell) {
+                        sum += pressure[near as usize][cell];
+                        count += 1.0;
+                    }
+                }
+            }
+            tile[cell] = if count > 0.0 { sum / count } else { 0.0 };
+        }
+    });
+    out
+}

@@ -1,0 +1,150 @@
+//! One V-cycle of multigrid: a good guess at the solution of L x = b, the preconditioner of conjugate gradients (McAdams, Sifakis
+//! and Teran 2010).
+//!
+//! Cells double from level to level; the open share of a coarse face is the mean of its four fine ones. A coarse cell takes part
+//! if one of its eight does and none is outside, where the pressure is 0. Residuals go down as means, corrections come up by
+//! trilinear interpolation. Beside solids as much of a correction is taken as helps. Each level is smoothed by two weighted
+//! Jacobi sweeps before and after, with Chebyshev's weights for the upper half of the frequencies: unlike Gauss and Seidel's,
+//! these do not depend on any order, so that mirrored fields have mirrored results.
+
+use rayon::prelude::*;
+
+use super::operator::Operator;
+use super::stencil::{Task, start};
+use super::transfer::{prolong, restrict};
+use crate::flow::scratch::first;
+use crate::flow::solids::Solids;
+use crate::flow::tiles::{Field, NONE, Tile, Tiles};
+
+/// Weights of two Jacobi sweeps: the inverse roots of Chebyshev's polynomial on [1/3, 2], the eigenvalues (over the diagonal) of
+/// the modes that a coarser level cannot hold. They leave at most 0.34 of those.
+const WEIGHTS: [f32; 2] = [1.731_9, 0.569_5];
+/// Pairs of sweeps on the coarsest level.
+const LAST: usize = 8;
+/// Most levels.
+const LEVELS: usize = 7;
+
+/// A level below the finest.
+#[derive(Debug, Default)]
+struct Level {
+    operator: Operator,
+    /// Slots of the eight finer tiles under each tile.
+    children: Vec<[u32; 8]>,
+    /// For each finer tile, the slot here and its octant.
+    parents: Vec<(u32, u8)>,
+    b: Field,
+    x: Field,
+    spare: Field,
+    /// Room for a correction, beside solids.
+    detour: Field,
+}
+
+/// The preconditioner.
+#[derive(Debug, Default)]
+pub struct Multigrid {
+    /// The finest level's operator.
+    pub finest: Operator,
+    levels: Vec<Level>,
+}
+
+impl Multigrid {
+    /// Makes it that of the tiles' cells between solids. Fields of its levels are kept.
+    pub fn become_of(&mut self, tiles: &Tiles, solids: &Solids) {
+        let is_plain = solids.is_empty() && !self.finest.has_stencils();
+        if is_plain && self.finest.tiles.is_of(tiles) {
+            return;
+        }
+        self.finest = Operator::new(tiles, solids);
+        let mut count = 0;
+        while count + 1 < LEVELS {
+            let finer = if count == 0 { &self.finest } else { &self.levels[count - 1].operator };
+            if finer.tiles.active() <= 1 {
+                break;
+            }
+            let (operator, children) = finer.coarser();
+            let mut parents = vec![(NONE, 0); finer.tiles.active()];
+            for (slot, children) in children.iter().enumerate() {
+                for (octant, child) in children.iter().enumerate().filter(|(_, child)| **child != NONE) {
+                    parents[*child as usize] = (slot as u32, octant as u8);
+                }
+            }
+            if self.levels.len() == count {
+                self.levels.push(Level::default());
+            }
+            let level = &mut self.levels[count];
+            (level.operator, level.children, level.parents) = (operator, children, parents);
+            count += 1;
+        }
+        self.levels.truncate(count);
+    }
+
+    /// x = M b; returns the sum of x times b.
+    pub fn cycle(&mut self, b: &[Tile], x: &mut [Tile], room: [&mut [Tile]; 2]) -> f64 {
+        descend(&self.finest, &mut self.levels, b, x, room)
+    }
+}
+
+fn descend(
+    operator: &Operator,
+    coarser: &mut [Level],
+    b: &[Tile],
+    x: &mut [Tile],
+    [spare, detour]: [&mut [Tile]; 2],
+) -> f64 {
+    let [first_weight, second_weight] = WEIGHTS;
+    let begin = |(slot, out): (usize, &mut Tile)| start(&b[slot], first_weight, operator.stencil(slot), out);
+    spare.par_iter_mut().enumerate().with_min_len(64).for_each(begin);
+    let mut sum = operator.compute(spare, |slot| Task::Smooth(&b[slot], second_weight), x);
+    let Some((next, further)) = coarser.split_first_mut() else {
+        for _ in 1..LAST {
+            operator.compute(x, |slot| Task::Smooth(&b[slot], first_weight), spare);
+            sum = operator.compute(spare, |slot| Task::Smooth(&b[slot], second_weight), x);
+        }
+        return sum;
+    };
+    let Level { operator: coarse, children, parents, b: below, x: correction, spare: room, detour: way } =
+        next;
+    let count = coarse.tiles.active();
+    let way = first(way, if coarse.has_stencils() { count } else { 0 });
+    let [below, correction, room] = [below, correction, room].map(|field| first(field, count));
+    restrict(operator, (b, x), children, below);
+    descend(coarse, further, below, correction, [room, way]);
+    if operator.has_stencils() {
+        detour.par_iter_mut().with_min_len(64).for_each(|tile| *tile = [0.0; 512]);
+        prolong(coarse, correction, operator, parents, detour);
+        correct(operator, detour, b, x, spare);
+    } else {
+        prolong(coarse, correction, operator, parents, x);
+    }
+    operator.compute(x, |slot| Task::Smooth(&b[slot], first_weight), spare);
+    operator.compute(spare, |slot| Task::Smooth(&b[slot], second_weight), x)
+}
+
+/// Adds so much of a correction to x that the error has the least energy. Coarse cells do not see narrow gaps and thin walls, and
+/// interpolation leads through these: taken whole, a correction may be many times too large.
+fn correct(operator: &Operator, correction: &[Tile], b: &[Tile], x: &mut [Tile], spare: &mut [Tile]) {
+    let energy = operator.compute(correction, |_| Task::Product, spare);
+    // The operator is symmetric: the correction times L x is L times the correction, times x.
+    let gain = product(correction, b) - product(spare, x);
+    let share = if energy > 0.0 { (gain / energy) as f32 } else { 0.0 };
+    x.par_iter_mut().zip(correction).with_min_len(64).for_each(|(x, way)| {
+        x.iter_mut().zip(way).for_each(|(x, way)| *x += share * way);
+    });
+}
+
+/// Sum of the products of two fields' values.
+pub fn product(a: &[Tile], b: &[Tile]) -> f64 {
+    let sums: Vec<f64> = a.par_iter().zip(b).with_min_len(64).map(|(a, b)| dot(a, b)).collect();
+    sums.iter().sum()
+}
+
+/// Sum of the products of two tiles' values.
+fn dot(a: &Tile, b: &Tile) -> f64 {
+    let mut sums = [0.0f32; 8];
+    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
+        for lane in 0..8 {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    sums.iter().map(|sum| f64::from(*sum)).sum()
+}

@@ -1,0 +1,206 @@
+//! Pockets: groups of connected cells that solids seal off from the air outside all tiles. The pressure in one is known up to a
+//! constant, and what its walls press out of it cannot leave: the mean inflow of a pocket is set aside, and so is the mean of its
+//! pressure.
+
+use rayon::prelude::*;
+
+use super::operator::{Operator, layer};
+use super::stencil::Stencil;
+use crate::flow::tiles::{FACES, NONE, Tile};
+
+/// Label of a cell that does not take part.
+const SOLID: u16 = u16::MAX;
+
+/// The connected parts of a tile.
+struct Parts {
+    /// Part of each cell; none: the tile is one part.
+    labels: Option<Box<[u16; 512]>>,
+    count: u32,
+    /// Whether each part borders on the outside.
+    opens: Vec<bool>,
+}
+
+/// The pockets of a set of tiles.
+#[derive(Default)]
+pub struct Pockets {
+    /// Cells of each pocket: a tile and, unless the whole tile belongs to it, its cells.
+    pockets: Vec<Vec<(u32, Option<Vec<u16>>)>>,
+}
+
+impl Pockets {
+    /// Finds the pockets.
+    pub fn find(operator: &Operator) -> Self {
+        if !operator.has_stencils() {
+            // Without solids, everything is connected to the outside.
+            return Self::default();
+        }
+        let active = operator.tiles.active();
+        let parts: Vec<Parts> =
+            (0..active).into_par_iter().with_min_len(8).map(|slot| parts_of(operator, slot)).collect();
+        let mut first = Vec::with_capacity(active);
+        let mut count = 0u32;
+        for parts in &parts {
+            first.push(count);
+            count += parts.count;
+        }
+        let mut groups = Groups { parents: (0..count).collect() };
+        for slot in 0..active {
+            for axis in 0..3 {
+                let above = operator.tiles.neighbours()[slot][FACES[2 * axis + 1]] as usize;
+                if above < active {
+                    let pair = [(first[slot], &parts[slot]), (first[above], &parts[above])];
+                    groups.join_tiles(axis, pair, operator.stencil(slot));
+                }
+            }
+        }
+        let mut is_open = vec![false; count as usize];
+        for (slot, parts) in parts.iter().enumerate() {
+            for (part, _) in parts.opens.iter().enumerate().filter(|(_, opens)| **opens) {
+                is_open[groups.root(first[slot] + part as u32) as usize] = true;
+            }
+        }
+        let mut numbers = vec![NONE; count as usize];
+        let mut pockets: Vec<Vec<(u32, Option<Vec<u16>>)>> = Vec::new();
+        for (slot, parts) in parts.iter().enumerate() {
+            for part in 0..parts.count {
+                let root = groups.root(first[slot] + part) as usize;
+                if is_open[root] {
+                    continue;
+                }
+                if numbers[root] == NONE {
+                    numbers[root] = pockets.len() as u32;
+                    pockets.push(Vec::new());
+                }
+                let cells = parts.labels.as_ref().map(|labels| {
+                    (0..512u16).filter(|cell| u32::from(labels[usize::from(*cell)]) == part).collect()
+                });
+                pockets[numbers[root] as usize].push((slot as u32, cells));
+            }
+        }
+        Self { pockets }
+    }
+
+    /// Subtracts the mean over each pocket.
+    pub fn level(&self, field: &mut [Tile]) {
+        for pocket in &self.pockets {
+            let (mut sum, mut count) = (0.0f64, 0usize);
+            for (slot, cells) in pocket {
+                let tile = &field[*slot as usize];
+                match cells {
+                    Some(cells) => {
+                        sum += cells.iter().map(|cell| f64::from(tile[usize::from(*cell)])).sum::<f64>();
+                        count += cells.len();
+                    }
+                    None => {
+                        sum += tile.iter().map(|value| f64::from(*value)).sum::<f64>();
+                        count += 512;
+                    }
+                }
+            }
+            let mean = (sum / count.max(1) as f64) as f32;
+            for (slot, cells) in pocket {
+                let tile = &mut field[*slot as usize];
+                match cells {
+                    Some(cells) => cells.iter().for_each(|cell| tile[usize::from(*cell)] -= mean),
+                    None => tile.iter_mut().for_each(|value| *value -= mean),
+                }
+            }
+        }
+    }
+}
+
+/// The parts of a tile, by flooding.
+fn parts_of(operator: &Operator, slot: usize) -> Parts {
+    let active = operator.tiles.active();
+    let is_outside = FACES.map(|at| operator.tiles.neighbours()[slot][at] as usize >= active);
+    let Some(stencil) = operator.stencil(slot) else {
+        return Parts { labels: None, count: 1, opens: vec![is_outside.contains(&true)] };
+    };
+    let mut labels = Box::new([SOLID; 512]);
+    let mut opens = Vec::new();
+    let mut stack = Vec::new();
+    for seed in 0..512usize {
+        if labels[seed] != SOLID || stencil.inverse[seed] == 0.0 {
+            continue;
+        }
+        let part = opens.len() as u16;
+        opens.push(false);
+        labels[seed] = part;
+        stack.push(seed);
+        while let Some(cell) = stack.pop() {
+            for (face, is_outside) in is_outside.iter().enumerate() {
+                let (axis, is_upper) = (face / 2, face % 2 == 1);
+                if open(stencil, axis, is_upper, cell) == 0.0 {
+                    continue;
+                }
+                match within(axis, is_upper, cell) {
+                    Some(next) if labels[next] == SOLID && stencil.inverse[next] > 0.0 => {
+                        labels[next] = part;
+                        stack.push(next);
+                    }
+                    None if *is_outside => opens[usize::from(part)] = true,
+                    _ => (),
+                }
+            }
+        }
+    }
+    Parts { labels: Some(labels), count: opens.len() as u32, opens }
+}
+
+/// The cell of the same tile behind a face.
+fn within(axis: usize, is_upper: bool, cell: usize) -> Option<usize> {
+    let step = 64 >> (3 * axis);
+    let at = cell / step % 8;
+    match is_upper {
+        true => (at < 7).then(|| cell + step),
+        false => (at > 0).then(|| cell - step),
+    }
+}
+
+/// Open share of a face of a cell.
+fn open(stencil: &Stencil, axis: usize, is_upper: bool, cell: usize) -> f32 {
+    match (is_upper, within(axis, true, cell)) {
+        (false, _) => stencil.lower[axis][cell],
+        (true, Some(next)) => stencil.lower[axis][next],
+        (true, None) => stencil.upper[axis][layer(axis, cell)],
+    }
+}
+
+/// Disjoint groups of parts.
+struct Groups {
+    parents: Vec<u32>,
+}
+
+impl Groups {
+    fn root(&mut self, mut part: u32) -> u32 {
+        while self.parents[part as usize] != part {
+            let above = self.parents[part as usize];
+            self.parents[part as usize] = self.parents[above as usize];
+            part = above;
+        }
+        part
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parents[a.max(b) as usize] = a.min(b);
+    }
+
+    /// Joins the parts of two tiles through the faces between them.
+    fn join_tiles(&mut self, axis: usize, [below, above]: [(u32, &Parts); 2], stencil: Option<&Stencil>) {
+        let part = |(first, parts): (u32, &Parts), cell: usize| match &parts.labels {
+            Some(labels) => (labels[cell] != SOLID).then(|| first + u32::from(labels[cell])),
+            None => Some(first),
+        };
+        let step = 64 >> (3 * axis);
+        for at in 0..64 {
+            let low = super::operator::first(axis, at);
+            let last = low + 7 * step;
+            if stencil.is_none_or(|stencil| open(stencil, axis, true, last) > 0.0)
+                && let (Some(a), Some(b)) = (part(below, last), part(above, low))
+            {
+                self.join(a, b);
+            }
+        }
+    }
+}

@@ -1,0 +1,472 @@
+//! What a mesh carries, on what became of it.
+//!
+//! Vertices and triangles that are still there keep their numbers bit for bit. What was made takes those of a place on the old mesh: a
+//! vertex of the nearest one, the corners of a triangle all of places on one old triangle, its chart, so that none lies across a seam.
+//! Where it is known where the liquid was at the first frame, that frame's mesh is asked first (`attributes/traced.rs`).
+
+mod texture;
+pub(in crate::mesh_repair) mod traced;
+pub(in crate::mesh_repair) mod weights;
+
+use rayon::prelude::*;
+
+use super::Source;
+use crate::geometry::check::deviation::NearestTree;
+use crate::geometry::mesh::attributes::{DetailedMesh, MeshArray, On};
+use crate::geometry::{DVec3, TriMesh, Uvs, Vec3};
+use traced::{Traced, is_mask};
+use weights::{Weights, alone, between, blended, heaviest, weights};
+
+/// Vertices or triangles of a task.
+pub(super) const GRAIN: usize = 1024;
+
+/// What a mesh carries, on what became of it: `mesh`, for whose vertices `vertices` names those that they were, and for whose
+/// triangles `sources` says where they come from.
+///
+/// Vertices that were there keep their numbers, and so do triangles that are [`Source::Whole`], with their corners. The corners of a
+/// [`Source::Part`] take what there is at their places in the triangle that it is a part of, those of a [`Source::New`] at the nearest
+/// places on the old triangle that is nearest to its middle; made vertices at the nearest place on the old mesh. There floats are
+/// interpolated, and colours in 8-bit integers (`red`, `green`, `blue`, `alpha`); other integers are those of the nearest corner.
+/// Where vertices with different texture coordinates were joined, the corners have coordinates then. Of other arrays of vertices that
+/// were joined the first one's number stays.
+///
+/// With `traced` what was made takes the numbers of the first frame instead, where it is known what the liquid there had then, and there
+/// is an array [`Traced::MASK`].
+pub fn carried(
+    detail: &DetailedMesh,
+    mesh: TriMesh,
+    vertices: &[Option<u32>],
+    sources: &[Source],
+    traced: Option<&Traced<'_>>,
+) -> DetailedMesh {
+    let mut out = match &detail.arrays[..] {
+        [mask] if traced.is_some() && detail.uvs.is_none() && is_mask(mask) => of_mask(mask, mesh, sources),
+        _ => of_old(detail, mesh, vertices, sources, traced.is_some()),
+    };
+    if let Some(traced) = traced {
+        traced.put(&mut out, vertices, sources);
+    }
+    out
+}
+
+/// What it takes from the mesh before alone. Of a mesh that is tracked no vertices were joined, but vertices that stay went into others.
+fn of_old(
+    detail: &DetailedMesh,
+    mesh: TriMesh,
+    vertices: &[Option<u32>],
+    sources: &[Source],
+    is_tracked: bool,
+) -> DetailedMesh {
+    if detail.uvs.is_none() && detail.arrays.is_empty() {
+        return DetailedMesh { mesh, ..DetailedMesh::default() };
+    }
+    if detail.mesh.triangles.is_empty() {
+        return of_nothing(detail, mesh);
+    }
+    let origins = Origins::of(&detail.mesh, &mesh, vertices, sources);
+    let uvs = detail.uvs.as_ref().map(|uvs| origins.uvs(uvs, &mesh.triangles, sources, is_tracked));
+    let arrays = detail.arrays.iter().map(|array| origins.array(array)).collect();
+    DetailedMesh { mesh, uvs, arrays }
+}
+
+/// The same of a mesh that carries the mask of what was made alone: that needs no places.
+fn of_mask(mask: &MeshArray, mesh: TriMesh, sources: &[Source]) -> DetailedMesh {
+    let value = |source: &Source| match *source {
+        Source::Whole(triangle) | Source::Part(triangle) => mask.values[triangle as usize],
+        Source::New => 1.0,
+    };
+    let values = sources.iter().map(value).collect();
+    let arrays = vec![MeshArray { name: mask.name.clone(), on: mask.on, number: mask.number, values }];
+    DetailedMesh { mesh, uvs: None, arrays }
+}
+
+/// What a mesh carries on one that came of nothing: zeros.
+fn of_nothing(detail: &DetailedMesh, mesh: TriMesh) -> DetailedMesh {
+    let [vertices, faces] = [mesh.positions.len(), mesh.triangles.len()];
+    let array =
+        |array: &MeshArray| MeshArray { values: vec![0.0; array.on.count(vertices, faces)], ..array.clone() };
+    let uvs = |uvs: &Uvs| Uvs::nothing(uvs.corners.is_some(), vertices, faces);
+    let (arrays, uvs) = (detail.arrays.iter().map(array).collect(), detail.uvs.as_ref().map(uvs));
+    DetailedMesh { mesh, uvs, arrays }
+}
+
+/// Where a vertex has its numbers from.
+enum Origin {
+    /// A vertex of the old mesh.
+    Vertex(u32),
+    /// A place on a triangle of the old mesh.
+    Place(usize, Weights),
+}
+
+/// Where all numbers come from.
+struct Origins<'a> {
+    /// The triangles of the old mesh.
+    old: &'a [[u32; 3]],
+    /// Of each vertex.
+    vertices: Vec<Origin>,
+    /// Of each triangle: its chart, a triangle of the old mesh, and the places of its corners there.
+    triangles: Vec<(usize, [Weights; 3])>,
+}
+
+impl<'a> Origins<'a> {
+    /// Of a mesh that was another, which has triangles.
+    fn of(old: &'a TriMesh, new: &TriMesh, vertices: &[Option<u32>], sources: &[Source]) -> Self {
+        let tree = NearestTree::new(old);
+        let nearest = |place: DVec3| tree.nearest(place).map_or(0, |nearest| nearest.triangle);
+        let vertex = |(own, position): (&Option<u32>, &Vec3)| match own {
+            Some(vertex) => Origin::Vertex(*vertex),
+            None => {
+                let place: DVec3 = position.cast();
+                let triangle = nearest(place);
+                Origin::Place(triangle, weights(&old.corners(triangle), place))
+            }
+        };
+        let triangle = |(number, source): (usize, &Source)| {
+            let chart = match *source {
+                Source::Whole(chart) | Source::Part(chart) => chart as usize,
+                Source::New => {
+                    let [a, b, c] = new.corners(number);
+                    nearest((a + b + c) / 3.0)
+                }
+            };
+            let corner = |vertex: u32| {
+                let is_own = |corner: &u32| vertices[vertex as usize] == Some(*corner);
+                match old.triangles[chart].iter().position(is_own) {
+                    Some(corner) => alone(corner),
+                    None => weights(&old.corners(chart), new.positions[vertex as usize].cast()),
+                }
+            };
+            (chart, new.triangles[number].map(corner))
+        };
+        Self {
+            old: &old.triangles,
+            vertices: vertices.par_iter().zip(&new.positions).with_min_len(GRAIN).map(vertex).collect(),
+            triangles: sources.par_iter().enumerate().with_min_len(GRAIN).map(triangle).collect(),
+        }
+    }
+
+    fn array(&self, array: &MeshArray) -> MeshArray {
+        let of_vertex = |origin: &Origin| match origin {
+            Origin::Vertex(vertex) => array.values[*vertex as usize],
+            Origin::Place(triangle, weights) => {
+                blended(array, self.old[*triangle].map(|vertex| array.values[vertex as usize]), weights)
+            }
+        };
+        let of_corners = |(chart, weights): &(usize, [Weights; 3])| {
+            let numbers = [0, 1, 2].map(|corner| array.values[3 * chart + corner]);
+            weights.map(|weights| blended(array, numbers, &weights))
+        };
+        let values = match array.on {
+            On::Vertices => self.vertices.iter().map(of_vertex).collect(),
+            On::Corners => self.triangles.iter().flat_map(of_corners).collect(),
+            On::Faces => self.triangles.iter().map(|(chart, _)| array.values[*chart]).collect(),
+        };
+        MeshArray { name: array.name.clone(), on: array.on, number: array.number, values }
+    }
+
+    /// Texture coordinates, for these triangles of the new mesh with their sources.
+    fn uvs(&self, uvs: &Uvs, triangles: &[[u32; 3]], sources: &[Source], is_tracked: bool) -> Uvs {
+        if uvs.corners.is_none() && (is_tracked || !self.joins_seams(uvs, triangles)) {
+            let place = |origin: &Origin| match origin {
+                Origin::Vertex(vertex) => uvs.places[*vertex as usize],
+                Origin::Place(triangle, weights) => {
+                    between(self.old[*triangle].map(|vertex| uvs.places[vertex as usize]), weights)
+                }
+            };
+            let places = self.vertices.iter().map(place).collect();
+            return Uvs { places, corners: None, missing: uvs.missing };
+        }
+        let mut places = uvs.places.clone();
+        let mut corners = Vec::with_capacity(3 * self.triangles.len());
+        let mut beside = self.beside(uvs, triangles, sources).into_iter().peekable();
+        for (chart, weights) in &self.triangles {
+            let own = uvs.indices(self.old, *chart);
+            for weights in weights {
+                let most = heaviest(weights);
+                if let Some((_, index)) = beside.next_if(|(corner, _)| *corner == corners.len()) {
+                    corners.push(index);
+                } else if weights[most] == 1.0 {
+                    corners.push(own[most]);
+                } else {
+                    corners.push(places.len() as u32);
+                    places.push(between(own.map(|index| uvs.places[index as usize]), weights));
+                }
+            }
+        }
+        Uvs { places, corners: Some(corners), missing: uvs.missing }
+    }
+
+    /// The vertex of the old mesh that one of the new mesh is.
+    fn own(&self, vertex: u32) -> Option<u32> {
+        match self.vertices[vertex as usize] {
+            Origin::Vertex(own) => Some(own),
+            Origin::Place(..) => None,
+        }
+    }
+
+    /// Corners of parts that are vertices of the old mesh, but not their charts', ascending (of each triangle three), with the indices of
+    /// these vertices' coordinates: a collapse of two vertices leaves such corners. That index counts which the vertex has in a triangle
+    /// that it shares with the corner that went, where that has the index that it has on the chart: on the same side of a seam. Corners
+    /// without such a triangle are left out.
+    fn beside(&self, uvs: &Uvs, triangles: &[[u32; 3]], sources: &[Source]) -> Vec<(usize, u32)> {
+        // Each with its vertex, and the vertex and index of the corner that went.
+        let mut corners: Vec<(usize, u32, [u32; 2])> = Vec::new();
+        let parts = sources.iter().enumerate().filter(|(_, source)| matches!(source, Source::Part(_)));
+        for (number, _) in parts {
+            let (chart, weights) = &self.triangles[number];
+            let of_chart = self.old[*chart];
+            let names = triangles[number].map(|vertex| self.own(vertex));
+            for (corner, (name, weights)) in names.iter().zip(weights).enumerate() {
+                let Some(name) = name.filter(|name| !of_chart.contains(name)) else { continue };
+                let gone = (0..3usize).filter(|other| !names.contains(&Some(of_chart[*other])));
+                let nearest = gone.max_by(|a, b| weights[*a].total_cmp(&weights[*b]));
+                let index = |other: usize| uvs.indices(self.old, *chart)[other];
+                corners.extend(nearest.map(|at| (3 * number + corner, name, [of_chart[at], index(at)])));
+            }
+        }
+        let count = corners.iter().map(|(_, name, _)| *name as usize + 1).max().unwrap_or(0);
+        if count == 0 {
+            return Vec::new();
+        }
+        let mut is_asked = vec![false; count];
+        corners.iter().for_each(|(_, name, _)| is_asked[*name as usize] = true);
+        let mut around: Vec<(u32, usize)> = Vec::new();
+        for (triangle, names) in self.old.iter().enumerate() {
+            let asked = names.iter().filter(|name| is_asked.get(**name as usize) == Some(&true));
+            around.extend(asked.map(|name| (*name, triangle)));
+        }
+        around.sort_unstable();
+        let index_in = |triangle: usize, name: u32, [gone, index]: [u32; 2]| {
+            let (names, indices) = (self.old[triangle], uvs.indices(self.old, triangle));
+            let is_same_side = (0..3usize).any(|at| (names[at], indices[at]) == (gone, index));
+            let at = names.iter().position(|other| *other == name)?;
+            is_same_side.then_some(indices[at])
+        };
+        let found = |(corner, name, gone): (usize, u32, [u32; 2])| {
+            let begin = around.partition_point(|(other, _)| *other < name);
+            let mut own = around[begin..].iter().take_while(|(other, _)| *other == name);
+            own.find_map(|(_, triangle)| index_in(*triangle, name, gone)).map(|index| (corner, index))
+        };
+        corners.into_iter().filter_map(found).collect()
+    }
+
+    /// Whether a vertex is several of the old mesh that had different texture coordinates.
+    fn joins_seams(&self, uvs: &Uvs, triangles: &[[u32; 3]]) -> bool {
+        let place = |vertex: u32| uvs.places[vertex as usize];
+        let is_other = |chart: usize, weights: &Weights, vertex: u32| {
+            let most = heaviest(weights);
+            let own = self.own(vertex);
+            own.is_some_and(|own| weights[most] == 1.0 && place(self.old[chart][most]) != place(own))
+        };
+        self.triangles.iter().zip(triangles).any(|((chart, weights), names)| {
+            weights.iter().zip(names).any(|(weights, vertex)| is_other(*chart, weights, *vertex))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::repair;
+    use super::*;
+    use crate::context::{Context, Pool};
+    use crate::geometry::mesh::attributes::Number;
+
+    fn array(name: &str, on: On, number: Number, values: &[f64]) -> MeshArray {
+        MeshArray { name: name.into(), on, number, values: values.to_vec() }
+    }
+
+    /// A square of two triangles, and a square of the same with its first triangle turned round and its second cut in two, one half
+    /// of which was made anew.
+    fn squares() -> (TriMesh, TriMesh) {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 1.0]];
+        let positions: Vec<Vec3> = corners.iter().map(|[x, y]| Vec3::new(*x, *y, 0.0)).collect();
+        let old = TriMesh { positions: positions[..4].to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]] };
+        (old, TriMesh { positions, triangles: vec![[0, 2, 1], [0, 2, 4], [0, 4, 3]] })
+    }
+
+    const VERTICES: [Option<u32>; 5] = [Some(0), Some(1), Some(2), Some(3), None];
+    const SOURCES: [Source; 3] = [Source::Whole(0), Source::Part(1), Source::New];
+
+    #[test]
+    fn what_was_there_keeps_its_numbers_and_what_was_made_lies_between() {
+        let (old, new) = squares();
+        let arrays = vec![
+            array("wet", On::Vertices, Number::F32, &[0.25, 0.5, 0.125, 0.375]),
+            array("id", On::Vertices, Number::U32, &[5.0, 6.0, 7.0, 8.0]),
+            array("red", On::Vertices, Number::U8, &[0.0, 10.0, 100.0, 201.0]),
+            array("part", On::Faces, Number::U16, &[3.0, 4.0]),
+            array("dry", On::Corners, Number::F64, &[10.0, 20.0, 30.0, 40.0, 50.0, 60.0]),
+            array("kind", On::Corners, Number::I8, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]),
+            array("hole", On::Vertices, Number::F64, &[f64::NAN, 1.0, 2.0, 3.0]),
+            array("spread", On::Vertices, Number::F64, &[0.0, 1.0, f64::NAN, 3.0]),
+        ];
+        let places = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let uvs = Uvs { places: places.clone(), corners: None, missing: 2 };
+        let detail = DetailedMesh { mesh: old, uvs: Some(uvs), arrays };
+        let carried = carried(&detail, new.clone(), &VERTICES, &SOURCES, None);
+        assert_eq!(carried.mesh, new);
+        let wanted: [&[f64]; 6] = [
+            &[0.25, 0.5, 0.125, 0.375, 0.25],
+            &[5.0, 6.0, 7.0, 8.0, 7.0],
+            &[0.0, 10.0, 100.0, 201.0, 151.0],
+            &[3.0, 4.0, 4.0],
+            &[10.0, 30.0, 20.0, 40.0, 50.0, 55.0, 40.0, 55.0, 60.0],
+            &[1.0, 3.0, 2.0, 4.0, 5.0, 5.0, 4.0, 5.0, 6.0],
+        ];
+        for (found, wanted) in carried.arrays.iter().zip(wanted) {
+            assert_eq!(found.values, wanted, "{}", found.name);
+        }
+        let [hole, spread] = [6, 7].map(|n: usize| &carried.arrays[n].values);
+        assert!(hole[0].is_nan() && hole[1..] == [1.0, 2.0, 3.0, 2.5], "{hole:?}");
+        assert!(spread[2].is_nan() && spread[4].is_nan() && spread[3] == 3.0, "{spread:?}");
+        let uvs = carried.uvs.unwrap();
+        assert_eq!((uvs.corners, uvs.missing), (None, 2));
+        assert!(uvs.places[..4] == places && uvs.places[4] == [0.5, 1.0], "{:?}", uvs.places);
+    }
+
+    #[test]
+    fn coordinates_with_seams_stay_coordinates_of_corners() {
+        let (old, new) = squares();
+        let places: Vec<[f32; 2]> = (0..6u8).map(|n| [f32::from(n), 0.125 * f32::from(n)]).collect();
+        let uvs = Uvs { places: places.clone(), corners: Some((0..6).collect()), missing: 0 };
+        let detail = DetailedMesh { mesh: old, uvs: Some(uvs), arrays: Vec::new() };
+        let uvs = carried(&detail, new, &VERTICES, &SOURCES, None).uvs.unwrap();
+        assert_eq!(uvs.corners.unwrap(), [0, 2, 1, 3, 4, 6, 3, 7, 5]);
+        assert!(uvs.places.starts_with(&places));
+        assert_eq!(uvs.places[6..], [[4.5, 0.5625]; 2]);
+    }
+
+    #[test]
+    fn a_collapse_tears_no_texture() {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [0.0, 1.0], [1.0, 1.0], [2.0, 1.0]];
+        let positions: Vec<Vec3> = corners.iter().map(|[x, y]| Vec3::new(*x, *y, 0.0)).collect();
+        let old = TriMesh { positions, triangles: vec![[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]] };
+        // The second vertex became the first.
+        let kept = [0, 2, 3, 4, 5];
+        let positions = kept.map(|n: usize| old.positions[n]).to_vec();
+        let new = TriMesh { positions, triangles: vec![[0, 1, 4], [0, 4, 3], [0, 3, 2]] };
+        let vertices = kept.map(|n| Some(n as u32));
+        let sources = [Source::Part(2), Source::Part(3), Source::Whole(1)];
+        let places: Vec<[f32; 2]> = (0..7u8).map(|n| [f32::from(n), 0.5 * f32::from(n)]).collect();
+        let found = |places: &[[f32; 2]], corners| {
+            let uvs = Some(Uvs { places: places.to_vec(), corners, missing: 0 });
+            let detail = DetailedMesh { mesh: old.clone(), uvs, arrays: Vec::new() };
+            let traced = Traced { first: &detail, tree: None, places: &[], spacing: 1.0 };
+            carried(&detail, new.clone(), &vertices, &sources, Some(&traced)).uvs.unwrap()
+        };
+        let uvs = found(&places[..6], None);
+        assert_eq!((uvs.places, uvs.corners), (kept.map(|n| places[n]).to_vec(), None));
+        let mut indices = old.triangles.as_flattened().to_vec();
+        for has_seam in [false, true] {
+            if has_seam {
+                // The third triangle's coordinates lie elsewhere: there the first vertex has none.
+                indices[6] = 6;
+            }
+            let uvs = found(&places, Some(indices.clone()));
+            let first = if has_seam { 6 } else { 0 };
+            assert_eq!(
+                (uvs.places, uvs.corners),
+                (places.clone(), Some(vec![first, 2, 5, 0, 5, 4, 0, 4, 3]))
+            );
+        }
+    }
+
+    #[test]
+    fn coordinates_that_no_corner_has_any_more_go_where_nothing_is_traced() {
+        let (old, mut new) = squares();
+        let places: Vec<[f32; 2]> = (0..6u8).map(|n| [f32::from(n), 0.125 * f32::from(n)]).collect();
+        let uvs = Some(Uvs { places: places.clone(), corners: Some((0..6).collect()), missing: 0 });
+        let first = DetailedMesh { mesh: old, uvs, arrays: Vec::new() };
+        let traced = Traced { first: &first, tree: None, places: &[], spacing: 1.0 };
+        let [mut with, mut without] = [first.clone(), first.clone()];
+        for change in 0..3 {
+            with = carried(&with, new.clone(), &VERTICES, &SOURCES, Some(&traced));
+            without = carried(&without, new.clone(), &VERTICES, &SOURCES, None);
+            let (uvs, all) = (with.uvs.as_ref().unwrap(), without.uvs.as_ref().unwrap());
+            assert!(uvs.places.starts_with(&places));
+            let corners = uvs.corners.as_ref().unwrap();
+            assert!((6..uvs.places.len() as u32).all(|index| corners.contains(&index)), "{corners:?}");
+            assert_eq!(all.places.len() > uvs.places.len(), change > 0);
+            for triangle in 0..3 {
+                let of =
+                    |uvs: &Uvs| uvs.indices(&new.triangles, triangle).map(|index| uvs.places[index as usize]);
+                assert_eq!(of(uvs), of(all));
+            }
+            // The vertex that was made is made again, a little farther on.
+            new.positions[4].x += 0.125;
+        }
+    }
+
+    #[test]
+    fn vertices_that_were_joined_do_not_tear_what_lay_on_their_triangles() {
+        let (square, _) = squares();
+        let positions = [0, 1, 2, 0, 2, 3].map(|n: usize| square.positions[n]).to_vec();
+        let soup = TriMesh { positions, triangles: vec![[0, 1, 2], [3, 4, 5]] };
+        let vertices = [0, 1, 2, 5].map(Some);
+        let sources = [0, 1].map(Source::Whole);
+        for has_seam in [false, true] {
+            let mut places = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+            if has_seam {
+                places[4] = [7.0, 7.0];
+            }
+            let uvs = Some(Uvs { places: places.clone(), corners: None, missing: 0 });
+            let detail = DetailedMesh { mesh: soup.clone(), uvs, arrays: Vec::new() };
+            let uvs = carried(&detail, square.clone(), &vertices, &sources, None).uvs.unwrap();
+            if has_seam {
+                assert_eq!((uvs.places, uvs.corners), (places, Some(vec![0, 1, 2, 3, 4, 5])));
+            } else {
+                let kept = [0, 1, 2, 5].map(|n: usize| places[n]);
+                assert_eq!((&uvs.places[..], uvs.corners), (&kept[..], None));
+            }
+        }
+    }
+
+    #[test]
+    fn arrays_go_through_a_repair() {
+        let mut mesh = TriMesh::cuboid([0.0; 3], [1.0; 3]);
+        mesh.append(&TriMesh::cuboid([0.55, 0.45, 0.35], [1.5, 1.4, 1.3]));
+        let x = |vertex: u32| f64::from(mesh.positions[vertex as usize].x);
+        let of_corners: Vec<f64> = mesh.triangles.as_flattened().iter().map(|vertex| x(*vertex)).collect();
+        let numbers: Vec<f64> = (0..24u8).map(f64::from).collect();
+        let arrays = vec![
+            array("x", On::Vertices, Number::F32, &(0..16).map(x).collect::<Vec<_>>()),
+            array("x", On::Corners, Number::F32, &of_corners),
+            array("number", On::Faces, Number::I32, &numbers),
+        ];
+        let ctx = Context::new(Pool::new(2).unwrap());
+        let cell = 0.06;
+        let repaired = repair(&ctx, &mesh, cell).unwrap();
+        let detail = DetailedMesh { mesh, uvs: None, arrays };
+        let carried = carried(&detail, repaired.mesh, &repaired.vertices, &repaired.sources, None);
+        let (mesh, [of_vertices, of_corners, of_faces]) =
+            (&carried.mesh, [0, 1, 2].map(|n: usize| &carried.arrays[n]));
+        let [vertices, triangles] = [mesh.positions.len(), mesh.triangles.len()];
+        let lengths = [of_vertices, of_corners, of_faces].map(|array| array.values.len());
+        assert_eq!(lengths, [vertices, 3 * triangles, triangles]);
+        // What is rebuilt lies within a cell of the solid, but the nearest of the old mesh may be another face of it.
+        let is_near = |value: f64, vertex: u32, most: f64| {
+            (value - f64::from(mesh.positions[vertex as usize].x)).abs() <= most
+        };
+        for (vertex, own) in (0..).zip(&repaired.vertices) {
+            let most = if own.is_some() { 0.0 } else { 2.0 * cell };
+            assert!(is_near(of_vertices.values[vertex as usize], vertex, most), "{own:?}");
+        }
+        let mut whole = 0;
+        for (triangle, source) in repaired.sources.iter().enumerate() {
+            let most = match source {
+                Source::Whole(from) => {
+                    whole += 1;
+                    assert_eq!(of_faces.values[triangle], f64::from(*from));
+                    0.0
+                }
+                Source::Part(_) => 1e-3,
+                Source::New => 3.0 * cell,
+            };
+            let values = &of_corners.values[3 * triangle..];
+            let are_near =
+                mesh.triangles[triangle].iter().zip(values).all(|(vertex, x)| is_near(*x, *vertex, most));
+            assert!(are_near, "{source:?} {:?}", &values[..3]);
+        }
+        assert!(whole > 4, "{whole}");
+    }
+}

@@ -1,0 +1,261 @@
+//! Texture coordinates of what was made, from those of the first frame.
+//!
+//! A vertex of charted triangles has a coordinate of its own, that of the place of the first mesh nearest to where the liquid there was,
+//! and the triangles around it share it: on one side of a seam. Where that place lies across a seam from a triangle's chart, its corner
+//! takes the nearest one on the chart.
+//!
+//! Beside triangles that were kept, the mesh and the particles may have drifted apart by a little. There a vertex keeps the coordinate
+//! that it has in these, and what it differs by is spread over what was made: the texture goes on, without a seam and without a row
+//! of triangles in which it is stretched. It ends at torn triangles.
+
+use super::traced::{Chart, Charts, longest};
+use super::weights::{Weights, between};
+use crate::geometry::{TriMesh, Uvs};
+
+/// A coordinate, or a difference of two.
+type Pair = [f64; 2];
+
+/// Of two places of the first mesh the coordinates are on one side of a seam where they lie no farther apart than so many times what
+/// they change at most, on the triangles of the two, over the way between them.
+const SEAMLESS: f64 = 4.0;
+/// What rounding to 32 bits may make of coordinates that are the same.
+const ROUNDING: f64 = 1e-6;
+/// A coordinate that a vertex has in kept triangles is about the same as another within so many edges of the made triangle.
+const SAME: f64 = 2.0;
+/// What is left of a difference from one vertex to the next: far from what is kept the texture is its own.
+const FADES: f64 = 0.8;
+/// How often differences are spread.
+const SWEEPS: usize = 48;
+const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
+
+/// Puts the coordinates of the first frame into those that a mesh has from the mesh before; `is_kept` is for each of the charts'
+/// vertices whether it was there before, or another triangle has it too. In coordinates of vertices, charted triangles with a vertex
+/// that keeps a coordinate from far away are torn.
+pub(in crate::mesh_repair) fn textured(
+    charts: &mut Charts<'_>,
+    first: &Uvs,
+    out: &mut Uvs,
+    mesh: &TriMesh,
+    is_kept: &[bool],
+) {
+    if charts.list.is_empty() {
+        // What was made has coordinates of the mesh before, and each change adds some.
+        tidy(out, first.places.len());
+        return;
+    }
+    let texture = Texture::of(charts, first, mesh);
+    let near = Around::of(charts, out, mesh, is_kept);
+    // The coordinates that vertices keep, and by how much they differ.
+    let kept: Vec<Option<u32>> = (0..charts.names.len())
+        .map(|slot| near.nearest(slot, out, texture.own[slot], texture.reach[slot]))
+        .collect();
+    let differences = kept.iter().zip(&texture.own).map(|(kept, own)| {
+        let place = out.places[(*kept)? as usize].map(f64::from);
+        Some([place[0] - own[0], place[1] - own[1]])
+    });
+    let spread = texture.spread(charts, differences.collect());
+    let own = |slot: usize| [0, 1].map(|axis| (texture.own[slot][axis] + spread[slot][axis]) as f32);
+    if out.corners.is_none() {
+        for (slot, name) in charts.names.iter().enumerate().filter(|(slot, _)| !is_kept[*slot]) {
+            out.places[*name as usize] = own(slot);
+        }
+        let is_far = |slot: &usize| is_kept[*slot] && kept[*slot].is_none();
+        charts.list.iter_mut().for_each(|chart| chart.is_torn |= chart.slots.iter().any(is_far));
+        return;
+    }
+    let mut made: Vec<Option<u32>> = vec![None; charts.names.len()];
+    let mut indices = Vec::with_capacity(3 * charts.list.len());
+    for (chart, corners) in charts.list.iter().zip(&texture.corners) {
+        for (slot, corner) in chart.slots.into_iter().zip(&corners.of) {
+            let found = match corner {
+                Corner::Own => kept[slot].or(made[slot]),
+                Corner::Chart(_) if chart.is_torn => None,
+                Corner::Chart(place) => near.nearest(slot, out, *place, corners.reach),
+            };
+            let index = found.unwrap_or_else(|| {
+                let place = match corner {
+                    Corner::Own => own(slot),
+                    Corner::Chart(place) => place.map(|x| x as f32),
+                };
+                out.places.push(place);
+                out.places.len() as u32 - 1
+            });
+            if let Corner::Own = corner {
+                made[slot] = Some(index);
+            }
+            indices.push(index);
+        }
+    }
+    if let Some(corners) = &mut out.corners {
+        for (chart, own) in charts.list.iter().zip(indices.chunks(3)) {
+            corners[3 * chart.number..3 * chart.number + 3].copy_from_slice(own);
+        }
+    }
+    tidy(out, first.places.len());
+}
+
+/// Takes coordinates away that no corner has, but the first ones.
+fn tidy(uvs: &mut Uvs, first: usize) {
+    let Some(corners) = &mut uvs.corners else { return };
+    let mut is_used: Vec<bool> = (0..uvs.places.len()).map(|at| at < first).collect();
+    corners.iter().for_each(|corner| is_used[*corner as usize] = true);
+    let mut next = 0;
+    let number = |is_used: &bool| {
+        next += u32::from(*is_used);
+        next - u32::from(*is_used)
+    };
+    let numbers: Vec<u32> = is_used.iter().map(number).collect();
+    corners.iter_mut().for_each(|corner| *corner = numbers[*corner as usize]);
+    let mut marks = is_used.iter();
+    uvs.places.retain(|_| marks.next().copied().unwrap_or_default());
+}
+
+/// Where a corner of a charted triangle has its coordinate from.
+#[derive(Clone, Copy)]
+enum Corner {
+    /// It is its vertex' own.
+    Own,
+    /// That at a place on the chart.
+    Chart(Pair),
+}
+
+/// Corners of a charted triangle.
+struct Corners {
+    of: [Corner; 3],
+    /// Up to what difference a coordinate is about the same.
+    reach: f64,
+}
+
+/// Coordinates of the first frame, of the charts' vertices and triangles.
+struct Texture {
+    /// Of each vertex.
+    own: Vec<Pair>,
+    /// Up to what difference a coordinate is about the same, for each vertex.
+    reach: Vec<f64>,
+    /// Of each triangle.
+    corners: Vec<Corners>,
+}
+
+impl Texture {
+    fn of(charts: &Charts<'_>, first: &Uvs, mesh: &TriMesh) -> Self {
+        let triangles = &charts.first.mesh.triangles;
+        let at = |triangle: usize, weights: &Weights| -> Pair {
+            let corners = first.indices(triangles, triangle).map(|index| first.places[index as usize]);
+            between(corners, weights).map(f64::from)
+        };
+        let own: Vec<Pair> = charts.spots.iter().map(|spot| at(spot.triangle, &spot.weights)).collect();
+        // How much coordinates change at most over a metre of a triangle of the first mesh.
+        let rate = |triangle: usize| {
+            let places = charts.first.mesh.corners(triangle);
+            let corners = first.indices(triangles, triangle).map(|index| first.places[index as usize]);
+            let corners = corners.map(|place| place.map(f64::from));
+            let of_edge = |[a, b]: [usize; 2]| {
+                let length = (places[b] - places[a]).norm();
+                if length > 0.0 { apart(corners[a], corners[b]) / length } else { 0.0 }
+            };
+            EDGES.into_iter().map(of_edge).fold(0.0, f64::max)
+        };
+        let rates: Vec<f64> = charts.spots.iter().map(|spot| rate(spot.triangle)).collect();
+        let corners_of = |chart: &Chart| {
+            let of_chart = rate(chart.triangle);
+            let corner = |n: usize| {
+                let (slot, weights) = (chart.slots[n], &chart.corners[n]);
+                let there = at(chart.triangle, weights);
+                let way = (charts.place(&charts.spots[slot]) - charts.at(chart.triangle, weights)).norm();
+                let most = SEAMLESS * of_chart.max(rates[slot]) * way + ROUNDING;
+                let is_own = !chart.is_torn && apart(own[slot], there) <= most;
+                if is_own { (Corner::Own, own[slot]) } else { (Corner::Chart(there), there) }
+            };
+            let found = [0, 1, 2].map(corner);
+            let of_edge = |[a, b]: [usize; 2]| apart(found[a].1, found[b].1);
+            let long = EDGES.into_iter().map(of_edge).fold(0.0, f64::max);
+            let reach = SAME * long.max(of_chart * longest(&mesh.corners(chart.number)));
+            Corners { of: found.map(|(corner, _)| corner), reach }
+        };
+        let corners: Vec<Corners> = charts.list.iter().map(corners_of).collect();
+        let mut reach = vec![0.0f64; charts.names.len()];
+        for (chart, corners) in charts.list.iter().zip(&corners).filter(|(chart, _)| !chart.is_torn) {
+            for slot in chart.slots {
+                reach[slot] = reach[slot].max(corners.reach);
+            }
+        }
+        Self { own, reach, corners }
+    }
+
+    /// Differences of all vertices, from those that have one: each has most of the mean of its neighbours', through triangles that are not torn
+    /// and have no seam between the two.
+    fn spread(&self, charts: &Charts<'_>, fixed: Vec<Option<Pair>>) -> Vec<Pair> {
+        let mut links: Vec<(usize, usize)> = Vec::new();
+        for (chart, corners) in charts.list.iter().zip(&self.corners).filter(|(chart, _)| !chart.is_torn) {
+            for [a, b] in EDGES {
+                if let (Corner::Own, Corner::Own) = (corners.of[a], corners.of[b]) {
+                    let [a, b] = [a, b].map(|n| chart.slots[n]);
+                    links.extend([(a, b), (b, a)]);
+                }
+            }
+        }
+        links.sort_unstable();
+        links.dedup();
+        let mut now = fixed.clone();
+        for _ in 0..SWEEPS {
+            for around in links.chunk_by(|a, b| a.0 == b.0) {
+                let slot = around[0].0;
+                if fixed[slot].is_some() {
+                    continue;
+                }
+                let known = around.iter().filter_map(|(_, other)| now[*other]);
+                let (sum, count) = known.fold(([0.0; 2], 0.0), |(sum, count), difference| {
+                    ([sum[0] + difference[0], sum[1] + difference[1]], count + 1.0)
+                });
+                if count > 0.0 {
+                    now[slot] = Some(sum.map(|x| FADES * x / count));
+                }
+            }
+        }
+        now.into_iter().map(Option::unwrap_or_default).collect()
+    }
+}
+
+/// The coordinates that the charts' vertices have in other triangles: slots, each with the indices of its coordinates, ascending.
+struct Around(Vec<(usize, u32)>);
+
+impl Around {
+    fn of(charts: &Charts<'_>, out: &Uvs, mesh: &TriMesh, is_kept: &[bool]) -> Self {
+        let mut slots = vec![None; mesh.positions.len()];
+        charts.names.iter().enumerate().for_each(|(slot, name)| slots[*name as usize] = Some(slot));
+        let mut list = Vec::new();
+        if out.corners.is_none() {
+            let kept = charts.names.iter().enumerate().filter(|(slot, _)| is_kept[*slot]);
+            list.extend(kept.map(|(slot, name)| (slot, *name)));
+            return Self(list);
+        }
+        for number in charts.others(&mesh.triangles) {
+            let indices = out.indices(&mesh.triangles, number);
+            for (name, index) in mesh.triangles[number].iter().zip(indices) {
+                list.extend(slots[*name as usize].map(|slot| (slot, index)));
+            }
+        }
+        list.sort_unstable();
+        list.dedup();
+        Self(list)
+    }
+
+    /// The index of the coordinate of a slot that is nearest to a place, of several the first; none farther away than `reach`.
+    fn nearest(&self, slot: usize, uvs: &Uvs, place: Pair, reach: f64) -> Option<u32> {
+        let begin = self.0.partition_point(|(other, _)| *other < slot);
+        let own = self.0[begin..].iter().take_while(|(other, _)| *other == slot);
+        let far = |index: u32| apart(uvs.places[index as usize].map(f64::from), place);
+        let all = own.map(|(_, index)| (far(*index), *index));
+        let nearest = all.fold(None, |best: Option<(f64, u32)>, next| match best {
+            Some(best) if best.0 <= next.0 => Some(best),
+            _ => Some(next),
+        });
+        nearest.filter(|(far, _)| *far <= reach).map(|(_, index)| index)
+    }
+}
+
+/// How far two coordinates are apart.
+fn apart(a: Pair, b: Pair) -> f64 {
+    let [u, v] = [b[0] - a[0], b[1] - a[1]];
+    (u * u + v * v).sqrt()
+}

@@ -1,0 +1,475 @@
+//! What was made takes what the liquid there had at the first frame, where it is known where that was: so textures go through merges
+//! and splits.
+//!
+//! A made triangle, a *charted* one, has a chart on the first mesh: the triangle there that is nearest to where its middle was.
+//! Liquids that were apart meet in triangles whose corners come from far apart: these are *torn*. They have a place of one of the two,
+//! and are marked.
+
+use rayon::prelude::*;
+
+use super::GRAIN;
+use super::texture::textured;
+use super::weights::{Weights, blended, weights};
+use crate::geometry::check::deviation::NearestTree;
+use crate::geometry::mesh::attributes::{DetailedMesh, MeshArray, Number, On};
+use crate::geometry::{DVec3, TriMesh};
+use crate::mesh_repair::Source;
+
+/// A triangle is torn where its corners were farther apart at the first frame than so many times its longest edge and a spacing: liquid
+/// that was drawn together by less shows a texture that is drawn together.
+const TORN: f64 = 3.0;
+
+/// Where what was made comes from: what [`carry_attributes`](crate::mesh_repair::carry_attributes) needs for it to take the numbers of the
+/// first frame.
+///
+/// A made triangle takes them where the places of its three corners are known: its corners those at the places of the first mesh
+/// nearest to these, all on one side of a seam, the triangle those of the one that is nearest to its middle. Made vertices of such
+/// triangles alone take those at the nearest place. A vertex that other triangles have too keeps the texture coordinates of these where
+/// they are about the same, and what was made blends into them; where they are not, there is a seam, or, in coordinates of vertices,
+/// the triangle is marked.
+#[derive(Clone, Copy)]
+pub struct Traced<'a> {
+    /// The mesh at the first frame, with what it carried then.
+    pub first: &'a DetailedMesh,
+    /// Its triangles, for who goes through many changes; none: they are sorted anew.
+    pub tree: Option<&'a NearestTree>,
+    /// For each vertex of the new mesh, where the liquid there was at the first frame (m); none where that is not known, and for
+    /// vertices that no made triangle has. Empty: of none.
+    pub places: &'a [Option<DVec3>],
+    /// Initial distance between particles (m).
+    pub spacing: f64,
+}
+
+impl Traced<'_> {
+    /// Name of the array of faces that says what they are: 0 a triangle of the first mesh, as it was; 1 a part of one, or a made one;
+    /// 2 a made one, or a part of it, whose corners come from far apart. It goes on from change to change; where there is none yet, all
+    /// triangles are those of the first mesh.
+    pub const MASK: &'static str = "rebuilt";
+
+    /// Puts the numbers of the first frame into what has those of the mesh before.
+    pub(in crate::mesh_repair) fn put(
+        &self,
+        out: &mut DetailedMesh,
+        vertices: &[Option<u32>],
+        sources: &[Source],
+    ) {
+        let mut charts = Charts::of(self, &out.mesh, sources);
+        let is_kept = charts.kept(vertices, &out.mesh.triangles);
+        for (n, array) in out.arrays.iter_mut().enumerate() {
+            charts.fill(n, array, &is_kept);
+        }
+        if let (Some(first), Some(uvs)) = (&self.first.uvs, &mut out.uvs) {
+            textured(&mut charts, first, uvs, &out.mesh, &is_kept);
+        }
+        mark(out, sources, &charts.list);
+    }
+}
+
+/// Whether an array is the one that says of each face what it is.
+pub(in crate::mesh_repair) fn is_mask(array: &MeshArray) -> bool {
+    array.name == Traced::MASK && array.on == On::Faces
+}
+
+/// Says of each face what it is.
+fn mark(out: &mut DetailedMesh, sources: &[Source], charts: &[Chart]) {
+    let at = out.arrays.iter().position(is_mask).unwrap_or(out.arrays.len());
+    if at == out.arrays.len() {
+        let values = vec![0.0; sources.len()];
+        let name = Traced::MASK.into();
+        out.arrays.push(MeshArray { name, on: On::Faces, number: Number::U8, values });
+    }
+    let values = &mut out.arrays[at].values;
+    for (value, source) in values.iter_mut().zip(sources) {
+        match source {
+            Source::Whole(_) => {}
+            // Of a torn one it is torn.
+            Source::Part(_) => *value = value.max(1.0),
+            Source::New => *value = 1.0,
+        }
+    }
+    charts.iter().filter(|chart| chart.is_torn).for_each(|chart| values[chart.number] = 2.0);
+}
+
+/// A made triangle that takes the numbers of the first frame.
+pub(in crate::mesh_repair) struct Chart {
+    /// Its number in the new mesh.
+    pub number: usize,
+    /// Which of the charts' vertices its corners are.
+    pub slots: [usize; 3],
+    /// A triangle of the first mesh, and its places that are nearest to where the corners were.
+    pub triangle: usize,
+    pub corners: [Weights; 3],
+    /// Whether its corners come from far apart.
+    pub is_torn: bool,
+}
+
+/// A place on the first mesh.
+pub(in crate::mesh_repair) struct Spot {
+    pub triangle: usize,
+    pub weights: Weights,
+}
+
+/// All made triangles that take the numbers of the first frame.
+pub(in crate::mesh_repair) struct Charts<'a> {
+    pub first: &'a DetailedMesh,
+    /// Ascending.
+    pub list: Vec<Chart>,
+    /// The vertices of the new mesh that they have, ascending.
+    pub names: Vec<u32>,
+    /// For each of these the place of the first mesh nearest to where the liquid there was.
+    pub spots: Vec<Spot>,
+}
+
+impl<'a> Charts<'a> {
+    fn of(traced: &Traced<'a>, mesh: &TriMesh, sources: &[Source]) -> Self {
+        let first = traced.first;
+        let place = |vertex: u32| traced.places.get(vertex as usize).copied().flatten();
+        let known = |(number, source): (usize, &Source)| {
+            let [a, b, c] = mesh.triangles[number].map(place);
+            if *source == Source::New { Some((number, [a?, b?, c?])) } else { None }
+        };
+        let known: Vec<(usize, [DVec3; 3])> = match first.mesh.triangles.is_empty() {
+            true => Vec::new(),
+            false => sources.iter().enumerate().filter_map(known).collect(),
+        };
+        let mut out = Self { first, list: Vec::new(), names: Vec::new(), spots: Vec::new() };
+        if known.is_empty() {
+            return out;
+        }
+        let made;
+        let tree = match traced.tree {
+            Some(tree) => tree,
+            None => {
+                made = NearestTree::new(&first.mesh);
+                &made
+            }
+        };
+        let spot = |place: DVec3| {
+            let triangle = tree.nearest(place).map_or(0, |nearest| nearest.triangle);
+            Spot { triangle, weights: weights(&first.mesh.corners(triangle), place) }
+        };
+        out.names = known.iter().flat_map(|(number, _)| mesh.triangles[*number]).collect();
+        out.names.sort_unstable();
+        out.names.dedup();
+        let of_name = |name: &u32| spot(place(*name).unwrap_or_default());
+        out.spots = out.names.par_iter().with_min_len(GRAIN).map(of_name).collect();
+        let chart = |(number, places): &(usize, [DVec3; 3])| {
+            let slots = mesh.triangles[*number].map(|name| out.slot(name));
+            let most = TORN * longest(&mesh.corners(*number)) + traced.spacing;
+            let there = slots.map(|slot| out.place(&out.spots[slot]));
+            let is_torn = longest(places) > most || longest(&there) > most;
+            let middle = (places[0] + places[1] + places[2]) / 3.0;
+            let triangle = spot(if is_torn { nearest_to(middle, places) } else { middle }).triangle;
+            let corners = first.mesh.corners(triangle);
+            let corners = places.map(|place| weights(&corners, place));
+            Chart { number: *number, slots, triangle, corners, is_torn }
+        };
+        out.list = known.par_iter().with_min_len(GRAIN).map(chart).collect();
+        out
+    }
+
+    /// Which of the charts' vertices one is that they have.
+    fn slot(&self, name: u32) -> usize {
+        self.names.partition_point(|other| *other < name)
+    }
+
+    /// Where on the first mesh a spot is (m).
+    pub fn place(&self, spot: &Spot) -> DVec3 {
+        self.at(spot.triangle, &spot.weights)
+    }
+
+    /// A place on a triangle of the first mesh (m).
+    pub fn at(&self, triangle: usize, weights: &Weights) -> DVec3 {
+        let [a, b, c] = self.first.mesh.corners(triangle);
+        a * weights[0] + b * weights[1] + c * weights[2]
+    }
+
+    /// For each of the charts' vertices whether it was there before, or another triangle has it too.
+    fn kept(&self, vertices: &[Option<u32>], triangles: &[[u32; 3]]) -> Vec<bool> {
+        let mut is_kept: Vec<bool> = vertices.iter().map(Option::is_some).collect();
+        for names in self.others(triangles).map(|number| &triangles[number]) {
+            names.iter().for_each(|name| is_kept[*name as usize] = true);
+        }
+        self.names.iter().map(|name| is_kept[*name as usize]).collect()
+    }
+
+    /// The triangles that have no chart, ascending.
+    pub fn others(&self, triangles: &[[u32; 3]]) -> impl Iterator<Item = usize> {
+        let mut charted = self.list.iter().map(|chart| chart.number).peekable();
+        (0..triangles.len()).filter(move |number| charted.next_if_eq(number).is_none())
+    }
+
+    /// Puts the first mesh's numbers into an array, the one with this number, if the first mesh has it too.
+    fn fill(&self, n: usize, array: &mut MeshArray, is_kept: &[bool]) {
+        let is_same =
+            |own: &&MeshArray| own.name == array.name && own.on == array.on && own.number == array.number;
+        let arrays = &self.first.arrays;
+        let own = arrays.get(n).filter(is_same).or_else(|| arrays.iter().find(is_same));
+        let Some(own) = own else { return };
+        let values = &mut array.values;
+        match own.on {
+            On::Vertices => {
+                let made = self.names.iter().zip(&self.spots).zip(is_kept).filter(|(_, is_kept)| !**is_kept);
+                for ((name, spot), _) in made {
+                    let corners = self.first.mesh.triangles[spot.triangle];
+                    let numbers = corners.map(|vertex| own.values[vertex as usize]);
+                    values[*name as usize] = blended(own, numbers, &spot.weights);
+                }
+            }
+            On::Corners => {
+                for chart in &self.list {
+                    let numbers = [0, 1, 2].map(|corner| own.values[3 * chart.triangle + corner]);
+                    for (corner, weights) in chart.corners.iter().enumerate() {
+                        values[3 * chart.number + corner] = blended(own, numbers, weights);
+                    }
+                }
+            }
+            On::Faces => {
+                self.list.iter().for_each(|chart| values[chart.number] = own.values[chart.triangle]);
+            }
+        }
+    }
+}
+
+/// The longest edge of a triangle.
+pub(in crate::mesh_repair) fn longest([a, b, c]: &[DVec3; 3]) -> f64 {
+    (b - a).norm().max((c - b).norm()).max((a - c).norm())
+}
+
+/// That of some places which is nearest to one, of several the first.
+fn nearest_to(middle: DVec3, [a, b, c]: &[DVec3; 3]) -> DVec3 {
+    let far = |place: &DVec3| (place - middle).norm_squared();
+    let nearer = if far(b) < far(a) { b } else { a };
+    if far(c) < far(nearer) { *c } else { *nearer }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Uvs, Vec3};
+    use crate::mesh_repair::carry_attributes as carried;
+
+    /// Cells along an edge of the sheet, and the vertices of it that were made again.
+    const SIDE: usize = 16;
+    const MADE: std::ops::RangeInclusive<usize> = 3..=5;
+    /// Texture coordinates to a metre.
+    const SCALE: f32 = 0.125;
+    /// By how much the liquid moved along x, and how far apart coordinates across a seam are.
+    const WAY: f32 = 32.0;
+    const SEAM: f32 = 5.0;
+
+    /// A sheet of cells of a metre in two triangles each.
+    fn sheet(along: f32) -> TriMesh {
+        let on = || 0..=SIDE;
+        let place = |x: usize, y: usize| Vec3::new(x as f32 + along, y as f32, 0.0);
+        let positions = on().flat_map(|x| on().map(move |y| place(x, y))).collect();
+        let name = |x: usize, y: usize| (x * (SIDE + 1) + y) as u32;
+        let cell = |n: usize| {
+            let (x, y) = (n / SIDE, n % SIDE);
+            let [a, b, c, d] = [name(x, y), name(x + 1, y), name(x + 1, y + 1), name(x, y + 1)];
+            [[a, b, c], [a, c, d]]
+        };
+        TriMesh { positions, triangles: (0..SIDE * SIDE).flat_map(cell).collect() }
+    }
+
+    /// How the sheet's texture coordinates are kept.
+    #[derive(Clone, Copy, PartialEq)]
+    enum Kind {
+        OfVertices,
+        OfCorners,
+        /// From x = 4 on they lie elsewhere.
+        WithSeam,
+    }
+
+    /// The sheet at the first frame, with what it carries.
+    fn first(kind: Kind) -> DetailedMesh {
+        let mesh = sheet(0.0);
+        let places: Vec<[f32; 2]> = mesh.positions.iter().map(|p| [SCALE * p.x, SCALE * p.y]).collect();
+        let count = places.len() as u32;
+        let beyond: Vec<[f32; 2]> = places.iter().map(|[u, v]| [u + SEAM, *v]).collect();
+        let corner = |names: &[u32; 3]| {
+            let is_beyond = names.iter().all(|name| mesh.positions[*name as usize].x >= 4.0);
+            names.map(|name| if is_beyond { name + count } else { name })
+        };
+        let uvs = match kind {
+            Kind::OfVertices => Uvs { places, corners: None, missing: 0 },
+            Kind::OfCorners => {
+                Uvs { places, corners: Some(mesh.triangles.as_flattened().to_vec()), missing: 0 }
+            }
+            Kind::WithSeam => {
+                let corners = mesh.triangles.iter().flat_map(corner).collect();
+                Uvs { places: [places, beyond].concat(), corners: Some(corners), missing: 0 }
+            }
+        };
+        let x = mesh.positions.iter().map(|place| f64::from(place.x)).collect();
+        let numbers = (0..mesh.triangles.len()).map(|triangle| triangle as f64).collect();
+        let array = |name: &str, on, values| MeshArray { name: name.into(), on, number: Number::F32, values };
+        let arrays = vec![array("x", On::Vertices, x), array("number", On::Faces, numbers)];
+        DetailedMesh { mesh, uvs: Some(uvs), arrays }
+    }
+
+    fn is_made(vertex: usize) -> bool {
+        MADE.contains(&(vertex / (SIDE + 1))) && MADE.contains(&(vertex % (SIDE + 1)))
+    }
+
+    /// The sheet after the liquid moved, and after some of it was made again. By the particles the liquid was `astray` (m) farther along
+    /// x at the first frame than by the mesh before, and within `lost` (m) of x = 4 also 8 m aside.
+    fn after(kind: Kind, astray: f64, lost: f32) -> (DetailedMesh, Vec<Source>) {
+        let first = first(kind);
+        let old = DetailedMesh { mesh: sheet(WAY), ..first.clone() };
+        let mut new = sheet(WAY);
+        let mut origins: Vec<Option<u32>> = (0..new.positions.len() as u32).map(Some).collect();
+        for vertex in (0..origins.len()).filter(|vertex| is_made(*vertex)) {
+            origins[vertex] = None;
+            new.positions[vertex] += Vec3::new(0.25, -0.125, 0.0);
+        }
+        let source = |(triangle, names): (u32, &[u32; 3])| match names.iter().any(|n| is_made(*n as usize)) {
+            true => Source::New,
+            false => Source::Whole(triangle),
+        };
+        let sources: Vec<Source> = (0..).zip(&new.triangles).map(source).collect();
+        let place = |place: &Vec3| {
+            let aside = if (place.x - WAY - 4.0).abs() < lost { 8.0 } else { 0.0 };
+            Some(place.cast::<f64>() - DVec3::new(f64::from(WAY) - astray, -aside, 0.0))
+        };
+        let places: Vec<Option<DVec3>> = new.positions.iter().map(place).collect();
+        let traced = Traced { first: &first, tree: None, places: &places, spacing: 1.0 };
+        let out = carried(&old, new, &origins, &sources, Some(&traced));
+        (out, sources)
+    }
+
+    /// Coordinates of a triangle's corners, and the places of these (m).
+    fn corners(detail: &DetailedMesh, triangle: usize) -> [([f32; 2], Vec3); 3] {
+        let uvs = detail.uvs.as_ref().unwrap();
+        let indices = uvs.indices(&detail.mesh.triangles, triangle);
+        let names = detail.mesh.triangles[triangle];
+        [0, 1, 2].map(|n| (uvs.places[indices[n] as usize], detail.mesh.positions[names[n] as usize]))
+    }
+
+    fn mask(detail: &DetailedMesh) -> &[f64] {
+        &detail.arrays.iter().find(|array| array.name == Traced::MASK).unwrap().values
+    }
+
+    #[test]
+    fn a_texture_goes_on_without_a_seam_where_the_mesh_before_drifted() {
+        // The vertex in the middle of what was made.
+        let middle = 4 * (SIDE + 1) + 4;
+        for kind in [Kind::OfVertices, Kind::OfCorners] {
+            for astray in [0.0, 0.3] {
+                let (out, sources) = after(kind, astray, 0.0);
+                let mut corners_there = 0;
+                for (triangle, source) in sources.iter().enumerate() {
+                    assert_eq!(mask(&out)[triangle], f64::from(u8::from(*source == Source::New)));
+                    let names = out.mesh.triangles[triangle];
+                    for (name, ([u, v], place)) in names.into_iter().zip(corners(&out, triangle)) {
+                        let off = (u - SCALE * (place.x - WAY)).abs().max((v - SCALE * place.y).abs());
+                        // Away from what is kept the particles' own texture counts more and more.
+                        let most = if *source == Source::New { SCALE * astray as f32 } else { 0.0 };
+                        assert!(off < most + 1e-5, "{triangle}, {source:?}: {u} {v} at {place}");
+                        if name as usize == middle {
+                            // Two edges from the rim 0.475 of the difference there is left.
+                            let wanted = 0.525 * most;
+                            assert!((off - wanted).abs() < 0.05 * most + 1e-5, "{off}, not {wanted}");
+                            corners_there += 1;
+                        }
+                    }
+                }
+                assert_eq!(corners_there, 6);
+                let [x, number] = [0, 1].map(|n: usize| &out.arrays[n].values);
+                for (vertex, place) in out.mesh.positions.iter().enumerate() {
+                    let wanted = f64::from(place.x - WAY) + if is_made(vertex) { astray } else { 0.0 };
+                    assert!((x[vertex] - wanted).abs() < 1e-4, "{vertex}: {} {wanted}", x[vertex]);
+                }
+                assert!((0..sources.len()).all(|n| astray > 0.0 || (number[n] - n as f64).abs() < 40.0));
+                let made = out.uvs.as_ref().unwrap().places.len() - (SIDE + 1) * (SIDE + 1);
+                assert_eq!(made, if kind == Kind::OfVertices { 0 } else { 9 });
+            }
+        }
+    }
+
+    #[test]
+    fn no_triangle_lies_across_a_seam() {
+        for astray in [0.0, 0.3] {
+            let (out, sources) = after(Kind::WithSeam, astray, 0.0);
+            let made = (0..sources.len()).filter(|triangle| sources[*triangle] == Source::New);
+            for triangle in made {
+                assert_eq!(mask(&out)[triangle], 1.0);
+                let [a, b, c] = corners(&out, triangle).map(|([u, _], _)| u);
+                let span = a.max(b).max(c) - a.min(b).min(c);
+                assert!(span < 3.0 * SCALE, "{triangle}: {a} {b} {c}");
+            }
+        }
+    }
+
+    #[test]
+    fn where_other_liquid_came_there_is_a_seam_or_a_mark() {
+        let astray = 6.0;
+        for kind in [Kind::OfVertices, Kind::OfCorners] {
+            let (out, sources) = after(kind, astray, 0.0);
+            for (triangle, source) in sources.iter().enumerate() {
+                let is_new = *source == Source::New;
+                let has_kept = out.mesh.triangles[triangle].iter().any(|name| !is_made(*name as usize));
+                let is_marked = kind == Kind::OfVertices && is_new && has_kept;
+                let wanted = f64::from(u8::from(is_new)) + f64::from(u8::from(is_marked));
+                assert_eq!(mask(&out)[triangle], wanted, "{triangle}");
+                if is_marked {
+                    continue;
+                }
+                let by = if is_new { astray as f32 } else { 0.0 };
+                for ([u, _], place) in corners(&out, triangle) {
+                    assert!((u - SCALE * (place.x - WAY + by)).abs() < 1e-5, "{triangle}: {u} at {place}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn triangles_of_liquids_that_were_apart_are_marked_and_not_smeared() {
+        let (out, sources) = after(Kind::OfCorners, 0.0, 0.6);
+        let is_lost = |place: &Vec3| (place.x - WAY - 4.0).abs() < 0.6;
+        let mut torn = 0;
+        for (triangle, source) in sources.iter().enumerate().filter(|(_, source)| **source == Source::New) {
+            let corners = corners(&out, triangle);
+            let lost = corners.iter().filter(|(_, place)| is_lost(place)).count();
+            let is_torn = lost % 3 != 0;
+            torn += usize::from(is_torn);
+            assert_eq!(mask(&out)[triangle], if is_torn { 2.0 } else { 1.0 }, "{triangle}, {source:?}");
+            if is_torn {
+                let (low, high) =
+                    corners.iter().fold(([f32::MAX; 2], [f32::MIN; 2]), |(low, high), (uv, _)| {
+                        ([0, 1].map(|n| low[n].min(uv[n])), [0, 1].map(|n| high[n].max(uv[n])))
+                    });
+                assert!((0..2).all(|n| high[n] - low[n] < 1.01 * SCALE), "{triangle}: {corners:?}");
+            }
+        }
+        assert!(torn > 4, "{torn}");
+    }
+
+    #[test]
+    fn the_mask_goes_on_from_change_to_change() {
+        let (old, _) = after(Kind::OfCorners, 0.0, 0.6);
+        let first = first(Kind::OfCorners);
+        let torn = mask(&old).iter().position(|value| *value == 2.0).unwrap();
+        let mut sources: Vec<Source> = (0..old.mesh.triangles.len() as u32).map(Source::Whole).collect();
+        (sources[0], sources[1], sources[torn]) = (Source::Part(0), Source::New, Source::Part(torn as u32));
+        let origins: Vec<Option<u32>> = (0..old.mesh.positions.len() as u32).map(Some).collect();
+        // Nothing is known of where the liquid was.
+        let traced = Traced { first: &first, tree: None, places: &[], spacing: 1.0 };
+        let out = carried(&old, old.mesh.clone(), &origins, &sources, Some(&traced));
+        let mut wanted = mask(&old).to_vec();
+        (wanted[0], wanted[1]) = (1.0, 1.0);
+        assert_eq!((wanted[torn], mask(&out) == wanted), (2.0, true));
+        assert_eq!(out.arrays.len(), old.arrays.len());
+        // The same where the mesh carries nothing else, and goes with its triangles.
+        let arrays = old.arrays.iter().filter(|array| is_mask(array)).cloned().collect();
+        let alone = DetailedMesh { mesh: old.mesh.clone(), uvs: None, arrays };
+        (sources[2], wanted[2]) = (Source::Whole(torn as u32), 2.0);
+        let out = carried(&alone, old.mesh.clone(), &origins, &sources, Some(&traced));
+        assert!(mask(&out) == wanted && out.arrays.len() == 1);
+        sources[2] = Source::Whole(2);
+        let bare = DetailedMesh { mesh: old.mesh.clone(), ..DetailedMesh::default() };
+        let out = carried(&bare, old.mesh.clone(), &origins, &sources, Some(&traced));
+        assert_eq!(mask(&out).iter().sum::<f64>(), 3.0);
+        assert!(carried(&bare, old.mesh.clone(), &origins, &sources, None).arrays.is_empty());
+    }
+}

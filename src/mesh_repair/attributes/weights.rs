@@ -1,0 +1,125 @@
+//! Numbers at a place on a triangle, from those of its corners.
+
+use crate::geometry::DVec3;
+use crate::geometry::mesh::attributes::{MeshArray, Number};
+
+/// Arrays whose 8-bit integers are shares of a colour: they are interpolated, as floats are.
+const COLOURS: [&str; 4] = ["red", "green", "blue", "alpha"];
+/// A triangle whose first corner has a lesser sine has no face to speak of: its places are those of its edges.
+const NEEDLE: f64 = 1e-8;
+
+/// How much the corners of a triangle count at a place on it: 0 or more, 1 in all.
+pub type Weights = [f64; 3];
+
+/// The weights of a corner.
+pub(in crate::mesh_repair) fn alone(corner: usize) -> Weights {
+    let mut weights = [0.0; 3];
+    weights[corner] = 1.0;
+    weights
+}
+
+/// The corner that counts most, of several the first.
+pub(in crate::mesh_repair) fn heaviest(&[a, b, c]: &Weights) -> usize {
+    if a >= b && a >= c {
+        0
+    } else if b >= c {
+        1
+    } else {
+        2
+    }
+}
+
+/// The place of a triangle that is nearest to another place (m); where that is a corner's, exactly this corner.
+pub fn weights(corners: &[DVec3; 3], place: DVec3) -> Weights {
+    if let Some(corner) = corners.iter().position(|corner| *corner == place) {
+        return alone(corner);
+    }
+    let [a, b, c] = corners;
+    let (ab, ac, way) = (b - a, c - a, place - a);
+    let normal = ab.cross(&ac);
+    let square = normal.norm_squared();
+    if square > NEEDLE * NEEDLE * ab.norm_squared() * ac.norm_squared() {
+        // Shares of the area; rounding leaves them a sum of 1.
+        let (of_b, of_c) = (way.cross(&ac).dot(&normal) / square, ab.cross(&way).dot(&normal) / square);
+        let weights = [1.0 - of_b - of_c, of_b, of_c];
+        if weights.iter().all(|weight| *weight >= 0.0) {
+            return weights;
+        }
+    }
+    let mut best = (f64::INFINITY, alone(0));
+    for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+        let along = corners[to] - corners[from];
+        let square = along.norm_squared();
+        let way = (place - corners[from]).dot(&along);
+        let share = if square > 0.0 { (way / square).clamp(0.0, 1.0) } else { 0.0 };
+        let far = (corners[from] + along * share - place).norm_squared();
+        if far < best.0 {
+            let mut weights = [0.0; 3];
+            weights[from] = 1.0 - share;
+            weights[to] = share;
+            best = (far, weights);
+        }
+    }
+    best.1
+}
+
+/// An array's number at a place, from those of the corners.
+pub(in crate::mesh_repair) fn blended(array: &MeshArray, numbers: [f64; 3], weights: &Weights) -> f64 {
+    let most = heaviest(weights);
+    if weights[most] == 1.0 {
+        return numbers[most];
+    }
+    match array.number {
+        Number::F64 => mean(numbers, weights),
+        Number::F32 => f64::from(mean(numbers, weights) as f32),
+        Number::I8 | Number::U8 if COLOURS.contains(&&*array.name) => mean(numbers, weights).round(),
+        _ => numbers[most],
+    }
+}
+
+/// Texture coordinates at a place, from those of the corners.
+pub(in crate::mesh_repair) fn between(places: [[f32; 2]; 3], weights: &Weights) -> [f32; 2] {
+    [0, 1].map(|axis| mean(places.map(|place| f64::from(place[axis])), weights) as f32)
+}
+
+/// The mean of three numbers: any of them where all are the same, and without those that do not count at all.
+fn mean(numbers: [f64; 3], weights: &Weights) -> f64 {
+    let most = heaviest(weights);
+    let others = (0..3).filter(|corner| *corner != most && weights[*corner] > 0.0);
+    others.fold(numbers[most], |sum, corner| sum + weights[corner] * (numbers[corner] - numbers[most]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_place_of_any_triangle_has_weights() {
+        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        let triangles = [
+            [at(0.0, 0.0, 0.0), at(2.0, 0.1, 0.0), at(0.3, 1.5, 0.7)],
+            [at(0.1, 0.2, 0.3); 3],
+            [at(0.0, 0.0, 0.0), at(0.3, 0.3, 0.3), at(1.0, 1.0, 1.0)],
+            [at(0.0, 0.0, 0.0), at(0.0, 0.0, 0.0), at(1.0, -1.0, 0.5)],
+            [at(0.0, 0.0, 0.0), at(1.0, 1e-12, 0.0), at(1e-40, 0.0, 0.0)],
+        ];
+        let steps = |n: i32| f64::from(n) * 0.4 - 1.0;
+        for corners in &triangles {
+            let there = |weights: &Weights| -> DVec3 {
+                corners.iter().zip(weights).map(|(corner, weight)| corner * *weight).sum()
+            };
+            for place in (0..216).map(|n| at(steps(n % 6), steps(n / 6 % 6), steps(n / 36))) {
+                let found = weights(corners, place);
+                assert!(found.iter().all(|weight| (0.0..=1.0).contains(weight)), "{found:?}");
+                assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{found:?}");
+                let far = (there(&found) - place).norm();
+                for n in 0..121 {
+                    let [b, c] = [n % 11, n / 11].map(|n| f64::from(n) / 10.0);
+                    let other = (there(&[1.0 - b - c, b, c]) - place).norm();
+                    assert!(b + c > 1.0 || far <= other + 1e-9, "{corners:?} {place}: {far} {other}");
+                }
+            }
+            (0..3).for_each(|n| assert_eq!(there(&weights(corners, corners[n])), corners[n]));
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! The mesh that comes out of cut and fill, by index.
+
+use std::collections::HashMap;
+
+use super::exact::{GridEdge, Point};
+use super::{Cut, Shape, Trouble};
+use crate::geometry::DVec3;
+use crate::mesh_repair::Source;
+use crate::mesh_repair::fill::Fill;
+
+/// A mesh that is being rebuilt; places in cells.
+pub struct Draft {
+    /// Places of the vertices (cells): those of the mesh first, then those that were made.
+    pub places: Vec<DVec3>,
+    /// Which vertices were made here; the others are the mesh's own, and stay.
+    pub is_made: Vec<bool>,
+    /// Counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Of each triangle.
+    pub sources: Vec<Source>,
+}
+
+/// Joins the parts of a mesh, whose own vertices have these places (cells).
+///
+/// # Errors
+/// [`Trouble`] without cells, where a point has no place.
+pub fn sewn(shape: &Shape, own: &[DVec3], cut: &Cut, fill: &Fill) -> Result<Draft, Trouble> {
+    let mut draft = Draft {
+        places: own.to_vec(),
+        is_made: vec![false; own.len()],
+        triangles: cut.whole.iter().map(|triangle| shape.triangles[*triangle as usize]).collect(),
+        sources: cut.whole.iter().map(|triangle| Source::Whole(*triangle)).collect(),
+    };
+    let mut numbers: HashMap<Point, u32> = HashMap::new();
+    let mut number = |draft: &mut Draft, point: Point| -> Result<u32, Trouble> {
+        if let Point::Vertex(vertex) = point {
+            return Ok(vertex);
+        }
+        if let Some(number) = numbers.get(&point) {
+            return Ok(*number);
+        }
+        let place = place(shape, fill, point).ok_or_else(|| Trouble(Vec::new()))?;
+        let number = draft.places.len() as u32;
+        draft.places.push(place);
+        draft.is_made.push(true);
+        numbers.insert(point, number);
+        Ok(number)
+    };
+    let parts = cut.parts.iter().map(|(triangle, points)| (Source::Part(*triangle), points));
+    let rebuilt = fill.triangles.iter().map(|points| (Source::New, points));
+    for (source, points) in parts.chain(rebuilt) {
+        let mut names = [0; 3];
+        for (name, point) in names.iter_mut().zip(points) {
+            *name = number(&mut draft, *point)?;
+        }
+        draft.triangles.push(names);
+        draft.sources.push(source);
+    }
+    Ok(draft)
+}
+
+fn place(shape: &Shape, fill: &Fill, point: Point) -> Option<DVec3> {
+    match point {
+        Point::OnGrid(edge) => on_grid(fill, edge),
+        Point::Middle(..) => {
+            let at = fill.middles.binary_search_by(|(middle, _)| middle.cmp(&point)).ok()?;
+            let ring = &fill.middles[at].1;
+            let places: Vec<DVec3> = ring
+                .iter()
+                .map(|point| match point {
+                    Point::OnGrid(edge) => on_grid(fill, *edge),
+                    other => shape.place(*other),
+                })
+                .collect::<Option<_>>()?;
+            // By lengths: many points that lie close together draw it to them no more than few.
+            let next = places.iter().cycle().skip(1);
+            let (sum, all) = places.iter().zip(next).fold((DVec3::zeros(), 0.0), |(sum, all), (a, b)| {
+                let length = (b - a).norm();
+                (sum + (a + b) * (0.5 * length), all + length)
+            });
+            Some(if all > 0.0 { sum / all } else { places[0] })
+        }
+        other => shape.place(other),
+    }
+}
+
+fn on_grid(fill: &Fill, edge: GridEdge) -> Option<DVec3> {
+    let at = fill.shares.binary_search_by(|(other, _)| other.cmp(&edge)).ok()?;
+    let mut place = DVec3::from(edge.1.map(f64::from));
+    place[edge.0] += fill.shares[at].1;
+    Some(place)
+}

@@ -1,0 +1,236 @@
+//! The mesh outside of a set of cells, cut along the outer faces of the set.
+//!
+//! A triangle that passes through an outer face is replaced by its part outside: polygons whose corners are its own corners, the
+//! points where its edges pass through outer faces, and those where it passes through outer edges of the grid. The same points, in
+//! the other direction, are where the rebuilt surface begins ([`super::fill`]).
+
+pub(in crate::mesh_repair) mod draft;
+pub(in crate::mesh_repair) mod exact;
+pub(in crate::mesh_repair) mod pierces;
+mod polygon;
+
+use rayon::prelude::*;
+
+use exact::{GridFace, Point, Traced, beside, on_edge, to_cells, trace};
+use pierces::Pierces;
+
+use super::region::CellSet;
+use crate::distance::lattice::Fixed;
+use crate::geometry::Coord;
+use crate::geometry::DVec3;
+
+/// Triangles a task looks at.
+const GRAIN: usize = 1024;
+/// Cells of a box that are looked at one by one, before a triangle is traced.
+const FEW: i64 = 64;
+
+/// A closed mesh on the lattice.
+pub struct Shape {
+    /// Places of the vertices.
+    pub fixed: Vec<Fixed>,
+    /// Counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    pub pierces: Pierces,
+}
+
+/// What is left of the mesh outside of a set of cells.
+#[derive(Default)]
+pub struct Cut {
+    /// Numbers of the triangles that are outside as a whole.
+    pub whole: Vec<u32>,
+    /// Parts of others, each with the triangle's number.
+    pub parts: Vec<(u32, [Point; 3])>,
+    /// Where the cut runs over outer faces, in the direction of the surface inside; ascending by face.
+    pub rim: Vec<(GridFace, [Point; 2])>,
+}
+
+/// Cells with which the set has to grow before the mesh can be cut.
+#[derive(Debug)]
+pub struct Trouble(pub Vec<Coord>);
+
+impl Shape {
+    /// The place of a point that lies on the mesh (cells).
+    pub fn place(&self, point: Point) -> Option<DVec3> {
+        match point {
+            Point::Vertex(vertex) => Some(to_cells(self.fixed[vertex as usize])),
+            Point::OnEdge(ends, axis, plane) => {
+                Some(on_edge(ends.map(|end| self.fixed[end as usize]), axis, plane))
+            }
+            Point::OnTriangle(triangle, (axis, node)) => {
+                let pierce =
+                    self.pierces.on((axis, node)).iter().find(|pierce| pierce.triangle == triangle)?;
+                let mut place = DVec3::from(node.map(f64::from));
+                place[axis] += pierce.share;
+                Some(place)
+            }
+            Point::OnGrid(_) | Point::Middle(..) => None,
+        }
+    }
+
+    fn corners(&self, triangle: u32) -> [Fixed; 3] {
+        self.triangles[triangle as usize].map(|name| self.fixed[name as usize])
+    }
+
+    fn traced(&self, triangle: u32) -> Option<Traced> {
+        let names = self.triangles[triangle as usize];
+        trace(triangle, names, self.corners(triangle), self.pierces.of_triangle(triangle))
+    }
+
+    /// The cells that a triangle passes through, ascending; those of its box where it cannot be traced.
+    pub fn cells_of(&self, triangle: u32) -> Vec<Coord> {
+        let mut cells = match self.traced(triangle) {
+            Some(traced) => cells(&traced),
+            None => box_of(self.corners(triangle)),
+        };
+        cells.sort_unstable();
+        cells.dedup();
+        cells
+    }
+
+    /// Cuts the mesh along the outer faces of a set of cells.
+    ///
+    /// # Errors
+    /// [`Trouble`], where a triangle cannot be cut.
+    pub fn cut(&self, set: &CellSet) -> Result<Cut, Trouble> {
+        let numbers: Vec<u32> = (0..self.triangles.len() as u32).collect();
+        let parts: Vec<Result<Cut, Trouble>> = numbers
+            .par_chunks(GRAIN)
+            .map(|numbers| {
+                let mut cut = Cut::default();
+                let mut trouble = Vec::new();
+                for triangle in numbers {
+                    if self.cut_one(*triangle, set, &mut cut).is_none() {
+                        trouble.extend(self.cells_of(*triangle));
+                    }
+                }
+                if trouble.is_empty() { Ok(cut) } else { Err(Trouble(trouble)) }
+            })
+            .collect();
+        let (mut all, mut trouble) = (Cut::default(), Vec::new());
+        for part in parts {
+            match part {
+                Ok(cut) => {
+                    all.whole.extend(cut.whole);
+                    all.parts.extend(cut.parts);
+                    all.rim.extend(cut.rim);
+                }
+                Err(Trouble(cells)) => trouble.extend(cells),
+            }
+        }
+        all.rim.sort_unstable();
+        if trouble.is_empty() { Ok(all) } else { Err(Trouble(trouble)) }
+    }
+
+    fn cut_one(&self, triangle: u32, set: &CellSet, out: &mut Cut) -> Option<()> {
+        let (low, high) = bounds(self.corners(triangle));
+        let size = (0..3).map(|axis| i64::from(high[axis] - low[axis]) + 1).product::<i64>();
+        if size <= FEW {
+            let mut held = 0;
+            each(low, high, |cell| held += i64::from(set.holds(cell)));
+            if held == 0 {
+                out.whole.push(triangle);
+            }
+            if held == 0 || held == size {
+                return Some(());
+            }
+        }
+        let traced = self.traced(triangle)?;
+        let cells = cells(&traced);
+        let held = cells.iter().filter(|cell| set.holds(**cell)).count();
+        if held == 0 {
+            out.whole.push(triangle);
+        }
+        if held == 0 || held == cells.len() {
+            return Some(());
+        }
+        let halves = self.halves(triangle, &traced, set, &mut out.rim);
+        for polygon in polygon::polygons(self, triangle, halves)? {
+            out.parts.push((triangle, polygon));
+        }
+        Some(())
+    }
+
+    /// The sides of the part of a triangle outside of a set, with it to the left; adds those along outer faces to the rim, the
+    /// other way round.
+    fn halves(
+        &self,
+        triangle: u32,
+        traced: &Traced,
+        set: &CellSet,
+        rim: &mut Vec<(GridFace, [Point; 2])>,
+    ) -> Vec<Half> {
+        let names = self.triangles[triangle as usize];
+        let mut halves = Vec::new();
+        for (edge, passages) in traced.edges.iter().enumerate() {
+            let [name, next] = [names[edge], names[(edge + 1) % 3]];
+            let mut cell = traced.cells[edge];
+            let mut from = (!set.holds(cell)).then_some(Point::Vertex(name));
+            for passage in passages {
+                let behind = beside(passage.face)[usize::from(passage.is_onward)];
+                if set.holds(behind) != set.holds(cell) {
+                    let (axis, at) = passage.face;
+                    let point = Point::OnEdge([name.min(next), name.max(next)], axis, at[axis]);
+                    match from.take() {
+                        Some(from) => halves.push(Half { ends: [from, point], cell }),
+                        None => from = Some(point),
+                    }
+                }
+                cell = behind;
+            }
+            if let Some(from) = from {
+                halves.push(Half { ends: [from, Point::Vertex(next)], cell });
+            }
+        }
+        for segment in &traced.segments {
+            let [before, behind] = beside(segment.face);
+            let [a, b] = segment.ends;
+            match [before, behind].map(|cell| set.holds(cell)) {
+                [true, false] => {
+                    halves.push(Half { ends: [a, b], cell: behind });
+                    rim.push((segment.face, [b, a]));
+                }
+                [false, true] => {
+                    halves.push(Half { ends: [b, a], cell: before });
+                    rim.push((segment.face, [a, b]));
+                }
+                _ => {}
+            }
+        }
+        halves
+    }
+}
+
+/// A side of the part of a triangle outside of a set of cells: from one point to another, with a cell outside to the left.
+#[derive(Debug, Clone, Copy)]
+pub struct Half {
+    pub ends: [Point; 2],
+    pub cell: Coord,
+}
+
+/// The cells that a triangle passes through; some more than once.
+fn cells(traced: &Traced) -> Vec<Coord> {
+    let through = traced.edges.iter().flatten().flat_map(|passage| beside(passage.face));
+    let across = traced.segments.iter().flat_map(|segment| beside(segment.face));
+    traced.cells.into_iter().chain(through).chain(across).collect()
+}
+
+fn bounds(corners: [Fixed; 3]) -> (Coord, Coord) {
+    let cells = corners.map(exact::cell_of);
+    let of = |pick: fn(i32, i32) -> i32| [0, 1, 2].map(|a| pick(pick(cells[0][a], cells[1][a]), cells[2][a]));
+    (of(i32::min), of(i32::max))
+}
+
+fn each(low: Coord, high: Coord, mut see: impl FnMut(Coord)) {
+    for x in low[0]..=high[0] {
+        for y in low[1]..=high[1] {
+            (low[2]..=high[2]).for_each(|z| see([x, y, z]));
+        }
+    }
+}
+
+fn box_of(corners: [Fixed; 3]) -> Vec<Coord> {
+    let (low, high) = bounds(corners);
+    let mut out = Vec::new();
+    each(low, high, |cell| out.push(cell));
+    out
+}

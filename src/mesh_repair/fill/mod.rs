@@ -1,0 +1,226 @@
+//! The surface inside of a set of cells: marching cubes, sewn to the cut around it.
+//!
+//! On a face between two cells of the set the surface runs as in [`crate::geometry::marching_cubes`]; on an outer face it runs where the cut
+//! does, point by point. In each cell these ways join to rings, which triangles fill. Two cells have the same points on the face
+//! between them, and cells and cut those on outer faces: what comes out is closed.
+
+pub(in crate::mesh_repair) mod holes;
+
+use super::cut::exact::{GridEdge, GridFace, Point, around};
+use super::cut::{Cut, Shape, Trouble};
+use super::region::{CellSet, Inside};
+use crate::geometry::Coord;
+use crate::geometry::marching_cubes::{Edge, FACES, cases, filled, lines};
+
+/// How near to a node a rebuilt surface may pass an edge of the grid (cells): nearer, triangles would be slivers.
+const NEAR: f64 = 0.02;
+
+/// The rebuilt surface.
+#[derive(Default)]
+pub struct Fill {
+    pub triangles: Vec<[Point; 3]>,
+    /// Places of points that are not on the mesh, on edges of the grid, as shares of them; ascending.
+    pub shares: Vec<(GridEdge, f64)>,
+    /// The middles of rings, ascending, each with the ring's points.
+    pub middles: Vec<(Point, Vec<Point>)>,
+}
+
+/// The ways of the cut on outer faces, from edge to edge of the grid.
+pub struct Rim {
+    /// Ascending by face.
+    ways: Vec<(GridFace, Vec<Point>)>,
+}
+
+impl Rim {
+    /// Joins the segments of a cut.
+    ///
+    /// # Errors
+    /// The cells outside of faces on which they form a closed ring, or do not join.
+    pub fn of(cut: &Cut, set: &CellSet) -> Result<Self, Trouble> {
+        let (mut ways, mut trouble) = (Vec::new(), Vec::new());
+        for segments in cut.rim.chunk_by(|a, b| a.0 == b.0) {
+            let face = segments[0].0;
+            match joined(segments) {
+                Some(joined) => ways.extend(joined.into_iter().map(|way| (face, way))),
+                None => trouble
+                    .extend(super::cut::exact::beside(face).into_iter().filter(|cell| !set.holds(*cell))),
+            }
+        }
+        if trouble.is_empty() { Ok(Self { ways }) } else { Err(Trouble(trouble)) }
+    }
+
+    fn on(&self, face: GridFace) -> &[(GridFace, Vec<Point>)] {
+        let first = self.ways.partition_point(|(other, _)| *other < face);
+        let count = self.ways[first..].iter().take_while(|(other, _)| *other == face).count();
+        &self.ways[first..first + count]
+    }
+}
+
+/// Ways from an edge of the grid to another; none where segments of one face, ascending by their first points, do not join so.
+fn joined(segments: &[(GridFace, [Point; 2])]) -> Option<Vec<Vec<Point>>> {
+    if segments.windows(2).any(|pair| pair[0].1[0] == pair[1].1[0]) {
+        return None;
+    }
+    let is_end = |point: Point| matches!(point, Point::OnTriangle(..));
+    let mut ways = Vec::new();
+    let mut used = 0;
+    for (_, [from, _]) in segments.iter().filter(|(_, ends)| is_end(ends[0])) {
+        let mut way = vec![*from];
+        loop {
+            let at = segments.binary_search_by(|(_, ends)| ends[0].cmp(way.last().unwrap_or(from))).ok()?;
+            used += 1;
+            let to = segments[at].1[1];
+            way.push(to);
+            if is_end(to) {
+                break;
+            }
+            if way.len() > segments.len() + 1 {
+                return None;
+            }
+        }
+        ways.push(way);
+    }
+    (used == segments.len()).then_some(ways)
+}
+
+/// Fills a set of cells.
+///
+/// # Errors
+/// Cells at which the ways do not join to rings.
+pub fn fill(shape: &Shape, set: &CellSet, inside: &impl Inside, rim: &Rim) -> Result<Fill, Trouble> {
+    let mut out = Fill::default();
+    let mut trouble = Vec::new();
+    for cell in set.iter() {
+        let cube = Cube { shape, set, inside, rim, cell };
+        if cube.fill(&mut out).is_none() {
+            trouble.push(cell);
+        }
+    }
+    out.shares.sort_unstable_by_key(|share| share.0);
+    out.shares.dedup_by_key(|share| share.0);
+    out.middles.sort_unstable_by_key(|middle| middle.0);
+    if trouble.is_empty() { Ok(out) } else { Err(Trouble(trouble)) }
+}
+
+/// A cell that is filled.
+struct Cube<'a, I> {
+    shape: &'a Shape,
+    set: &'a CellSet,
+    inside: &'a I,
+    rim: &'a Rim,
+    cell: Coord,
+}
+
+impl<I: Inside> Cube<'_, I> {
+    /// The edge of the grid that is an edge of the cube.
+    fn edge(&self, (corner, axis): Edge) -> GridEdge {
+        (axis, self.node(corner))
+    }
+
+    fn node(&self, corner: usize) -> Coord {
+        [0, 1, 2].map(|axis| self.cell[axis] + (corner >> (2 - axis) & 1) as i32)
+    }
+
+    /// Where the surface passes an edge of the cube: on an outer edge that is where the mesh does.
+    fn point(&self, edge: Edge, out: &mut Fill) -> Option<Point> {
+        let edge = self.edge(edge);
+        if around(edge).iter().all(|cell| self.set.holds(*cell)) {
+            out.shares.push((edge, self.share(edge).clamp(NEAR, 1.0 - NEAR)));
+            return Some(Point::OnGrid(edge));
+        }
+        match self.shape.pierces.on(edge) {
+            [one] => Some(Point::OnTriangle(one.triangle, edge)),
+            _ => None,
+        }
+    }
+
+    /// Where the surface passes an inner edge: where it is told to, or where the mesh's winding number passes 0.
+    fn share(&self, edge: GridEdge) -> f64 {
+        if let Some(share) = self.inside.share(edge) {
+            return share;
+        }
+        let mut winding = self.shape.pierces.winding(edge.1);
+        let mut through = Vec::new();
+        for pierce in self.shape.pierces.on(edge) {
+            let next = winding + pierce.change;
+            if (winding > 0) != (next > 0) {
+                through.push(pierce.share);
+            }
+            winding = next;
+        }
+        through.get(through.len() / 2).copied().unwrap_or(0.5)
+    }
+
+    fn fill(&self, out: &mut Fill) -> Option<()> {
+        let case =
+            (0..8).fold(0, |case, corner| case | usize::from(self.inside.at(self.node(corner))) << corner);
+        let is_outer: [bool; 6] = std::array::from_fn(|face| {
+            let mut beside = self.cell;
+            beside[face / 2] += if face % 2 == 0 { -1 } else { 1 };
+            !self.set.holds(beside)
+        });
+        if is_outer == [false; 6] {
+            for triangle in &cases()[case] {
+                let [a, b, c] = triangle.map(|edge| self.point(edge, out));
+                out.triangles.push([a?, b?, c?]);
+            }
+            return Some(());
+        }
+        let mut ways: Vec<Vec<Point>> = Vec::new();
+        for (face, corners) in FACES.iter().enumerate() {
+            if is_outer[face] {
+                let mut behind = self.cell;
+                behind[face / 2] += (face % 2) as i32;
+                ways.extend(self.rim.on((face / 2, behind)).iter().map(|(_, way)| way.clone()));
+            } else {
+                for [from, to] in lines(case, corners) {
+                    ways.push(vec![self.point(from, out)?, self.point(to, out)?]);
+                }
+            }
+        }
+        let rings = rings(ways)?;
+        for (ring, number) in rings.into_iter().zip(0..) {
+            self.fill_ring(ring, number, out);
+        }
+        Some(())
+    }
+
+    fn fill_ring(&self, ring: Vec<Point>, number: u32, out: &mut Fill) {
+        let on_edges: Option<Vec<Edge>> = ring.iter().map(|point| self.edge_of(*point)).collect();
+        let flat = on_edges.as_ref().and_then(|edges| filled(edges).map(|triangles| (edges, triangles)));
+        if let Some((edges, triangles)) = flat {
+            let point =
+                |edge: Edge| edges.iter().position(|other| *other == edge).map_or(ring[0], |at| ring[at]);
+            out.triangles.extend(triangles.into_iter().map(|corners| corners.map(point)));
+            return;
+        }
+        let middle = Point::Middle(self.cell, number);
+        let next = ring.iter().cycle().skip(1);
+        out.triangles.extend(ring.iter().zip(next).map(|(from, to)| [*from, *to, middle]));
+        out.middles.push((middle, ring));
+    }
+
+    /// The edge of the cube on which a point lies; none inside of its faces.
+    fn edge_of(&self, point: Point) -> Option<Edge> {
+        let (Point::OnTriangle(_, (axis, node)) | Point::OnGrid((axis, node))) = point else { return None };
+        let corner = (0..8).find(|corner| self.node(*corner) == node)?;
+        Some((corner, axis))
+    }
+}
+
+/// Joins ways to rings, each point once; none where they do not join.
+fn rings(mut ways: Vec<Vec<Point>>) -> Option<Vec<Vec<Point>>> {
+    let mut rings = Vec::new();
+    while let Some(mut ring) = ways.pop() {
+        loop {
+            let to = ring.pop()?;
+            if to == ring[0] {
+                break;
+            }
+            let next = ways.iter().position(|way| way[0] == to)?;
+            ring.extend(ways.swap_remove(next));
+        }
+        rings.push(ring);
+    }
+    Some(rings)
+}

@@ -1,0 +1,61 @@
+//! Triangles and parts that lie on others.
+
+use rayon::prelude::*;
+
+use super::rotated;
+use crate::geometry::Vec3;
+use crate::geometry::check::duplicates;
+use crate::geometry::check::edges::{edge_uses, imbalance, is_same_edge, parts_of};
+
+/// Which triangles have the vertices of others and go. Of those that are turned the same way the first stays. Where two are turned
+/// opposite ways none does: they are a sheet folded onto itself, which encloses nothing. But where such sheets are closed
+/// themselves, the first ones stay: a body both sides of whose faces were given.
+pub(in crate::mesh_repair) fn doubled(vertices: usize, triangles: &[[u32; 3]]) -> Vec<bool> {
+    let by_vertices = |(triangle, number): (&[u32; 3], u32)| {
+        let [a, b, c] = rotated(*triangle);
+        ([a, b.min(c), b.max(c)], number, b < c)
+    };
+    let mut order: Vec<([u32; 3], u32, bool)> = triangles.iter().zip(0..).map(by_vertices).collect();
+    order.par_sort_unstable();
+    let mut is_out = vec![false; triangles.len()];
+    let mut folded = Vec::new();
+    for same in order.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
+        same[1..].iter().for_each(|(_, number, _)| is_out[*number as usize] = true);
+        if same.iter().any(|(_, _, way)| *way != same[0].2) {
+            folded.push(same[0].1);
+        }
+    }
+    if folded.is_empty() {
+        return is_out;
+    }
+    let sheets: Vec<[u32; 3]> = folded.iter().map(|&number| triangles[number as usize]).collect();
+    let uses = edge_uses(vertices, &sheets);
+    let parts = parts_of(sheets.len(), &uses);
+    let mut is_closed = vec![true; sheets.len()];
+    for run in uses.chunk_by(is_same_edge).filter(|run| run.len() != 2) {
+        is_closed[parts[run[0].1 as usize] as usize] = false;
+    }
+    for (&number, &part) in folded.iter().zip(&parts) {
+        is_out[number as usize] = !is_closed[part as usize];
+    }
+    is_out
+}
+
+/// Whether triangles run along each edge as often one way as the other, without those that are left out; beyond the end of the marks
+/// none is.
+pub(in crate::mesh_repair) fn is_balanced(vertices: usize, triangles: &[[u32; 3]], is_out: &[bool]) -> bool {
+    let is_out = |at: usize| is_out.get(at) == Some(&true);
+    let kept: Vec<[u32; 3]> =
+        triangles.iter().enumerate().filter(|(at, _)| !is_out(*at)).map(|(_, triangle)| *triangle).collect();
+    edge_uses(vertices, &kept).chunk_by(is_same_edge).all(|run| imbalance(&kept, run) == 0)
+}
+
+/// Which triangles are of parts that lie on one before them, triangle by triangle.
+pub(in crate::mesh_repair) fn copies(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u32]) -> Vec<bool> {
+    let position = |vertex: u32| {
+        let p = &positions[vertex as usize];
+        // Adding zero makes -0 and 0 the same.
+        [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f32::to_bits)
+    };
+    duplicates::copies(parts, |_| true, |triangle| rotated(triangles[triangle].map(position)))
+}

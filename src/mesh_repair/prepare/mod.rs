@@ -1,0 +1,308 @@
+//! Any triangles become triangles that are closed as a chain and turned outward.
+//!
+//! Parts that are closed by their indices stay as they are. The others are joined where vertices are one corner, then turned so
+//! that neighbours agree, and their holes are closed (`fill/holes.rs`). Every step takes some n log n operations for n triangles.
+
+mod copies;
+
+use rayon::prelude::*;
+
+use super::fill::holes::close;
+use crate::geometry::check::edges::{Use, agree, edge_uses, is_same_edge, parts_of, side, sound};
+use crate::geometry::check::predicates::is_flat;
+use crate::geometry::mesh::weld::Weld;
+use crate::geometry::{DVec3, TriMesh, Vec3};
+use copies::{copies, doubled, is_balanced};
+
+/// What was done to a mesh before anything was cut.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Prepared {
+    /// Vertices joined with others at the same position, or within rounding of theirs on open edges ([`Weld`]).
+    pub joined_vertices: usize,
+    /// Vertices on open edges that are within rounding of others, but which of them are one is not clear.
+    pub ambiguous_vertices: usize,
+    /// Triangles without area, doubled or alone, that were left out, and those of parts that lay on a part like them.
+    pub dropped_triangles: usize,
+    /// Triangles turned round so that they agree with their neighbours.
+    pub turned_triangles: usize,
+    /// Parts turned outward as a whole.
+    pub turned_parts: usize,
+    /// Holes that were closed.
+    pub holes: usize,
+    /// Triangles that close them.
+    pub added_triangles: usize,
+}
+
+/// Triangles that are closed as a chain and turned outward: along every edge as many run one way as the other.
+#[derive(Debug)]
+pub(super) struct Closed {
+    /// Positions (m): the mesh's own vertices first, in their order and all of them, then those that close holes.
+    pub positions: Vec<Vec3>,
+    /// The mesh's triangles first, in their order, then those that close holes. A triangle that was turned round keeps its
+    /// first corner.
+    pub triangles: Vec<[u32; 3]>,
+    /// The triangle of the mesh that each one is; none where it closes a hole.
+    pub sources: Vec<Option<u32>>,
+    /// What was done.
+    pub prepared: Prepared,
+}
+
+/// Triangles a task looks at.
+const GRAIN: usize = 2048;
+
+/// Closes a mesh, whose positions are finite and whose indices are in range, and turns it outward, part by part: a part is what
+/// hangs together by edges. The solid is where the winding number is over 0 then. A cavity, which is a part that lies inside
+/// out within another, is turned outward too: it is filled.
+///
+/// Parts that are closed by their indices, each edge with two triangles that agree, keep their vertices, triangles without area
+/// among them too; of parts that lie on each other triangle by triangle the first stays. No triangle may be left.
+pub(super) fn prepare(mesh: &TriMesh) -> Closed {
+    let vertices = mesh.positions.len();
+    let mut closed = Closed {
+        positions: mesh.positions.clone(),
+        triangles: mesh.triangles.clone(),
+        sources: (0..mesh.triangles.len() as u32).map(Some).collect(),
+        prepared: Prepared::default(),
+    };
+    let uses = edge_uses(vertices, &mesh.triangles);
+    let mut parts = parts_of(mesh.triangles.len(), &uses);
+    let is_sound = sound(&mesh.triangles, &uses, &parts);
+    if is_sound.contains(&false) {
+        closed.join(&is_sound);
+        closed.leave_out(&collapsed(&closed.triangles));
+        let is_out = doubled(vertices, &closed.triangles);
+        // Bodies that nearly coincide share some triangles: where all is closed as it is, it stays closed.
+        if !is_balanced(vertices, &closed.triangles, &[]) || is_balanced(vertices, &closed.triangles, &is_out)
+        {
+            closed.leave_out(&is_out);
+        }
+        closed.leave_out(&loose_needles(&closed.positions, &closed.triangles));
+        let uses = edge_uses(vertices, &closed.triangles);
+        closed.make_agree(&uses);
+        close(&mut closed, &uses);
+        let uses = edge_uses(closed.positions.len(), &closed.triangles);
+        parts = parts_of(closed.triangles.len(), &uses);
+    }
+    closed.turn_outward(&parts);
+    closed.leave_out(&copies(&closed.positions, &closed.triangles, &parts));
+    closed.prepared.added_triangles = closed.sources.iter().filter(|source| source.is_none()).count();
+    closed
+}
+
+impl Closed {
+    /// Joins vertices that are one corner, among those of triangles that are not sound: each takes the name of the first.
+    fn join(&mut self, is_sound: &[bool]) {
+        let mut is_named = vec![false; self.positions.len()];
+        for (triangle, _) in self.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound) {
+            triangle.iter().for_each(|&vertex| is_named[vertex as usize] = true);
+        }
+        let mut names: Vec<u32> = (0..self.positions.len() as u32).collect();
+        let named: Vec<u32> = names.iter().copied().filter(|&vertex| is_named[vertex as usize]).collect();
+        let places: Vec<DVec3> = named.iter().map(|&vertex| self.positions[vertex as usize].cast()).collect();
+        let unsound = self.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound);
+        let number = |vertex: u32| named.partition_point(|other| *other < vertex) as u32;
+        let triangles: Vec<[u32; 3]> = unsound.map(|(triangle, _)| triangle.map(number)).collect();
+        let weld = Weld::of(&places, &triangles);
+        self.prepared.ambiguous_vertices = weld.ambiguous.len();
+        for (&vertex, first) in named.iter().zip(weld.firsts) {
+            names[vertex as usize] = named[first as usize];
+            self.prepared.joined_vertices += usize::from(names[vertex as usize] != vertex);
+        }
+        for (triangle, _) in self.triangles.iter_mut().zip(is_sound).filter(|(_, sound)| !**sound) {
+            *triangle = triangle.map(|vertex| names[vertex as usize]);
+        }
+    }
+
+    /// Turns triangles round so that two which are alone on an edge agree.
+    fn make_agree(&mut self, uses: &[Use]) {
+        let area = |at: usize| {
+            let [a, b, c] = corners(&self.positions, &self.triangles[at]);
+            (b - a).cross(&(c - a)).norm()
+        };
+        let turned = agree(&self.triangles, uses, area).turned;
+        for (triangle, _) in self.triangles.iter_mut().zip(&turned).filter(|(_, turned)| **turned) {
+            triangle.swap(1, 2);
+            self.prepared.turned_triangles += 1;
+        }
+    }
+
+    /// Leaves out triangles, and counts them; those beyond the end of `is_out` stay.
+    pub(super) fn leave_out(&mut self, is_out: &[bool]) {
+        let count = is_out.iter().filter(|is_out| **is_out).count();
+        if count == 0 {
+            return;
+        }
+        let mut marks = is_out.iter();
+        self.triangles.retain(|_| marks.next() != Some(&true));
+        let mut marks = is_out.iter();
+        self.sources.retain(|_| marks.next() != Some(&true));
+        self.prepared.dropped_triangles += count;
+    }
+
+    /// Turns parts of negative volume round.
+    fn turn_outward(&mut self, parts: &[u32]) {
+        let mut six = vec![0.0f64; parts.len()];
+        for (triangle, &part) in self.triangles.iter().zip(parts) {
+            let origin: DVec3 = self.positions[self.triangles[part as usize][0] as usize].cast();
+            let [a, b, c] = corners(&self.positions, triangle).map(|place| place - origin);
+            six[part as usize] += a.dot(&b.cross(&c));
+        }
+        for (triangle, &part) in self.triangles.iter_mut().zip(parts) {
+            if six[part as usize] < 0.0 {
+                triangle.swap(1, 2);
+            }
+        }
+        self.prepared.turned_parts = six.iter().filter(|six| **six < 0.0).count();
+    }
+}
+
+/// Corners of a triangle beginning with the least, so that those which are turned the same way are equal.
+pub(super) fn rotated<T: Ord + Copy>([a, b, c]: [T; 3]) -> [T; 3] {
+    [a, b, c].min([b, c, a]).min([c, a, b])
+}
+
+fn corners(positions: &[Vec3], triangle: &[u32; 3]) -> [DVec3; 3] {
+    triangle.map(|vertex| positions[vertex as usize].cast())
+}
+
+/// Which triangles name a vertex twice.
+fn collapsed(triangles: &[[u32; 3]]) -> Vec<bool> {
+    triangles.iter().map(|[a, b, c]| a == b || b == c || c == a).collect()
+}
+
+/// Which triangles without area go: those without which fewer edges are open. One that lies between others, on an edge of one and two
+/// of another, stays.
+fn loose_needles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<bool> {
+    let mut is_out = vec![false; triangles.len()];
+    let is_needle = |triangle: &[u32; 3]| is_flat(&triangle.map(|vertex| positions[vertex as usize]));
+    let is_needle: Vec<bool> = triangles.par_iter().with_min_len(GRAIN).map(is_needle).collect();
+    if !is_needle.contains(&true) {
+        return is_out;
+    }
+    let uses = edge_uses(positions.len(), triangles);
+    let edges: Vec<&[Use]> = uses.chunk_by(is_same_edge).collect();
+    let mut left: Vec<usize> = edges.iter().map(|run| run.len()).collect();
+    let mut own = vec![[0usize; 3]; triangles.len()];
+    for (edge, run) in edges.iter().enumerate() {
+        for &(ends, triangle) in run.iter() {
+            own[triangle as usize][side(&triangles[triangle as usize], ends)] = edge;
+        }
+    }
+    let mut todo: Vec<u32> = (0..triangles.len() as u32).rev().filter(|at| is_needle[*at as usize]).collect();
+    while let Some(needle) = todo.pop() {
+        let counts = own[needle as usize].map(|edge| left[edge]);
+        // Without it an edge with an even number of triangles is open, one with an odd number no longer.
+        let gained = counts.iter().filter(|count| **count % 2 == 1).count();
+        if is_out[needle as usize] || gained < 2 || !counts.contains(&1) {
+            continue;
+        }
+        is_out[needle as usize] = true;
+        for edge in own[needle as usize] {
+            left[edge] -= 1;
+            // The last needle on an edge may be loose now.
+            if left[edge] == 1 {
+                todo.extend(edges[edge].iter().map(|used| used.1).filter(|at| is_needle[*at as usize]));
+            }
+        }
+    }
+    is_out
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// What becomes of a mesh, checked for what holds of any, with how it was prepared.
+    pub fn checked(mesh: &TriMesh) -> (TriMesh, Prepared) {
+        let Closed { positions, triangles, sources, prepared } = prepare(mesh);
+        assert!(positions.starts_with(&mesh.positions));
+        assert_eq!(sources.len(), triangles.len());
+        let own: Vec<u32> = sources.iter().copied().flatten().collect();
+        assert!(own.is_sorted_by(|a, b| a < b));
+        assert_eq!(own.len() + prepared.dropped_triangles, mesh.triangles.len());
+        assert_eq!(triangles.len() - own.len(), prepared.added_triangles);
+        let out = TriMesh { positions, triangles };
+        assert!(out.is_closed());
+        (out, prepared)
+    }
+
+    pub fn cube(at: f32) -> TriMesh {
+        TriMesh::cuboid([at, 0.0, 0.0], [at + 1.0, 1.0, 1.0])
+    }
+
+    pub fn both(mut first: TriMesh, second: &TriMesh) -> TriMesh {
+        first.append(second);
+        first
+    }
+
+    /// A mesh each of whose triangles has vertices of its own.
+    pub fn soup(mesh: &TriMesh) -> TriMesh {
+        let positions: Vec<Vec3> =
+            mesh.triangles.as_flattened().iter().map(|&vertex| mesh.positions[vertex as usize]).collect();
+        let triangles = (0..mesh.triangles.len() as u32).map(|at| [3 * at, 3 * at + 1, 3 * at + 2]).collect();
+        TriMesh { positions, triangles }
+    }
+
+    #[test]
+    fn few_triangles_are_turned_and_whole_parts_outward() {
+        let mut turned = cube(0.0);
+        turned.triangles[..2].iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        let (out, prepared) = checked(&turned);
+        assert_eq!((out, prepared), (cube(0.0), Prepared { turned_triangles: 2, ..Prepared::default() }));
+        let (out, prepared) = checked(&cube(0.0).reversed());
+        assert_eq!((out, prepared), (cube(0.0), Prepared { turned_parts: 1, ..Prepared::default() }));
+        // A cavity is filled.
+        let cavity = TriMesh::cuboid([0.25; 3], [0.75; 3]).reversed();
+        let (out, prepared) = checked(&both(cube(0.0), &cavity));
+        assert_eq!((out.volume(), prepared.turned_parts, prepared.dropped_triangles), (1.125, 1, 0));
+    }
+
+    #[test]
+    fn loose_triangles_are_joined() {
+        let tetrahedron = TriMesh {
+            positions: vec![Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()],
+            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
+        };
+        let (out, prepared) = checked(&soup(&tetrahedron));
+        assert_eq!(prepared, Prepared { joined_vertices: 8, ..Prepared::default() });
+        assert!(out.is_manifold() && out.triangles.len() == 4 && out.volume() > 0.16);
+    }
+
+    #[test]
+    fn of_doubled_bodies_one_is_left() {
+        let (one, inverted) = (cube(0.0), cube(0.0).reversed());
+        let mut twice = one.clone();
+        twice.triangles.extend_from_slice(&one.triangles);
+        let mut two_sided = one.clone();
+        two_sided.triangles.extend_from_slice(&inverted.triangles);
+        let soups = both(soup(&one), &soup(&inverted));
+        for mesh in [both(one.clone(), &one), both(one.clone(), &inverted), twice, two_sided, soups] {
+            let (out, prepared) = checked(&mesh);
+            assert_eq!((out.volume(), prepared.dropped_triangles, prepared.holes), (1.0, 12, 0));
+            assert!(out.is_manifold());
+        }
+        // Both sides of a square enclose nothing, nor does a triangle alone.
+        let positions = vec![Vec3::zeros(), Vec3::x(), Vec3::new(1.0, 1.0, 0.0), Vec3::y()];
+        let sheet = [[0, 1, 2], [0, 2, 3], [2, 1, 0], [3, 2, 0]];
+        for count in [4, 1] {
+            let mesh = TriMesh { positions: positions.clone(), triangles: sheet[..count].to_vec() };
+            let (out, prepared) = checked(&mesh);
+            assert_eq!((out.triangles.len(), prepared.dropped_triangles), (0, count));
+        }
+    }
+
+    #[test]
+    fn what_is_closed_stays_as_it_is() {
+        // Cubes that share an edge, by their indices.
+        let mut joined = both(cube(0.0), &TriMesh::cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0]));
+        let shared = |vertex: u32| [(8, 3), (12, 7)].iter().find(|pair| pair.0 == vertex).map(|pair| pair.1);
+        joined.triangles.as_flattened_mut().iter_mut().for_each(|at| *at = shared(*at).unwrap_or(*at));
+        assert_eq!(checked(&joined), (joined.clone(), Prepared::default()));
+        // Cubes with a wall at the same place, beside one that is open.
+        let mut mesh = both(both(cube(0.0), &cube(1.0)), &cube(5.0));
+        mesh.triangles.truncate(34);
+        let (out, prepared) = checked(&mesh);
+        assert_eq!(prepared, Prepared { holes: 1, added_triangles: 2, ..Prepared::default() });
+        assert!(out.triangles.starts_with(&mesh.triangles) && out.is_manifold() && out.volume() == 3.0);
+    }
+}

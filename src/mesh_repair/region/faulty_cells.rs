@@ -1,0 +1,126 @@
+//! Cells in which a mesh is at fault.
+
+use std::collections::HashMap;
+
+use super::CellSet;
+use crate::context::Context;
+use crate::error::Result;
+use crate::geometry::Coord;
+use crate::geometry::check::faults::meeting_pairs;
+use crate::geometry::check::topology::{bodies, faulty};
+use crate::geometry::{DVec3, TriMesh};
+use crate::mesh_repair::cut::Shape;
+use crate::mesh_repair::cut::exact::{around, beside, cell_of, passages};
+use crate::mesh_repair::prepare::Closed;
+
+/// Pierces so near to each other are at one place (cells).
+const TOGETHER: f64 = 1e-6;
+/// Least altitude of a triangle that closes a hole, over its longest edge.
+const THINNEST: f64 = 4e-4;
+
+/// The cells in which a mesh is at fault: where triangles pass through each other, where edges or vertices are not manifold, where
+/// the surface bounds something else than the solid, parts too small for the grid that lie within others, and slivers that close
+/// holes.
+///
+/// # Errors
+/// Cancel.
+pub fn flagged(ctx: &Context, closed: &Closed, shape: &Shape) -> Result<CellSet> {
+    let mut set = CellSet::default();
+    let mesh = TriMesh { positions: closed.positions.clone(), triangles: closed.triangles.clone() };
+    // A large triangle meets many small ones.
+    let mut known: HashMap<u32, Vec<Coord>> = HashMap::new();
+    for [first, second] in meeting_pairs(&mesh) {
+        ctx.check()?;
+        for triangle in [first, second] {
+            known.entry(triangle).or_insert_with(|| shape.cells_of(triangle));
+        }
+        let [a, b] = [&known[&first], &known[&second]];
+        let common: Vec<Coord> = a.iter().copied().filter(|cell| b.binary_search(cell).is_ok()).collect();
+        // On the lattice they may just miss each other.
+        let cells = if common.is_empty() { [&a[..], b].concat() } else { common };
+        cells.into_iter().for_each(|cell| _ = set.add(cell));
+    }
+    let (vertices, edges) = faulty(shape.fixed.len(), &shape.triangles);
+    for vertex in vertices {
+        set.add(cell_of(shape.fixed[vertex as usize]));
+    }
+    for ends in edges {
+        let [a, b] = ends.map(|end| shape.fixed[end as usize]);
+        [a, b].into_iter().for_each(|end| _ = set.add(cell_of(end)));
+        for passage in passages(a, b).into_iter().flatten() {
+            beside(passage.face).into_iter().for_each(|cell| _ = set.add(cell));
+        }
+    }
+    overlaps(shape, 0.0, &mut set);
+    small(shape, &mut set);
+    let caps = (0u32..).zip(&closed.sources).filter(|(_, source)| source.is_none());
+    for (triangle, _) in caps.filter(|(triangle, _)| is_thin(mesh.corners(*triangle as usize))) {
+        shape.cells_of(triangle).into_iter().for_each(|cell| _ = set.add(cell));
+    }
+    Ok(set)
+}
+
+fn is_thin([a, b, c]: [DVec3; 3]) -> bool {
+    let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
+    (b - a).cross(&(c - a)).norm() < THINNEST * longest
+}
+
+/// Adds the cells in which the surface bounds something else than the solid, because it has passed through itself: by at least a depth
+/// (cells, less than 1) along an edge of the grid.
+pub fn overlaps(shape: &Shape, depth: f64, set: &mut CellSet) {
+    for edge in shape.pierces.edges() {
+        let mut winding = shape.pierces.winding(edge.1);
+        let mut from = 0.0;
+        let is_wrong = |winding: i32| !(0..=1).contains(&winding);
+        let mut is_deep = false;
+        // Pierces at one place are in no order: only what is before and behind them counts.
+        for together in shape.pierces.on(*edge).chunk_by(|a, b| b.share - a.share < TOGETHER) {
+            let at = together[0].share;
+            is_deep |= is_wrong(winding) && (from == 0.0 || at - from >= depth);
+            winding += together.iter().map(|pierce| pierce.change).sum::<i32>();
+            from = at;
+        }
+        if is_deep || is_wrong(winding) {
+            around(*edge).into_iter().for_each(|cell| _ = set.add(cell));
+        }
+    }
+}
+
+/// Adds the cells of parts that pass no edge of the grid and are not clearly outside of all others.
+fn small(shape: &Shape, set: &mut CellSet) {
+    for part in bodies(&shape.triangles) {
+        if part.iter().any(|triangle| !shape.pierces.of_triangle(*triangle).is_empty()) {
+            continue;
+        }
+        let cells: Vec<Coord> = part.iter().flat_map(|triangle| shape.cells_of(*triangle)).collect();
+        let is_outside = |cell: &Coord| {
+            (0..8).all(|n| {
+                shape.pierces.winding([cell[0] + (n >> 2), cell[1] + (n >> 1 & 1), cell[2] + (n & 1)]) == 0
+            })
+        };
+        if !cells.iter().all(is_outside) {
+            cells.into_iter().for_each(|cell| _ = set.add(cell));
+        }
+    }
+}
+
+/// The cells of all parts that touch a set, with the set.
+pub fn parts(shape: &Shape, set: &CellSet) -> CellSet {
+    let mut out = set.clone();
+    for part in bodies(&shape.triangles) {
+        let touches = |triangle: &u32| shape.cells_of(*triangle).iter().any(|cell| set.holds(*cell));
+        if part.iter().any(touches) {
+            part.iter().flat_map(|triangle| shape.cells_of(*triangle)).for_each(|cell| _ = out.add(cell));
+        }
+    }
+    out
+}
+
+/// The cells that the mesh passes through.
+pub fn everything(shape: &Shape) -> CellSet {
+    let mut out = CellSet::default();
+    for triangle in 0..shape.triangles.len() as u32 {
+        shape.cells_of(triangle).into_iter().for_each(|cell| _ = out.add(cell));
+    }
+    out
+}

@@ -1,0 +1,376 @@
+//! A closed mesh that changes by edge collapses and flips, with the triangles around its vertices. It stays a closed 2-manifold by
+//! index: two neighbours become one only where the link condition holds (Dey, Edelsbrunner, Guha and Nekhayev 1999, "Topology
+//! preserving edge contraction"). Vertices and triangles of the mesh that came in are not touched.
+
+use crate::geometry::DVec3;
+use crate::mesh_repair::{Draft, Source};
+
+/// A change of the mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::mesh_repair) enum Change {
+    /// A made vertex goes into a neighbour, which lies at a place (cells) then.
+    Collapse { from: u32, to: u32, place: DVec3 },
+    /// Triangles a, b, c and b, a, d become c, a, d and d, b, c.
+    Flip { triangles: [u32; 2], corners: [u32; 4] },
+}
+
+/// The corners of two triangles after a flip.
+pub(in crate::mesh_repair) fn flipped([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
+    [[c, a, d], [d, b, c]]
+}
+
+/// Of a vertex that no created triangle names.
+const NONE: u32 = u32::MAX;
+
+/// A mesh with the triangles around each vertex that a created triangle names: all of them, whole ones too.
+pub(in crate::mesh_repair) struct Fans<'a> {
+    draft: &'a mut Draft,
+    /// Of each vertex the index of its fan; [`NONE`]: it has none.
+    slots: Vec<u32>,
+    /// Triangles of each fan, in no order.
+    fans: Vec<Vec<u32>>,
+    /// Of each triangle whether a collapse has taken it away.
+    is_dead: Vec<bool>,
+}
+
+impl<'a> Fans<'a> {
+    /// Takes a pass over all triangles, and memory for those near created ones.
+    pub(in crate::mesh_repair) fn of(draft: &'a mut Draft) -> Self {
+        let mut slots = vec![NONE; draft.places.len()];
+        let mut count = 0;
+        for (corners, source) in draft.triangles.iter().zip(&draft.sources) {
+            if matches!(source, Source::Whole(_)) {
+                continue;
+            }
+            for corner in corners {
+                let slot = &mut slots[*corner as usize];
+                if *slot == NONE {
+                    *slot = count;
+                    count += 1;
+                }
+            }
+        }
+        let mut fans: Vec<Vec<u32>> = vec![Vec::new(); count as usize];
+        for (triangle, corners) in (0..).zip(&draft.triangles) {
+            for corner in corners {
+                if let Some(fan) = fans.get_mut(slots[*corner as usize] as usize) {
+                    fan.push(triangle);
+                }
+            }
+        }
+        let is_dead = vec![false; draft.triangles.len()];
+        Self { draft, slots, fans, is_dead }
+    }
+
+    /// Whether a triangle is there, and was made or changed by the repair; whole ones stay as they are.
+    pub(in crate::mesh_repair) fn is_created(&self, triangle: u32) -> bool {
+        !self.is_dead[triangle as usize] && !matches!(self.source(triangle), Source::Whole(_))
+    }
+
+    /// Vertices of a triangle.
+    pub(in crate::mesh_repair) fn corners(&self, triangle: u32) -> [u32; 3] {
+        self.draft.triangles[triangle as usize]
+    }
+
+    /// The place of a vertex (cells).
+    pub(in crate::mesh_repair) fn place(&self, vertex: u32) -> DVec3 {
+        self.draft.places[vertex as usize]
+    }
+
+    fn source(&self, triangle: u32) -> Source {
+        self.draft.sources[triangle as usize]
+    }
+
+    fn is_made(&self, vertex: u32) -> bool {
+        self.draft.is_made[vertex as usize]
+    }
+
+    /// The triangles around a vertex; empty where no created triangle named it.
+    fn around(&self, vertex: u32) -> &[u32] {
+        self.fans.get(self.slots[vertex as usize] as usize).map(Vec::as_slice).unwrap_or_default()
+    }
+
+    fn around_mut(&mut self, vertex: u32) -> Option<&mut Vec<u32>> {
+        self.fans.get_mut(self.slots[vertex as usize] as usize)
+    }
+
+    /// The vertices that have an edge in common with one, ascending.
+    fn ring(&self, vertex: u32) -> Vec<u32> {
+        let corners = self.around(vertex).iter().flat_map(|&triangle| self.corners(triangle));
+        let mut ring: Vec<u32> = corners.filter(|&corner| corner != vertex).collect();
+        ring.sort_unstable();
+        ring.dedup();
+        ring
+    }
+
+    /// Collapses and flips of a triangle's edges after which the mesh is a closed 2-manifold still, wherever its vertices lie.
+    pub(in crate::mesh_repair) fn changes(&self, triangle: u32) -> Vec<Change> {
+        let corners = self.corners(triangle);
+        let mut out = Vec::with_capacity(12);
+        for first in 0..3 {
+            let [a, b, c] = [0, 1, 2].map(|n| corners[(first + n) % 3]);
+            let [a_is_made, b_is_made] = [a, b].map(|vertex| self.is_made(vertex));
+            if (a_is_made || b_is_made) && self.may_join(a, b) {
+                let [at_a, at_b] = [a, b].map(|vertex| self.place(vertex));
+                if a_is_made {
+                    out.push(Change::Collapse { from: a, to: b, place: at_b });
+                }
+                if b_is_made {
+                    out.push(Change::Collapse { from: b, to: a, place: at_a });
+                }
+                if a_is_made && b_is_made {
+                    out.push(Change::Collapse { from: a, to: b, place: (at_a + at_b) / 2.0 });
+                }
+            }
+            out.extend(self.flip(triangle, [a, b, c]));
+        }
+        out
+    }
+
+    /// Whether two neighbours may become one vertex: none is beside both but the two corners opposite their edge, and these,
+    /// which lose a triangle each, keep three. That leaves tetrahedra alone, too.
+    fn may_join(&self, a: u32, b: u32) -> bool {
+        let [mut shared, other] = [a, b].map(|vertex| self.ring(vertex));
+        shared.retain(|vertex| other.binary_search(vertex).is_ok());
+        shared.len() == 2 && shared.iter().all(|&corner| self.around(corner).len() > 3)
+    }
+
+    /// The flip of the edge from a triangle's corner a to b; none where the triangle beyond is whole, or the new edge is there already.
+    fn flip(&self, triangle: u32, [a, b, c]: [u32; 3]) -> Option<Change> {
+        let mut fan = self.around(a).iter().copied();
+        let beyond = fan.find(|&other| other != triangle && self.corners(other).contains(&b))?;
+        let d = self.corners(beyond).into_iter().find(|&corner| corner != a && corner != b)?;
+        let is_there = self.around(c).iter().any(|&other| self.corners(other).contains(&d));
+        let may_flip = self.is_created(triangle) && self.is_created(beyond) && !is_there;
+        may_flip.then_some(Change::Flip { triangles: [triangle, beyond], corners: [a, b, c, d] })
+    }
+
+    /// Triangles with a corner that a collapse moves or renames.
+    pub(in crate::mesh_repair) fn moving(
+        &self,
+        from: u32,
+        to: u32,
+        place: DVec3,
+    ) -> impl Iterator<Item = u32> {
+        let around: &[u32] = if place == self.place(to) { &[] } else { self.around(to) };
+        let others = around.iter().filter(move |&&triangle| !self.corners(triangle).contains(&from));
+        self.around(from).iter().chain(others).copied()
+    }
+
+    /// Whether triangles are parts of one.
+    fn are_of_one(&self, triangles: &[u32]) -> bool {
+        let is_of = |of: u32| triangles.iter().all(|&other| self.source(other) == Source::Part(of));
+        matches!(self.source(triangles[0]), Source::Part(of) if is_of(of))
+    }
+
+    /// Makes a change, one of [`Fans::changes`] whose moving triangles are all created; returns the triangles that it touched, and
+    /// whole ones around the same vertex.
+    pub(in crate::mesh_repair) fn make(&mut self, change: Change) -> Vec<u32> {
+        match change {
+            Change::Collapse { from, to, place } => self.collapse(from, to, place),
+            Change::Flip { triangles: [one, two], corners: [a, b, c, d] } => {
+                let source = if self.are_of_one(&[one, two]) { self.source(one) } else { Source::New };
+                for (triangle, corners) in [one, two].into_iter().zip(flipped([a, b, c, d])) {
+                    self.draft.triangles[triangle as usize] = corners;
+                    self.draft.sources[triangle as usize] = source;
+                }
+                self.remove(a, two);
+                self.remove(b, one);
+                self.add(c, two);
+                self.add(d, one);
+                vec![one, two]
+            }
+        }
+    }
+
+    fn collapse(&mut self, from: u32, to: u32, place: DVec3) -> Vec<u32> {
+        let moving: Vec<u32> = self.moving(from, to, place).collect();
+        // Where nothing moves, or all within one plane, parts stay parts.
+        let stays = place == self.place(from) && place == self.place(to);
+        if !stays && !self.are_of_one(&moving) {
+            moving.iter().for_each(|&triangle| self.draft.sources[triangle as usize] = Source::New);
+        }
+        self.draft.places[to as usize] = place;
+        let fan = self.around_mut(from).map(std::mem::take).unwrap_or_default();
+        for triangle in fan {
+            let corners = self.corners(triangle);
+            if corners.contains(&to) {
+                self.is_dead[triangle as usize] = true;
+                corners.into_iter().for_each(|corner| self.remove(corner, triangle));
+            } else {
+                let renamed = corners.map(|corner| if corner == from { to } else { corner });
+                self.draft.triangles[triangle as usize] = renamed;
+                self.add(to, triangle);
+            }
+        }
+        self.around(to).to_vec()
+    }
+
+    fn add(&mut self, vertex: u32, triangle: u32) {
+        if let Some(fan) = self.around_mut(vertex) {
+            fan.push(triangle);
+        }
+    }
+
+    fn remove(&mut self, vertex: u32, triangle: u32) {
+        if let Some(fan) = self.around_mut(vertex) {
+            fan.retain(|&other| other != triangle);
+        }
+    }
+
+    /// Drops the triangles that were taken away, and made vertices that no triangle names. All others keep their order.
+    pub(in crate::mesh_repair) fn finish(self) {
+        let (draft, is_dead) = (self.draft, self.is_dead);
+        let alive: Vec<usize> = (0..is_dead.len()).filter(|&triangle| !is_dead[triangle]).collect();
+        draft.triangles = alive.iter().map(|&triangle| draft.triangles[triangle]).collect();
+        draft.sources = alive.iter().map(|&triangle| draft.sources[triangle]).collect();
+        let mut is_named = vec![false; draft.places.len()];
+        draft.triangles.as_flattened().iter().for_each(|&corner| is_named[corner as usize] = true);
+        let mut numbers = vec![0; is_named.len()];
+        let mut kept = 0;
+        for vertex in 0..is_named.len() {
+            numbers[vertex] = kept as u32;
+            if is_named[vertex] || !draft.is_made[vertex] {
+                draft.places[kept] = draft.places[vertex];
+                draft.is_made[kept] = draft.is_made[vertex];
+                kept += 1;
+            }
+        }
+        draft.places.truncate(kept);
+        draft.is_made.truncate(kept);
+        for corners in &mut draft.triangles {
+            *corners = corners.map(|corner| numbers[corner as usize]);
+        }
+    }
+}
+
+#[cfg(test)]
+pub(in crate::mesh_repair) mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::geometry::check::topology::Topology;
+
+    /// Quads of a torus around its axis, and across its tube.
+    const AROUND: u32 = 80;
+    const ACROSS: u32 = 24;
+
+    /// A torus of whole triangles with edges of 0.3 to 0.9 sizes (cells). Triangles 2n and 2n + 1 have their first edge in common.
+    pub fn torus(size: f64) -> Draft {
+        let place = |n: u32| {
+            let turn = |n: u32, of: u32| TAU * f64::from(n) / f64::from(of);
+            let (u, v) = (turn(n / ACROSS, AROUND), turn(n % ACROSS, ACROSS));
+            let far = 6.0 + 2.0 * libm::cos(v);
+            DVec3::new(far * libm::cos(u), 2.0 * libm::sin(v), far * libm::sin(u)) * size
+        };
+        let quad = |n: u32| {
+            let at = |i: u32, j: u32| (n / ACROSS + i) % AROUND * ACROSS + (n % ACROSS + j) % ACROSS;
+            let [a, b, c, d] = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)];
+            [[a, c, b], [c, a, d]]
+        };
+        let triangles: Vec<[u32; 3]> = (0..AROUND * ACROSS).flat_map(quad).collect();
+        Draft {
+            places: (0..AROUND * ACROSS).map(place).collect(),
+            is_made: vec![false; (AROUND * ACROSS) as usize],
+            sources: (0..triangles.len() as u32).map(Source::Whole).collect(),
+            triangles,
+        }
+    }
+
+    fn make(draft: &mut Draft, place: DVec3) -> u32 {
+        draft.places.push(place);
+        draft.is_made.push(true);
+        draft.places.len() as u32 - 1
+    }
+
+    /// Puts parts of a triangle in its place.
+    fn replace(draft: &mut Draft, triangle: usize, parts: &[[u32; 3]]) {
+        let source = match draft.sources[triangle] {
+            Source::Whole(of) => Source::Part(of),
+            other => other,
+        };
+        draft.triangles[triangle] = parts[0];
+        draft.sources[triangle] = source;
+        draft.triangles.extend_from_slice(&parts[1..]);
+        draft.sources.resize(draft.triangles.len(), source);
+    }
+
+    /// Makes a vertex in a triangle, where weights of its corners put it.
+    pub fn split(draft: &mut Draft, triangle: usize, weights: [f64; 3]) {
+        let [a, b, c] = draft.triangles[triangle];
+        let [p, q, r] = [a, b, c].map(|corner| draft.places[corner as usize]);
+        let all = weights[0] + weights[1] + weights[2];
+        let made = make(draft, (p * weights[0] + q * weights[1] + r * weights[2]) / all);
+        replace(draft, triangle, &[[a, b, made], [b, c, made], [c, a, made]]);
+    }
+
+    /// Makes a vertex on the first edge of a triangle, at a share of it.
+    pub fn split_edge(draft: &mut Draft, triangle: usize, share: f64) {
+        let [a, b, c] = draft.triangles[triangle];
+        let runs_back = |corners: &[u32; 3]| (0..3).any(|n| corners[n] == b && corners[(n + 1) % 3] == a);
+        let beyond = draft.triangles.iter().position(runs_back).unwrap();
+        let d = draft.triangles[beyond].into_iter().find(|&corner| corner != a && corner != b).unwrap();
+        let [p, q] = [a, b].map(|corner| draft.places[corner as usize]);
+        let made = make(draft, p + (q - p) * share);
+        replace(draft, triangle, &[[a, made, c], [made, b, c]]);
+        replace(draft, beyond, &[[b, made, d], [made, a, d]]);
+    }
+
+    /// A pyramid over a square whose tip, 4, was made, and a tetrahedron of vertices 6 to 9 apart from it.
+    fn draft() -> Draft {
+        let pyramid = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [0, 2, 1], [0, 3, 2]];
+        let tetrahedron = [[6, 8, 7], [6, 7, 9], [7, 8, 9], [8, 6, 9]];
+        let source = |n: u32| if n < 4 { Source::New } else { Source::Whole(n) };
+        Draft {
+            places: (0..10).map(|vertex| DVec3::repeat(f64::from(vertex))).collect(),
+            is_made: (0..10).map(|vertex| vertex == 4).collect(),
+            triangles: pyramid.into_iter().chain(tetrahedron).collect(),
+            sources: (0..10).map(source).collect(),
+        }
+    }
+
+    #[test]
+    fn fans_hold_whole_triangles_too_and_are_only_where_something_was_created() {
+        let mut draft = draft();
+        let fans = Fans::of(&mut draft);
+        assert_eq!(fans.around(4), [0, 1, 2, 3]);
+        assert_eq!(fans.around(0), [0, 3, 4, 5]);
+        assert_eq!((fans.ring(0), fans.ring(1)), (vec![1, 2, 3, 4], vec![0, 2, 4]));
+        assert!(fans.around(7).is_empty());
+    }
+
+    #[test]
+    fn only_sound_changes_are_offered() {
+        let mut draft = draft();
+        let fans = Fans::of(&mut draft);
+        // 1 and 3 are beside 0 and 4, but 2 is, too.
+        assert!(!fans.may_join(4, 0) && !fans.may_join(4, 2));
+        // Beside 1 and 4 are 0 and 2 alone.
+        assert!(fans.may_join(4, 1) && fans.may_join(4, 3));
+        let [a, b, c, d] = [1, 4, 0, 2];
+        let into = Change::Collapse { from: 4, to: 1, place: DVec3::repeat(1.0) };
+        // The edge 0-2 is there already; that from 1 to 3 is not, but 0-1 has a whole triangle beyond.
+        assert_eq!(fans.flip(0, [a, b, c]), None);
+        let flip = Change::Flip { triangles: [0, 3], corners: [4, 0, 1, 3] };
+        assert_eq!(fans.changes(0), [into, flip]);
+        assert_eq!(flipped([a, b, c, d]), [[0, 1, 2], [2, 4, 0]]);
+    }
+
+    #[test]
+    fn changes_keep_a_closed_manifold_and_what_is_dropped_is_dropped_alone() {
+        for change in [0, 1] {
+            let mut draft = draft();
+            let mut fans = Fans::of(&mut draft);
+            let touched = fans.make(fans.changes(0)[change]);
+            assert_eq!(touched.len(), [3, 2][change]);
+            fans.finish();
+            assert!(Topology::of(draft.places.len(), &draft.triangles).is_watertight());
+            // Vertex 5 stays: it was not made.
+            let (vertices, triangles) = [(9, 8), (10, 10)][change];
+            assert_eq!((draft.places.len(), draft.triangles.len()), (vertices, triangles));
+            assert_eq!((draft.is_made.len(), draft.sources.len()), (vertices, triangles));
+            assert_eq!(draft.places[vertices - 1], DVec3::repeat(9.0));
+            assert_eq!(draft.triangles[triangles - 1].map(|n| n as usize + 10 - vertices), [8, 6, 9]);
+        }
+    }
+}

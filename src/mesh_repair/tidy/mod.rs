@@ -1,0 +1,481 @@
+//! Takes slivers out of the triangles that a repair made: pieces of a cut as thin as rounding, points beside vertices or at the same
+//! place, corners almost on the edge opposite. A made vertex goes into a neighbour, or an edge flips ([`editable_mesh`]).
+//!
+//! Quality is the altitude of a triangle on its longest edge over that edge, 0.87 at best. Edges shorter than [`SHORT`] count as that
+//! long: triangles among points that all but coincide look well shaped by chance, and are none once their places have 32 bits.
+
+mod editable_mesh;
+
+use std::collections::VecDeque;
+
+use super::{Draft, Source};
+use crate::geometry::DVec3;
+use editable_mesh::{Change, Fans, flipped};
+
+/// Quality below which a triangle is a sliver: what a repaired mesh promises, 1e-4, with a margin.
+const LEAST: f64 = 4e-4;
+/// Quality from which on a triangle is left alone.
+const GOOD: f64 = 0.05;
+/// Length up to which edges are short (cells).
+const SHORT: f64 = 1e-3;
+/// How far a vertex may move at once (cells).
+const FARTHEST: f64 = 0.5;
+/// How far the surface may move where an edge flips (cells): between large triangles that meet in a ridge it would go far.
+const BEVEL: f64 = 0.1;
+/// How often a triangle is queued in a sweep, at most.
+const TRIES: u8 = 8;
+/// Sweeps by one rule before the next has its turn, at most.
+const SWEEPS: usize = 4;
+/// How often all rules have their turns, at most.
+const ROUNDS: usize = 3;
+
+/// For which triangles a change is looked for, and what it must keep to.
+struct Rule {
+    /// Triangles of less quality are looked at.
+    below: f64,
+    /// Slivers must become fewer; else the worst triangle must become better, and slivers not more.
+    by_count: bool,
+    /// How far a vertex may move (cells).
+    farthest: f64,
+    /// Edges may flip, not only collapse.
+    may_flip: bool,
+    /// A collapse may turn triangles over.
+    may_turn: bool,
+    /// A flip may fold its two triangles.
+    may_fold: bool,
+}
+
+/// Against slivers alone.
+const RESORT: Rule = Rule {
+    below: LEAST,
+    by_count: true,
+    farthest: FARTHEST,
+    may_flip: true,
+    may_turn: false,
+    may_fold: false,
+};
+
+/// One after another: points that all but coincide become one before a flip can part them; then triangles become better; what is
+/// left of slivers goes in ever ruder ways.
+const RULES: [Rule; 5] = [
+    Rule { farthest: SHORT, may_flip: false, ..RESORT },
+    Rule { below: GOOD, by_count: false, ..RESORT },
+    RESORT,
+    Rule { may_turn: true, ..RESORT },
+    Rule { may_turn: true, may_fold: true, ..RESORT },
+];
+
+/// Takes slivers out of the created triangles, then drops made vertices that no triangle names; all others keep their order. The
+/// mesh must be a closed 2-manifold by index in which only created triangles name made vertices, and stays one. Returns how many
+/// created triangles are left whose least altitude is below [`LEAST`] of their longest edge, however short that is.
+pub(super) fn tidy(draft: &mut Draft) -> usize {
+    let mut tidy = Tidy::new(draft);
+    for _ in 0..ROUNDS {
+        for rule in &RULES {
+            for _ in 0..SWEEPS {
+                if !tidy.sweep(rule) {
+                    break;
+                }
+            }
+        }
+        if !tidy.created.iter().any(|&triangle| tidy.is_below(triangle, LEAST)) {
+            break;
+        }
+    }
+    let left = tidy.slivers();
+    tidy.fans.finish();
+    left
+}
+
+/// How far apart the two diagonals of a quadrangle are, a b and c d (cells).
+fn apart([a, b, c, d]: [DVec3; 4]) -> f64 {
+    let across = (b - a).cross(&(d - c));
+    let length = across.norm();
+    // Along one line they are not apart, and parallel ones bound no area.
+    if length > 0.0 { (c - a).dot(&across).abs() / length } else { 0.0 }
+}
+
+/// A normal of a triangle, as long as twice its area (square cells).
+fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
+    (b - a).cross(&(c - a))
+}
+
+/// Altitude of a triangle on its longest edge, over that edge, which counts as `least` (cells) where it is shorter; 0 where all
+/// corners are at one place.
+fn altitude(corners: &[DVec3; 3], least: f64) -> f64 {
+    let [a, b, c] = corners;
+    let square = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
+    if square > 0.0 { normal(corners).norm() / square.max(least * least) } else { 0.0 }
+}
+
+/// Quality of a triangle: see the top of this file.
+fn quality(corners: &[DVec3; 3]) -> f64 {
+    altitude(corners, SHORT)
+}
+
+/// The triangles that a change touches, before or after it.
+#[derive(Clone, Copy)]
+struct Score {
+    /// Least quality.
+    worst: f64,
+    slivers: usize,
+}
+
+impl Score {
+    const EMPTY: Self = Self { worst: f64::INFINITY, slivers: 0 };
+
+    fn count(&mut self, quality: f64) {
+        self.worst = self.worst.min(quality);
+        self.slivers += usize::from(quality < LEAST);
+    }
+}
+
+/// A change that a rule allows, and what comes of it.
+#[derive(Clone, Copy)]
+struct Outcome {
+    change: Change,
+    /// Least quality after it; at most [`GOOD`]: more is not worth a longer way.
+    worst: f64,
+    /// How far the surface moves (cells).
+    far: f64,
+}
+
+impl Outcome {
+    fn is_better_than(&self, other: &Self) -> bool {
+        self.worst > other.worst || (self.worst >= other.worst && self.far < other.far)
+    }
+}
+
+/// A mesh out of which slivers are taken.
+struct Tidy<'a> {
+    fans: Fans<'a>,
+    /// Triangles that were created, ascending; collapses may have taken some away.
+    created: Vec<u32>,
+    /// Triangles to look at, each of them once.
+    waiting: VecDeque<u32>,
+    is_waiting: Vec<bool>,
+    /// How often each triangle was queued in this sweep.
+    tries: Vec<u8>,
+}
+
+impl<'a> Tidy<'a> {
+    fn new(draft: &'a mut Draft) -> Self {
+        let count = draft.triangles.len();
+        let created = (0..).zip(&draft.sources).filter(|(_, source)| !matches!(source, Source::Whole(_)));
+        Self {
+            created: created.map(|(triangle, _)| triangle).collect(),
+            fans: Fans::of(draft),
+            waiting: VecDeque::new(),
+            is_waiting: vec![false; count],
+            tries: vec![0; count],
+        }
+    }
+
+    /// Looks at all created triangles, and again at those that changed; returns whether any did.
+    fn sweep(&mut self, rule: &Rule) -> bool {
+        for at in 0..self.created.len() {
+            let triangle = self.created[at];
+            self.tries[triangle as usize] = 0;
+            self.queue(triangle, rule);
+        }
+        let mut has_changed = false;
+        while let Some(triangle) = self.waiting.pop_front() {
+            self.is_waiting[triangle as usize] = false;
+            if self.is_below(triangle, rule.below)
+                && let Some(change) = self.best(triangle, rule)
+            {
+                has_changed = true;
+                for touched in self.fans.make(change) {
+                    self.queue(touched, rule);
+                }
+            }
+        }
+        has_changed
+    }
+
+    fn queue(&mut self, triangle: u32, rule: &Rule) {
+        let at = triangle as usize;
+        if !self.is_waiting[at] && self.tries[at] < TRIES && self.is_below(triangle, rule.below) {
+            self.is_waiting[at] = true;
+            self.tries[at] += 1;
+            self.waiting.push_back(triangle);
+        }
+    }
+
+    /// Count of created triangles whose least altitude is below [`LEAST`] of their longest edge.
+    fn slivers(&self) -> usize {
+        let there = self.created.iter().filter(|&&triangle| self.fans.is_created(triangle));
+        there.filter(|&&triangle| altitude(&self.places(triangle), 0.0) < LEAST).count()
+    }
+
+    /// Whether a triangle was created, is there still, and has less than a quality.
+    fn is_below(&self, triangle: u32, bound: f64) -> bool {
+        self.fans.is_created(triangle) && quality(&self.places(triangle)) < bound
+    }
+
+    fn places(&self, triangle: u32) -> [DVec3; 3] {
+        self.fans.corners(triangle).map(|corner| self.fans.place(corner))
+    }
+
+    /// The best change that a rule allows for a triangle; of equal ones the first.
+    fn best(&self, triangle: u32, rule: &Rule) -> Option<Change> {
+        let mut best: Option<Outcome> = None;
+        for change in self.fans.changes(triangle) {
+            if let Some(outcome) = self.outcome(change, rule)
+                && best.is_none_or(|best| outcome.is_better_than(&best))
+            {
+                best = Some(outcome);
+            }
+        }
+        best.map(|best| best.change)
+    }
+
+    /// What comes of a change; none where a rule forbids it.
+    fn outcome(&self, change: Change, rule: &Rule) -> Option<Outcome> {
+        let far = match change {
+            Change::Collapse { from, place, .. } => (place - self.fans.place(from)).norm(),
+            Change::Flip { corners, .. } => apart(corners.map(|corner| self.fans.place(corner))),
+        };
+        let farthest =
+            if let Change::Flip { .. } = change { rule.farthest.min(BEVEL) } else { rule.farthest };
+        if far > farthest {
+            return None;
+        }
+        let [before, after] = match change {
+            Change::Collapse { from, to, place } => self.collapsed(from, to, place, rule)?,
+            Change::Flip { triangles, corners } if rule.may_flip => self.flipped(triangles, corners, rule)?,
+            Change::Flip { .. } => return None,
+        };
+        let are_fewer = after.slivers < before.slivers;
+        let is_gain = if rule.by_count {
+            are_fewer
+        } else if are_fewer {
+            after.worst >= before.worst
+        } else {
+            after.slivers == before.slivers && after.worst > before.worst
+        };
+        is_gain.then_some(Outcome { change, worst: after.worst.min(GOOD), far })
+    }
+
+    /// The triangles around a collapse, before and after it.
+    fn collapsed(&self, from: u32, to: u32, place: DVec3, rule: &Rule) -> Option<[Score; 2]> {
+        let [mut before, mut after] = [Score::EMPTY; 2];
+        for triangle in self.fans.moving(from, to, place) {
+            if !self.fans.is_created(triangle) {
+                return None;
+            }
+            let (corners, old) = (self.fans.corners(triangle), self.places(triangle));
+            let old_quality = quality(&old);
+            before.count(old_quality);
+            if corners.contains(&from) && corners.contains(&to) {
+                continue;
+            }
+            let moved = |at: u32| if at == from || at == to { place } else { self.fans.place(at) };
+            let new = corners.map(moved);
+            // Which way a sliver looks says nothing.
+            let turns = old_quality >= LEAST && normal(&old).dot(&normal(&new)) <= 0.0;
+            if turns && !rule.may_turn {
+                return None;
+            }
+            after.count(quality(&new));
+        }
+        Some([before, after])
+    }
+
+    /// The two triangles of a flip, before and after it.
+    fn flipped(&self, triangles: [u32; 2], corners: [u32; 4], rule: &Rule) -> Option<[Score; 2]> {
+        let [mut before, mut after] = [Score::EMPTY; 2];
+        let mut sum = DVec3::zeros();
+        for triangle in triangles {
+            let old = self.places(triangle);
+            before.count(quality(&old));
+            sum += normal(&old);
+        }
+        for corners in flipped(corners) {
+            let new = corners.map(|corner| self.fans.place(corner));
+            if normal(&new).dot(&sum) <= 0.0 && !rule.may_fold {
+                return None;
+            }
+            after.count(quality(&new));
+        }
+        Some([before, after])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::editable_mesh::tests::{split, split_edge, torus};
+    use super::*;
+    use crate::geometry::check::topology::Topology;
+
+    fn is_watertight(draft: &Draft) -> bool {
+        let arrays =
+            [(draft.is_made.len(), draft.places.len()), (draft.sources.len(), draft.triangles.len())];
+        arrays.iter().all(|(one, other)| one == other)
+            && Topology::of(draft.places.len(), &draft.triangles).is_watertight()
+    }
+
+    fn corners(draft: &Draft, triangle: usize) -> [DVec3; 3] {
+        draft.triangles[triangle].map(|corner| draft.places[corner as usize])
+    }
+
+    fn volume(draft: &Draft) -> f64 {
+        let six = |triangle: usize| {
+            let [a, b, c] = corners(draft, triangle);
+            a.dot(&b.cross(&c))
+        };
+        (0..draft.triangles.len()).map(six).sum::<f64>() / 6.0
+    }
+
+    /// Tidies what a mesh has become, and checks what holds however many slivers are left; returns how many. The volume changes by
+    /// less than a share.
+    fn tidied(draft: &mut Draft, first: &Draft, share: f64) -> usize {
+        let own = |draft: &Draft| -> Vec<DVec3> {
+            let all = draft.places.iter().zip(&draft.is_made);
+            all.filter(|(_, is_made)| !**is_made).map(|(place, _)| *place).collect()
+        };
+        let whole = |draft: &Draft| -> Vec<(Source, [DVec3; 3])> {
+            let all = (0..draft.triangles.len()).map(|at| (draft.sources[at], corners(draft, at)));
+            all.filter(|(source, _)| matches!(source, Source::Whole(_))).collect()
+        };
+        assert!(is_watertight(draft));
+        let before = (own(draft), whole(draft), volume(draft));
+        let left = tidy(draft);
+        assert!(is_watertight(draft));
+        assert!(own(draft) == before.0, "a vertex of the mesh's own was touched");
+        assert!(whole(draft) == before.1, "a whole triangle was touched");
+        let after = volume(draft);
+        assert!((after / before.2 - 1.0).abs() < share, "{after} is not {}", before.2);
+        for at in 0..draft.triangles.len() {
+            if let Source::Part(of) = draft.sources[at] {
+                let plane = corners(first, of as usize);
+                let up = normal(&plane).normalize();
+                let is_in_plane = |place: DVec3| (place - plane[0]).dot(&up).abs() < 1e-9;
+                assert!(corners(draft, at).into_iter().all(is_in_plane), "triangle {at} is no part of {of}");
+            }
+        }
+        let slivers = (0..draft.triangles.len())
+            .filter(|&at| !matches!(draft.sources[at], Source::Whole(_)))
+            .filter(|&at| altitude(&corners(draft, at), 0.0) < LEAST);
+        assert_eq!(left, slivers.count());
+        left
+    }
+
+    /// Numbers from 0 to 1 by a linear congruence.
+    struct Random(u64);
+
+    impl Random {
+        fn share(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
+            (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        }
+
+        fn below(&mut self, count: usize) -> usize {
+            (self.share() * count as f64) as usize
+        }
+    }
+
+    #[test]
+    fn points_at_vertices_beside_them_and_almost_on_edges_go() {
+        let first = torus(1.0);
+        for weights in [[1.0, 0.0, 0.0], [1.0, 1e-9, 1e-9], [1.0, 1.0, 1e-9], [1e-9, 1.0, 1e-12]] {
+            let mut draft = torus(1.0);
+            (0..30).for_each(|n| split(&mut draft, 20 * n, weights));
+            assert_eq!(tidied(&mut draft, &first, 1e-4), 0, "{weights:?}");
+            assert_eq!(
+                (draft.places.len(), draft.triangles.len()),
+                (first.places.len(), first.triangles.len())
+            );
+            let is_part = |source: &&Source| matches!(source, Source::Part(_));
+            assert_eq!(draft.sources.iter().filter(is_part).count(), 30, "{weights:?}");
+        }
+        let mut draft = torus(1.0);
+        for (n, share) in [0.0, 1e-12, 1e-9, 1e-5, 0.999_999, 1.0].into_iter().cycle().take(30).enumerate() {
+            split_edge(&mut draft, 20 * n, share);
+        }
+        assert_eq!(tidied(&mut draft, &first, 1e-4), 0);
+        assert_eq!(draft.triangles.len(), first.triangles.len());
+    }
+
+    #[test]
+    fn an_edge_flips_where_both_its_triangles_were_created() {
+        let first = torus(1.0);
+        let mut draft = torus(1.0);
+        for n in 0..30 {
+            split(&mut draft, 20 * n, [1.0, 1.0, 1e-9]);
+            split(&mut draft, 20 * n + 1, [1.0; 3]);
+        }
+        let count = draft.triangles.len();
+        assert_eq!(tidied(&mut draft, &first, 1e-4), 0);
+        assert_eq!((draft.places.len(), draft.triangles.len()), (first.places.len() + 60, count));
+        assert_eq!(draft.sources.iter().filter(|source| **source == Source::New).count(), 60);
+    }
+
+    #[test]
+    fn no_vertex_moves_far() {
+        let (first, mut draft) = (torus(10.0), torus(10.0));
+        (0..30).for_each(|n| split(&mut draft, 20 * n, [1.0, 1.0, 1e-9]));
+        assert_eq!(tidied(&mut draft, &first, 1e-4), 30);
+        assert_eq!(draft.triangles.len(), first.triangles.len() + 60);
+    }
+
+    #[test]
+    fn slivers_within_slivers_go() {
+        let first = torus(1.0);
+        for seed in 0..4 {
+            let (mut draft, mut random) = (torus(1.0), Random(seed));
+            for _ in 0..600 {
+                let triangle = random.below(40);
+                if random.below(3) == 0 {
+                    let share = [0.0, 1e-12, 1e-7, 0.3, 0.999_999, 1.0][random.below(6)];
+                    split_edge(&mut draft, triangle, share);
+                } else {
+                    let weight = |_: usize| [1e-15, 1e-9, 1e-5, 0.1, 1.0][random.below(5)];
+                    split(&mut draft, triangle, std::array::from_fn(weight));
+                }
+            }
+            assert_eq!(tidied(&mut draft, &first, 1e-4), 0, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn heaps_of_points_become_one() {
+        let first = torus(1.0);
+        for (made, noise) in [(1.0, 0.0), (1.0, 1e-9), (0.7, 1e-9)] {
+            let (mut draft, mut random) = (torus(1.0), Random(1));
+            for vertex in 0..draft.places.len() {
+                if random.share() < made {
+                    draft.is_made[vertex] = true;
+                    draft.places[vertex] =
+                        draft.places[vertex].map(|x| x.round() + noise * (random.share() - 0.5));
+                }
+            }
+            for (corners, source) in draft.triangles.iter().zip(&mut draft.sources) {
+                if corners.iter().any(|&corner| draft.is_made[corner as usize]) {
+                    *source = Source::New;
+                }
+            }
+            assert_eq!(tidied(&mut draft, &first, 5e-3), 0, "{made} of them, by {noise}");
+        }
+    }
+
+    #[test]
+    fn the_smallest_bodies_stay_closed() {
+        let body = |places: &[[f64; 3]], triangles: &[[u32; 3]]| Draft {
+            places: places.iter().map(|place| DVec3::from(*place)).collect(),
+            is_made: vec![true; places.len()],
+            triangles: triangles.to_vec(),
+            sources: vec![Source::New; triangles.len()],
+        };
+        let needle = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1e-9, 0.0], [0.5, 0.0, 1e-9]];
+        let mut tetrahedron = body(&needle, &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]);
+        assert_eq!(tidy(&mut tetrahedron), 4);
+        assert!(is_watertight(&tetrahedron) && tetrahedron.places.len() == 4);
+        // Two pyramids, base to base: the tip of one is almost on an edge of the base.
+        let flat = [[0.0; 3], [0.4, 0.0, 0.0], [0.2, 0.3, 0.0], [0.2, 1e-9, 1e-9], [0.2, 0.1, -0.1]];
+        let sides = [[0, 1, 3], [1, 2, 3], [2, 0, 3], [1, 0, 4], [2, 1, 4], [0, 2, 4]];
+        let mut doubled = body(&flat, &sides);
+        assert_eq!(tidy(&mut doubled), 0);
+        assert!(is_watertight(&doubled));
+    }
+}

@@ -1,0 +1,82 @@
+//! How much space the files of a liquid on a terrain need at most: when all of it is wet.
+
+use crate::scene::shallow::Shallow;
+use crate::shallow::free_fall::mesh::bound;
+
+/// Bytes of a 32-bit float in a text, with what stands around it, and of an index.
+const TEXT: u64 = 12;
+const INDEX: u64 = 8;
+/// Bytes of a column in the exact state, before it is packed, and of a scalar of it; of a drop, with what waits at a link.
+const STATE: u64 = 20;
+const SCALAR: u64 = 8;
+const DROP: u64 = 220;
+/// Bytes of a voxel of a leaf, of which there are some two for each column.
+const VOXEL: u64 = 2 * 4;
+/// Bytes of a triangle of a terrain that is stained: its corners, and of its half a vertex the place, the stain, and that in the exact state.
+const STAINED: u64 = 13 + (12 + 4 + 12) / 2;
+/// Bytes of a frame's report and record.
+const RECORDS: u64 = 3000;
+
+/// Bytes of a frame's files at most, with this many columns, on a mesh of so many triangles: when all are wet, and as many drops are in the air as there may be.
+pub(in crate::scene::shallow) fn frame(of: &Shallow, columns: u64, triangles: u64) -> u64 {
+    let output = of.output;
+    let scalars = of.scalars.len() as u64;
+    let (carried, falling) =
+        (if output.scalars { scalars } else { 0 }, u64::from(output.falling && of.params.falls.is_some()));
+    let if_asked = |is_asked: bool, bytes: u64| if is_asked { bytes } else { 0 };
+    let arrays = if_asked(output.depth, 4)
+        + if_asked(output.alpha, 4)
+        + if_asked(output.layer, 2)
+        + 4 * carried
+        + falling;
+    let vertex = 12 + if_asked(output.velocities, 12) + arrays;
+    // Two triangles a vertex, each with a byte that counts.
+    let ply = vertex + 2 * 13;
+    let numbers = 6 + u64::from(output.depth) + u64::from(output.alpha) + u64::from(output.layer);
+    let numbers = numbers + carried + falling;
+    let usd = TEXT * numbers + 2 * 3 * INDEX + 2 * 3;
+    let state = STATE + SCALAR * scalars;
+    let each = if_asked(output.ply, ply) + if_asked(output.usd, usd) + if_asked(output.vdb, VOXEL) + state;
+    let drops = of.params.falls.map_or(0, |falls| falls.most);
+    // As many vertices as its mesh has, each with two triangles.
+    let in_air = bound(drops).vertices as u64 * (if_asked(output.ply, ply) + if_asked(output.usd, usd));
+    let stained = if_asked(of.staining.is_some(), STAINED * triangles);
+    columns * each + in_air + stained + drops as u64 * DROP + RECORDS
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{TriMesh, Vec3};
+    use crate::io::mesh::{Carried, ply_bytes};
+    use crate::scene::Scene;
+    use crate::scene::shallow::stage::liquid_mesh::Drawn;
+    use std::path::Path;
+
+    #[test]
+    fn a_ply_file_is_as_large_as_said_but_for_its_header() {
+        let text = "[shot]\nframes = \"1-2\"\n[shallow]\nterrain = \"a.obj\"\ncell = 0.01\nfalls = true\nfalls_most = 1\n\
+                    [[scalar]]\nname = \"dye\"\n";
+        let scene = Scene::parse(text, Path::new("/s/shot.toml"), &[]).unwrap();
+        let of = scene.shallow().unwrap();
+        let count = 1000;
+        let drawn = Drawn {
+            mesh: TriMesh { positions: vec![Vec3::zeros(); count], triangles: vec![[0, 1, 2]; 2 * count] },
+            velocities: vec![Vec3::zeros(); count],
+            depths: vec![0.0; count],
+            alpha: vec![0.0; count],
+            layers: vec![0; count],
+            falling: Some(900),
+            scalars: vec![("dye".into(), vec![0.0; count])],
+        };
+        let arrays = drawn.arrays(of.output);
+        let carried =
+            Carried { velocities: &drawn.velocities, uvs: None, arrays: &arrays.iter().collect::<Vec<_>>() };
+        let bytes = ply_bytes(&drawn.mesh, &carried).len() as u64;
+        let more = (STATE + SCALAR) * count as u64;
+        let said = (frame(of, count as u64, 9) - frame(of, 0, 0)) - more;
+        assert!(bytes > said && bytes < said + 500, "{bytes} bytes, {said} said");
+        // A drop has a ball.
+        assert!(frame(of, 0, 0) > RECORDS + DROP + 42 * 12, "{}", frame(of, 0, 0));
+    }
+}

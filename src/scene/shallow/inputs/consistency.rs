@@ -1,0 +1,157 @@
+//! What keys of `[shallow]` must keep together, told with file and line.
+
+use super::scalars;
+use crate::error::Result;
+use crate::io::files::sequence::Pattern;
+use crate::io::mesh::{EXTENSIONS, extension};
+use crate::scene::schema::{Table, Value, Values};
+use crate::scene::shallow::{Form, Obstacle, Shallow};
+
+impl Shallow {
+    /// Checks what single keys of `[shallow]` do not show.
+    ///
+    /// # Errors
+    /// Keys that exclude each other, or one that others need.
+    pub(in crate::scene) fn check(table: &Table, values: &Values) -> Result<()> {
+        let Some(shallow) = Self::of(values) else { return Ok(()) };
+        let has = |name: &str| values.get(&format!("shallow.{name}")).is_some();
+        let kind = extension(&shallow.terrain);
+        let is_mesh = EXTENSIONS.contains(&&*kind);
+        for name in ["terrain_size", "terrain_height"] {
+            match (kind == "png", has(name)) {
+                (true, false) => {
+                    return Err(table.error(name, "is missing: an image needs its size and its heights (m)"));
+                }
+                (false, true) => return Err(table.error(name, "is of a .png image: leave it out")),
+                _ => {}
+            }
+        }
+        if shallow.image.is_some_and(|image| image.size.iter().any(|length| *length <= 0.0)) {
+            return Err(table.error("terrain_size", "must be two lengths over 0 m"));
+        }
+        if shallow.image.is_some_and(|image| image.heights[0] >= image.heights[1]) {
+            return Err(table.error("terrain_height", "must be [low, high] with low < high"));
+        }
+        if !is_mesh && shallow.space != crate::motion::Space::OWN {
+            let name = ["scale", "up"].into_iter().find(|name| table.has(name)).unwrap_or("origin");
+            return Err(table.error(name, "is for meshes: leave it out"));
+        }
+        if !is_mesh && shallow.sequence().is_some() {
+            return Err(table.error("terrain", "may be a sequence of meshes, not of other files"));
+        }
+        if !is_mesh && shallow.staining.is_some() {
+            return Err(
+                table.error("stains", "must be false: the terrain is no mesh that it could be an array of")
+            );
+        }
+        if shallow.area.is_some_and(|[x0, z0, x1, z1]| x1 <= x0 || z1 <= z0) {
+            return Err(table.error("area", "must be [x0, z0, x1, z1] with x0 < x1 and z0 < z1"));
+        }
+        if let (Some(bottom), Some(top)) = (shallow.bottom, shallow.top)
+            && bottom >= top
+        {
+            return Err(table.error("top", format!("must be above `bottom`, {bottom} m")));
+        }
+        if let (Some(fill), Some(top)) = (shallow.fill, shallow.top)
+            && fill > top
+        {
+            return Err(table.error("fill", format!("must not be above `top`, {top} m")));
+        }
+        if shallow.params.liquid.thinning.is_some() && shallow.look != "blood" {
+            return Err(table.error("thinning", "is of blood only: leave it out"));
+        }
+        // All others have their ranges.
+        shallow.params.validate().map_err(|_| {
+            table.error("gravity", "must point down by 0.001 to 1000 m/s2, and lean by 45 degrees at most")
+        })
+    }
+
+    /// Checks what single keys of a table of which there may be many do not show.
+    ///
+    /// # Errors
+    /// As [`Shallow::check`].
+    pub(in crate::scene) fn check_each(
+        name: &str,
+        index: usize,
+        table: &Table,
+        values: &Values,
+    ) -> Result<()> {
+        match name {
+            "object" => check_object(index, table, values),
+            "scalar" => scalars::check(index, table, values),
+            "pour" => {
+                scalars::check_brought(name, index, table, values)?;
+                let frame = values.of_many(name, index, "frame").and_then(Value::whole);
+                let Some(Value::Frames(frames)) = values.get("shot.frames") else { return Ok(()) };
+                match frame.filter(|frame| *frame < i64::from(frames.first)) {
+                    Some(_) => {
+                        let what = format!("must not lie before the shot's first frame, {}", frames.first);
+                        Err(table.error("frame", what))
+                    }
+                    None => Ok(()),
+                }
+            }
+            _ => {
+                scalars::check_brought(name, index, table, values)?;
+                let value = |key: &str| values.of_many(name, index, key);
+                let terrain = values.get("shallow.terrain").and_then(Value::path);
+                if value("follows").and_then(Value::flag) == Some(true)
+                    && terrain.and_then(Pattern::parse).is_none()
+                {
+                    let what = "must be false where the terrain does not move: it needs a sequence of meshes, as \"organ.%04d.ply\"";
+                    return Err(table.error("follows", what));
+                }
+                let frame = |key: &str| value(key).and_then(Value::whole);
+                match (frame("from"), frame("until")) {
+                    (Some(from), Some(until)) if from > until => {
+                        Err(table.error("until", format!("must not lie before `from`, {from}")))
+                    }
+                    _ => Ok(()),
+                }
+            }
+        }
+    }
+}
+
+fn check_object(index: usize, table: &Table, values: &Values) -> Result<()> {
+    let value = |name: &str| values.of_object(index, name);
+    let shape = value("shape").and_then(Value::text);
+    match (shape, value("file")) {
+        (None, None) => return Err(table.error("shape", "is missing (or `file`, a mesh)")),
+        (Some(_), Some(_)) => return Err(table.error("file", "excludes `shape`: give one of them")),
+        _ => {}
+    }
+    let needed: &[&str] = match shape {
+        Some("sphere") => &["radius"],
+        Some("capsule") => &["radius", "length"],
+        Some(_) => &["size"],
+        None => &[],
+    };
+    for name in ["radius", "length", "size"] {
+        match (needed.contains(&name), value(name)) {
+            (true, None) => {
+                return Err(table.error(name, format!("is missing: a {} has one", shape.unwrap_or(""))));
+            }
+            (false, Some(_)) => {
+                let of = shape.unwrap_or("mesh");
+                return Err(table.error(name, format!("is not of a {of}: leave it out")));
+            }
+            _ => {}
+        }
+    }
+    let Some(obstacle) = Obstacle::of(values, index) else { return Ok(()) };
+    match &obstacle.form {
+        Form::Sphere(radius) | Form::Capsule(radius, _) if *radius <= 0.0 => {
+            Err(table.error("radius", "must be over 0 m"))
+        }
+        Form::Cuboid(size) if size.iter().any(|length| *length <= 0.0) => {
+            Err(table.error("size", "must be three lengths over 0 m"))
+        }
+        Form::Mesh(..) if obstacle.keys.len() > 1 => {
+            Err(table.error("keys", "of a file are one at most: a mesh does not move (a shape does)"))
+        }
+        Form::Mesh(path, _) if Pattern::parse(path).is_some() => Err(table
+            .error("file", "must be one file: a mesh does not move (a shape does, and so does the terrain)")),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,77 @@
+//! Sources, drains and absorbers of a scene, at its frames.
+
+use crate::error::{Error, Result};
+use crate::geometry::TriMesh;
+use crate::scene::Scene;
+use crate::scene::shallow::{Inputs, Point, Shallow};
+use crate::shallow;
+use crate::shallow::sources::FlowPoint;
+
+impl Point {
+    /// Its rate on the way to a frame (m3/s).
+    fn rate(&self, frame: i32) -> f64 {
+        if self.acts(frame) { self.point.rate } else { 0.0 }
+    }
+}
+
+/// All of them, as they are on the way to a frame; those that follow the terrain on its mesh of that frame, which there is where it moves.
+pub(in crate::scene::shallow) fn at(
+    of: &Shallow,
+    inputs: &Inputs,
+    mesh: Option<&TriMesh>,
+    frame: i32,
+) -> Vec<FlowPoint> {
+    let at = |(index, point): (usize, &Point)| {
+        let on = inputs.attached.get(index).and_then(Option::as_ref).zip(mesh);
+        let at = on.map_or(point.point.at, |(on, mesh)| on.place(mesh));
+        FlowPoint { at, rate: point.rate(frame), ..point.point.clone() }
+    };
+    of.points.iter().enumerate().map(at).collect()
+}
+
+/// Puts them on a liquid's columns at the first frame.
+///
+/// # Errors
+/// One that lies inside solid or beyond the area, with its name.
+pub(in crate::scene::shallow) fn place(
+    scene: &Scene,
+    of: &Shallow,
+    liquid: &mut shallow::Shallow,
+    points: &[FlowPoint],
+) -> Result<()> {
+    let named = |index: usize| of.points[index].title();
+    liquid.set_flows(points, named).map_err(|error| match error {
+        Error::Argument(what) => Error::file(&scene.path, what),
+        other => other,
+    })
+}
+
+/// Moves, opens and closes them, from how they were to how they are on the way to the next frame.
+///
+/// # Errors
+/// None.
+pub(in crate::scene::shallow) fn turn(
+    liquid: &mut shallow::Shallow,
+    before: &[FlowPoint],
+    now: &[FlowPoint],
+) -> Result<()> {
+    for (index, (before, now)) in before.iter().zip(now).enumerate() {
+        if now.at != before.at {
+            liquid.move_flow(index, now.at);
+        }
+        if now.rate != before.rate {
+            liquid.set_rate(index, now.rate)?;
+        }
+    }
+    Ok(())
+}
+
+/// Those that should act on the way to a frame and cannot, as they lie inside solid or beyond the area.
+pub(in crate::scene::shallow) fn resting<'a>(
+    of: &'a Shallow,
+    liquid: &'a shallow::Shallow,
+    frame: i32,
+) -> impl Iterator<Item = &'a Point> {
+    let rests = move |(index, point): &(usize, &Point)| point.acts(frame) && liquid.is_resting(*index);
+    of.points.iter().enumerate().filter(rests).map(|(_, point)| point)
+}

@@ -1,0 +1,300 @@
+//! Everything that a scene with `[shallow]` reads before its first frame.
+
+mod attached;
+mod consistency;
+pub(in crate::scene::shallow) mod flow_points;
+pub(in crate::scene::shallow) mod obstacles;
+pub(in crate::scene::shallow) mod pours;
+pub(in crate::scene::shallow) mod scalars;
+pub(in crate::scene::shallow) mod terrain;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::estimate::memory;
+use super::stage::liquid_over_time::Course;
+use super::{Point, Shallow};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::geometry::check::orientation::Orientation;
+use crate::geometry::{DVec3, TriMesh, mesh};
+use crate::io::files::source;
+use crate::io::records::input_hashes::Seen;
+use crate::motion::Space;
+use crate::scene::Scene;
+use crate::shallow::columns::grid::{Grid, Heights, MOST_CELLS};
+use crate::shallow::terrain::facing::facing;
+use crate::shallow::terrain::{Solids, triangles};
+use attached::{Attached, attach};
+use terrain::{Terrain, read_mesh};
+
+/// Room above the terrain, where `top` is left out: share of the terrain's height, and the least (m).
+const ROOM: (f64, f64) = (0.25, 0.1);
+/// A terrain wider than this (m) looks like one in millimetres or centimetres.
+const WIDE: f64 = 20.0;
+
+/// What to say of a mesh (m) that 32-bit numbers round too much.
+fn too_far(path: &Path, mesh: &TriMesh, cell: f64) -> Option<String> {
+    mesh::too_far(&path.display().to_string(), mesh.farthest(), 1.0, cell, mesh::BY_KEY)
+}
+
+/// What a scene's files hold.
+pub struct Inputs {
+    /// The cells.
+    pub grid: Grid,
+    /// The heights of ground and liquid.
+    pub heights: Heights,
+    /// Least and greatest corner of the terrain at the first frame (m).
+    pub bounds: [DVec3; 2],
+    /// Triangles of the terrain, where it is a mesh.
+    pub triangles: Option<usize>,
+    /// The terrain at the first frame, with the meshes that stand on it.
+    pub(super) solids: Solids,
+    /// The meshes that stand on it (m).
+    pub(super) meshes: Vec<TriMesh>,
+    /// The terrain at the first frame, where it is a mesh that moves.
+    pub(super) moving: Option<TriMesh>,
+    /// The terrain, where it is a mesh that does not move, and minimum heights or stains are wanted.
+    pub(super) still: Option<TriMesh>,
+    /// What each of the scene's points moves with, where it follows the terrain.
+    pub(super) attached: Vec<Option<Attached>>,
+    /// How the terrain's triangles are turned.
+    pub(super) orientation: Orientation,
+    /// Whether all of them are turned after that, as they face down.
+    pub(super) is_turned: bool,
+    /// What the files held when they were read.
+    pub(in crate::scene) seen: Arc<Seen>,
+    /// What about the files should be told, a sentence each; the log has it too.
+    pub warnings: Vec<String>,
+}
+
+impl Inputs {
+    /// Reads the terrain of the first frame and the meshes on it, after checking that no file of any frame is missing.
+    ///
+    /// # Errors
+    /// What the files or keys have wrong, with file and key: a source inside solid, liquid that does not fit; cells that need more memory
+    /// than the context allows; cancel.
+    pub fn load(ctx: &Context, scene: &Scene) -> Result<Self> {
+        let (shallow, frames) = (scene.shallow()?, scene.shot.frames);
+        if shallow.output.vdb && !cfg!(feature = "vdb") {
+            let what = "output.volume = [\"vdb\"] needs OpenVDB, which this frazil was built without";
+            return Err(Error::file(&scene.path, what));
+        }
+        if shallow.sequence().is_some() {
+            frames.iter().try_for_each(|frame| source::open(&shallow.terrain_at(frame)).map(drop))?;
+        }
+        let seen = Arc::new(Seen::default());
+        let path = shallow.terrain_at(frames.first);
+        let mut terrain = Terrain::read(shallow, frames.first, &seen)?;
+        let bounds = terrain.bounds();
+        let grid = grid(shallow, &bounds).map_err(|error| told(&scene.path, error))?;
+        let heights = heights(shallow, &bounds).map_err(|error| told(&scene.path, error))?;
+        let mut warnings: Vec<String> = wide(shallow, &path, &bounds).into_iter().collect();
+        if let Terrain::Mesh(mesh) = &terrain {
+            warnings.extend(too_far(&path, mesh, grid.cell));
+        }
+        // What was meant in millimetres takes too much.
+        memory::allow_cells(ctx, &grid)
+            .inspect_err(|_| warnings.iter().for_each(|warning| log::warn!("{warning}")))?;
+        let orientation = terrain.turn_outward();
+        warnings.extend(orientation.warning().map(|what| format!("{}: {what}", path.display())));
+        let mut solids = terrain.solids(ctx, grid, heights).map_err(|error| told(&path, error))?;
+        let mut is_turned = false;
+        if solids.layers() == 0
+            && let Terrain::Mesh(mesh) = terrain
+        {
+            let mesh = mesh.reversed();
+            solids = triangles::solids(&mesh.positions, &mesh.triangles, grid, heights)?;
+            is_turned = solids.layers() > 0;
+            if is_turned {
+                warnings.push(format!("{}: its triangles face down: they are turned round", path.display()));
+            }
+            terrain = Terrain::Mesh(mesh);
+        }
+        if solids.layers() == 0 {
+            let [x0, z0, x1, z1] = area(&grid);
+            let what = format!(
+                "has no surface that faces up within x {x0:.6} to {x1:.6} m and z {z0:.6} to {z1:.6} m (shallow.area, cells of {} m)",
+                grid.cell
+            );
+            return Err(Error::file(path, what));
+        }
+        let mut meshes = obstacles::meshes(shallow, frames.first, &seen)?;
+        for (mesh, own) in meshes.iter_mut().zip(shallow.obstacles.iter().filter_map(|own| own.file())) {
+            let orientation = facing(mesh);
+            *mesh = orientation.applied_to(std::mem::take(mesh));
+            warnings.extend(orientation.warning().map(|what| format!("{}: {what}", own.display())));
+            let on_it = triangles::solids(&mesh.positions, &mesh.triangles, grid, heights);
+            let on_it = on_it.map_err(|error| told(own, error))?;
+            warnings.extend(too_far(own, mesh, grid.cell));
+            if orientation.has_open() && orientation.warning().is_none() {
+                let what = "is not closed: below a surface of it that faces up all is solid";
+                warnings.push(format!("{}: {what}", own.display()));
+            }
+            solids = united(&solids, &on_it);
+        }
+        let mesh = match terrain {
+            Terrain::Mesh(mesh) => Some(mesh),
+            #[cfg(any(feature = "cli", feature = "vdb"))]
+            _ => None,
+        };
+        let triangles = mesh.as_ref().map(|mesh| mesh.triangles.len());
+        let (moving, still) = if shallow.sequence().is_some() { (mesh, None) } else { (None, mesh) };
+        let still = still.filter(|_| shallow.lifts || shallow.skirts || shallow.staining.is_some());
+        let attached = moving.as_ref().map(|mesh| attach(ctx, shallow, mesh)).unwrap_or_default();
+        if let Some(mesh) = &moving {
+            warnings.extend(beside(scene, shallow, mesh, &attached));
+        }
+        let inputs = Self {
+            grid,
+            heights,
+            bounds,
+            triangles,
+            solids,
+            meshes,
+            moving,
+            still,
+            attached,
+            orientation,
+            is_turned,
+            seen,
+            warnings,
+        };
+        inputs.warnings.iter().for_each(|warning| log::warn!("{warning}"));
+        // A source inside solid is refused before anything is written.
+        Course::begin(ctx, (scene, shallow, &inputs))?;
+        Ok(inputs)
+    }
+
+    /// The mesh of the terrain at a frame, where it moves: as many vertices, and the same triangles, as at the first frame.
+    ///
+    /// # Errors
+    /// A file that cannot be read; another mesh; one that reaches beyond the heights.
+    pub(super) fn terrain_at(&self, shallow: &Shallow, frame: i32) -> Result<Option<TriMesh>> {
+        let Some(first) = &self.moving else { return Ok(None) };
+        let path = shallow.terrain_at(frame);
+        let mut mesh = read_mesh(&path, shallow.space, &self.seen)?;
+        let other = |mesh: &TriMesh| {
+            let count = |mesh: &TriMesh| {
+                format!("{} vertices and {} triangles", mesh.positions.len(), mesh.triangles.len())
+            };
+            let what = format!(
+                "is another mesh than that of the first frame, {} and not {}, or has other triangles: a terrain that moves keeps them",
+                count(mesh),
+                count(first)
+            );
+            Error::file(&path, what)
+        };
+        // As at the first frame.
+        if !self.orientation.fits(mesh.triangles.len()) {
+            return Err(other(&mesh));
+        }
+        mesh = self.orientation.applied_to(mesh);
+        if self.is_turned {
+            mesh = mesh.reversed();
+        }
+        if mesh.positions.len() != first.positions.len() || mesh.triangles != first.triangles {
+            return Err(other(&mesh));
+        }
+        let (low, high) = mesh.bounds().unwrap_or_default();
+        let range = [self.heights.low, self.heights.metres(crate::shallow::columns::grid::TOP)];
+        for (name, height, is_beyond) in
+            [("bottom", low.y, f64::from(low.y) < range[0]), ("top", high.y, f64::from(high.y) > range[1])]
+        {
+            if is_beyond {
+                let [from, to] = range;
+                let what = format!(
+                    "reaches {height} m, beyond the heights from {from} to {to} m: give shallow.{name}"
+                );
+                return Err(Error::file(path, what));
+            }
+        }
+        Ok(Some(mesh))
+    }
+}
+
+/// What is solid in either.
+pub(super) fn united(a: &Solids, b: &Solids) -> Solids {
+    let of_cell = |cell: usize| a.cell(cell).iter().chain(b.cell(cell)).copied().collect();
+    Solids::new(a.grid, a.heights, (0..a.grid.cells()).map(of_cell))
+}
+
+/// The cells: as many as fit the area best, in its middle.
+fn grid(shallow: &Shallow, bounds: &[DVec3; 2]) -> Result<Grid> {
+    let [low, high] = bounds;
+    let [x0, z0, x1, z1] = shallow.area.unwrap_or([low.x, low.z, high.x, high.z]);
+    let cell = shallow.cell;
+    let counts = [x1 - x0, z1 - z0].map(|length| (length / cell).round().max(1.0));
+    if let Some(count) = counts.into_iter().find(|count| *count > MOST_CELLS as f64) {
+        return Err(Error::argument(format!(
+            "shallow.cell = {cell} m makes {count} cells of {:.6} x {:.6} m, over {MOST_CELLS} along an axis",
+            x1 - x0,
+            z1 - z0
+        )));
+    }
+    let start = |from: f64, to: f64, count: f64| 0.5 * (from + to) - 0.5 * count * cell;
+    let origin = [start(x0, x1, counts[0]), start(z0, z1, counts[1])];
+    let grid = Grid { cell, origin, size: counts.map(|count| count as usize) };
+    grid.validate()?;
+    Ok(grid)
+}
+
+/// Least and greatest x and z of cells (m): `[x0, z0, x1, z1]`.
+pub(super) fn area(grid: &Grid) -> [f64; 4] {
+    let [x, z] = grid.origin;
+    [x, z, x + grid.size[0] as f64 * grid.cell, z + grid.size[1] as f64 * grid.cell]
+}
+
+/// The heights of ground and liquid.
+fn heights(shallow: &Shallow, bounds: &[DVec3; 2]) -> Result<Heights> {
+    let [low, high] = bounds.each_ref().map(|corner| corner.y);
+    let room = (ROOM.0 * (high - low)).max(ROOM.1);
+    let below = if shallow.sequence().is_some() { low - room } else { low };
+    let bottom = shallow.bottom.unwrap_or(below);
+    let top = shallow.top.unwrap_or(high.max(shallow.fill.unwrap_or(high)) + room);
+    if top <= bottom {
+        return Err(Error::argument(format!(
+            "the heights of ground and liquid go from {bottom} m up to {top} m: give shallow.bottom and shallow.top"
+        )));
+    }
+    Heights::between(bottom, top)
+}
+
+/// What to say of points that follow the terrain from a place beside their own, as it is on a slope and where they were given high above it.
+fn beside(scene: &Scene, shallow: &Shallow, mesh: &TriMesh, attached: &[Option<Attached>]) -> Vec<String> {
+    let told = |(point, attached): (&Point, &Option<Attached>)| {
+        let [x, y, z] = attached.as_ref()?.place(mesh);
+        let [own_x, _, own_z] = point.point.at;
+        let off = ((x - own_x).powi(2) + (z - own_z).powi(2)).sqrt();
+        (off > point.point.radius.max(2.0 * shallow.cell)).then(|| {
+            format!(
+                "{}: {}: the place of the terrain that is nearest to it, with which it moves, lies {off:.6} m beside it, at ({x:.6}, {y:.6}, {z:.6})",
+                scene.path.display(),
+                point.title()
+            )
+        })
+    };
+    shallow.points.iter().zip(attached).filter_map(told).collect()
+}
+
+/// What to say of a terrain that looks as if it were in another unit.
+fn wide(shallow: &Shallow, path: &Path, [low, high]: &[DVec3; 2]) -> Option<String> {
+    let size = high - low;
+    let is_mesh = shallow.image.is_none() && shallow.space.scale == Space::OWN.scale;
+    (is_mesh && size.x.max(size.z) > WIDE).then(|| {
+        format!(
+            "{}: the terrain is {:.1} x {:.1} x {:.1} m (x, y, z): shallow.scale = 0.001 takes millimetres, 0.01 centimetres",
+            path.display(),
+            size.x,
+            size.y,
+            size.z
+        )
+    })
+}
+
+fn told(path: &Path, error: Error) -> Error {
+    match error {
+        Error::Argument(what) => Error::file(path, what),
+        other => other,
+    }
+}

@@ -1,0 +1,153 @@
+//! Obstacles of a scene, where they are at its frames.
+
+use nalgebra::Rotation3;
+
+use crate::error::Result;
+use crate::geometry::{DVec3, TriMesh, Vec3};
+use crate::io::records::input_hashes::Seen;
+use crate::motion::{Key, Keys};
+use crate::scene::KeyPose;
+use crate::scene::shallow::{Form, Obstacle, Shallow};
+use crate::shallow::terrain::shapes::Shape;
+
+use super::terrain::read_mesh;
+
+impl Obstacle {
+    /// Turn and place (m) at a frame.
+    fn pose(&self, frame: i32) -> Result<(Rotation3<f64>, DVec3)> {
+        let key = |pose: &KeyPose| Key {
+            time: pose.frame,
+            at: DVec3::from(pose.at),
+            turn: DVec3::from(pose.turn_deg.map(f64::to_radians)),
+        };
+        let keys = Keys::new(self.keys.iter().map(key).collect())?.with_ease(self.ease);
+        Ok(keys.at(f64::from(frame)))
+    }
+
+    /// Its shape at a frame; none of a mesh.
+    fn shape(&self, frame: i32) -> Result<Option<Shape>> {
+        let (turn, at) = self.pose(frame)?;
+        Ok(match self.form {
+            Form::Sphere(radius) => Some(Shape::Sphere { centre: at, radius }),
+            Form::Capsule(radius, length) => {
+                let half = turn * DVec3::new(0.0, 0.5 * length, 0.0);
+                Some(Shape::Capsule { ends: [at - half, at + half], radius })
+            }
+            Form::Cuboid(size) => {
+                let axes = [DVec3::x(), DVec3::y(), DVec3::z()].map(|axis| turn * axis);
+                Some(Shape::Cuboid { centre: at, axes, half: size.map(|length| 0.5 * length) })
+            }
+            Form::Mesh(..) => None,
+        })
+    }
+
+    /// Its mesh as it stands on the terrain from the first frame on (m); none of a shape.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    fn mesh(&self, first: i32, seen: &Seen) -> Result<Option<TriMesh>> {
+        let Form::Mesh(path, space) = &self.form else { return Ok(None) };
+        let mut mesh = read_mesh(path, *space, seen)?;
+        let (turn, at) = self.pose(first)?;
+        mesh.positions.iter_mut().for_each(|place| *place = (turn * place.cast::<f64>() + at).cast());
+        Ok(Some(mesh))
+    }
+}
+
+/// The shapes of a scene at a frame, in the file's order.
+///
+/// # Errors
+/// None where the scene was read.
+pub(in crate::scene::shallow) fn shapes_at(shallow: &Shallow, frame: i32) -> Result<Vec<Shape>> {
+    let shapes = shallow.obstacles.iter().map(|obstacle| obstacle.shape(frame));
+    Ok(shapes.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
+}
+
+/// The meshes that stand on the terrain, each by itself, in the file's order (m).
+///
+/// # Errors
+/// A file that cannot be read.
+pub(in crate::scene::shallow) fn meshes(shallow: &Shallow, first: i32, seen: &Seen) -> Result<Vec<TriMesh>> {
+    let meshes = shallow.obstacles.iter().map(|obstacle| obstacle.mesh(first, seen));
+    Ok(meshes.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
+}
+
+/// Points around, and from the bottom to the middle, of a ball that is drawn.
+const AROUND: usize = 32;
+const RINGS: usize = 8;
+
+/// A shape as triangles, for a picture.
+pub(in crate::scene::shallow) fn drawn(shape: &Shape) -> TriMesh {
+    match shape {
+        Shape::Sphere { centre, radius } => pill([*centre; 2], *radius),
+        Shape::Capsule { ends, radius } => pill(*ends, *radius),
+        Shape::Cuboid { centre, axes, half } => {
+            let mut mesh = TriMesh::cuboid([-1.0; 3], [1.0; 3]);
+            for place in &mut mesh.positions {
+                let own = place.cast::<f64>();
+                let by = |axis: usize| axes[axis] * (own[axis] * half[axis]);
+                *place = (centre + by(0) + by(1) + by(2)).cast();
+            }
+            mesh
+        }
+    }
+}
+
+/// Two halves of a ball, and what lies between.
+fn pill([from, to]: [DVec3; 2], radius: f64) -> TriMesh {
+    let up = (to - from).try_normalize(0.0).unwrap_or_else(DVec3::y);
+    let helper = if up.x.abs() < 0.7 { DVec3::x() } else { DVec3::z() };
+    let side = helper.cross(&up).normalize();
+    let other = up.cross(&side);
+    let mut positions: Vec<Vec3> = Vec::new();
+    for ring in 0..2 * RINGS {
+        let end = usize::from(ring >= RINGS);
+        // The middle ring is there twice: at both ends.
+        let tilt = (ring - end) as f64 / (2 * RINGS - 2) as f64 * std::f64::consts::PI;
+        let (wide, high) = (radius * libm::sin(tilt), -radius * libm::cos(tilt));
+        for point in 0..AROUND {
+            let angle = point as f64 / AROUND as f64 * std::f64::consts::TAU;
+            let off = side * (wide * libm::cos(angle)) + other * (wide * libm::sin(angle)) + up * high;
+            positions.push(([from, to][end] + off).cast());
+        }
+    }
+    let mut triangles = Vec::new();
+    for ring in 0..2 * RINGS - 1 {
+        for point in 0..AROUND {
+            let at = |ring: usize, point: usize| (ring * AROUND + point % AROUND) as u32;
+            let [a, b, c, d] =
+                [at(ring, point), at(ring + 1, point), at(ring + 1, point + 1), at(ring, point + 1)];
+            triangles.extend([[a, c, b], [a, d, c]]);
+        }
+    }
+    TriMesh { positions, triangles }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drawn_pill_is_as_large_as_its_shape() {
+        let ends = [DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 2.0, 5.0)];
+        let mesh = drawn(&Shape::Capsule { ends, radius: 0.5 });
+        let whole = std::f64::consts::PI * (0.25 * 2.0 + 4.0 / 3.0 * 0.125);
+        assert!((mesh.volume() / whole - 1.0).abs() < 0.03, "{} is not {whole}", mesh.volume());
+        let ball = drawn(&Shape::Sphere { centre: ends[0], radius: 1.0 });
+        assert!((ball.volume() / (4.0 / 3.0 * std::f64::consts::PI) - 1.0).abs() < 0.03, "{}", ball.volume());
+        let half = [1.0, 2.0, 0.5];
+        let turned = [DVec3::y(), -DVec3::x(), DVec3::z()];
+        let cuboid = drawn(&Shape::Cuboid { centre: ends[0], axes: turned, half });
+        assert!((cuboid.volume() - 8.0).abs() < 1e-6, "{}", cuboid.volume());
+    }
+
+    #[test]
+    fn shapes_go_along_their_keys() {
+        let key = |frame, at, turn_deg| KeyPose { frame, at, turn_deg };
+        let keys = vec![key(1.0, [0.0; 3], [0.0; 3]), key(3.0, [2.0, 0.0, 0.0], [0.0, 0.0, 180.0])];
+        let obstacle = Obstacle { form: Form::Capsule(0.1, 2.0), keys, ease: false };
+        let Some(Shape::Capsule { ends, .. }) = obstacle.shape(2).unwrap() else { panic!() };
+        assert!((ends[0] - DVec3::new(2.0, 0.0, 0.0)).norm() < 1e-12, "{ends:?}");
+        assert!((ends[1] - DVec3::new(0.0, 0.0, 0.0)).norm() < 1e-12, "{ends:?}");
+    }
+}

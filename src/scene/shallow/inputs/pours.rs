@@ -1,0 +1,102 @@
+//! Liquid that a scene pours at frames.
+
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::scene::shallow::{ML, Pour, Shallow};
+use crate::shallow::{self, columns::Columns};
+
+/// Pours what a frame has.
+///
+/// # Errors
+/// One over nothing but solid, or beyond the area, or that does not fit, with its name.
+pub(in crate::scene::shallow) fn pour(
+    scene: &Scene,
+    of: &Shallow,
+    liquid: &mut shallow::Shallow,
+    frame: i32,
+) -> Result<()> {
+    let first = scene.shot.frames.first;
+    for (index, pour) in of.pours.iter().enumerate().filter(|(_, pour)| pour.frame.unwrap_or(first) == frame)
+    {
+        let told = |what: String| Error::file(&scene.path, format!("pour.{}: {what}", index + 1));
+        let columns = pour.columns(liquid.columns());
+        if columns.is_empty() {
+            let [x, y, z] = pour.at;
+            return Err(told(format!(
+                "at ({x}, {y}, {z}) there is only solid, or it lies outside of the area"
+            )));
+        }
+        liquid.set_poured(&pour.carries)?;
+        let lacking = pour.volume - spread(liquid, &columns, pour.volume);
+        // What rounding of depths leaves is less than that.
+        let (cell, unit) = (liquid.columns().grid.cell, liquid.columns().heights.unit);
+        if lacking > 1e-6 * pour.volume + columns.len() as f64 * unit * cell * cell {
+            let what = format!(
+                "{} ml do not fit into its circle: {:.6} ml are left (a greater radius or shallow.top)",
+                pour.volume / ML,
+                lacking / ML
+            );
+            return Err(told(what));
+        }
+    }
+    Ok(())
+}
+
+/// Adds a volume (m3) to columns, as deep to each as fits; returns what was added.
+fn spread(liquid: &mut shallow::Shallow, columns: &[usize], volume: f64) -> f64 {
+    let cell = liquid.columns().grid.cell;
+    let least = liquid.columns().heights.unit;
+    let (mut open, mut left) = (columns.to_vec(), volume / (cell * cell));
+    while !open.is_empty() {
+        let each = left / open.len() as f64;
+        if each < least {
+            break;
+        }
+        let mut full = 0;
+        open.retain(|&column| {
+            let added = liquid.pour(column, each);
+            left -= added;
+            let takes_all = added > each - least;
+            full += usize::from(!takes_all);
+            takes_all
+        });
+        if full == 0 {
+            break;
+        }
+    }
+    volume - left * cell * cell
+}
+
+impl Pour {
+    /// The columns in its circle, as a source has them: in each cell the one that its middle lies in, or is nearest to.
+    fn columns(&self, columns: &Columns) -> Vec<usize> {
+        let grid = &columns.grid;
+        let [x, y, z] = self.at;
+        let reach = self.radius / grid.cell + 1.0;
+        let range = |axis: usize, at: f64| {
+            let centre = (at - grid.origin[axis]) / grid.cell;
+            let last = grid.size[axis] as f64 - 1.0;
+            let [low, high] = [centre - reach, centre + reach].map(|at| at.floor().clamp(0.0, last) as usize);
+            low..=high
+        };
+        let mut cells: Vec<[usize; 2]> = Vec::new();
+        for row in range(1, z) {
+            for across in range(0, x) {
+                let [cx, cz] = grid.centre([across, row]);
+                if (cx - x).powi(2) + (cz - z).powi(2) <= self.radius * self.radius {
+                    cells.push([across, row]);
+                }
+            }
+        }
+        if cells.is_empty() {
+            cells.extend(grid.cell_at([x, z]));
+        }
+        let off = |index: usize| {
+            let [base, ceiling] = [columns.bases()[index], columns.ceilings()[index]]
+                .map(|height| columns.heights.metres(height));
+            (base - y).max(y - ceiling).max(0.0)
+        };
+        let nearest = |cell: [usize; 2]| columns.of_cell(cell).min_by(|&i, &j| off(i).total_cmp(&off(j)));
+        cells.into_iter().filter_map(nearest).collect()
+    }
+}

@@ -1,0 +1,245 @@
+//! What the liquid of a scene carries: dyes, ages, and what decays.
+
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::scene::schema::{Table, Value, Values};
+use crate::scene::shallow::{ML, Point, Shallow};
+use crate::shallow::scalars::MOST;
+use crate::shallow::{self, Law, Scalar, ScalarBalance, Thickening};
+
+/// Names that arrays of the surface have anyway, in some file.
+const TAKEN: [&str; 13] =
+    ["x", "y", "z", "v", "vx", "vy", "vz", "depth", "layer", "alpha", "falling", "points", "velocities"];
+
+/// Something that a scene's liquid carries.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Carried {
+    /// Name, law and range.
+    pub scalar: Scalar,
+    /// Concentration of what does not say its own.
+    pub start: f64,
+}
+
+impl Carried {
+    /// Those of a scene, in the file's order.
+    pub(in crate::scene::shallow) fn all_of(values: &Values) -> Vec<Self> {
+        (0..values.count("scalar")).map(|index| Self::of(values, index)).collect()
+    }
+
+    fn of(values: &Values, index: usize) -> Self {
+        let value = |name: &str| values.of_many("scalar", index, name);
+        let number = |name: &str| value(name).and_then(Value::number);
+        let text = |name: &str| value(name).and_then(Value::text);
+        let law = match (text("law"), number("half_life")) {
+            (Some("decays"), Some(half_life)) => Law::Decays(half_life),
+            (Some("ages"), _) => Law::Ages,
+            _ => Law::Dye,
+        };
+        let name = text("name").unwrap_or_default().into();
+        let scalar = Scalar { name, law, range: values.settled("scalar", Some(index), "range") };
+        Self { scalar, start: values.settled("scalar", Some(index), "start") }
+    }
+}
+
+/// How one of the scalars thickens the liquid: the first that does.
+pub(in crate::scene::shallow) fn thickening(values: &Values) -> Option<Thickening> {
+    (0..values.count("scalar")).find_map(|scalar| {
+        let number = |name: &str| values.of_many("scalar", scalar, name).and_then(Value::number);
+        let (times, to) = (number("thickens_times")?, number("thickens_to")?);
+        let from = values.settled("scalar", Some(scalar), "thickens_from");
+        Some(Thickening { scalar, from, to, times })
+    })
+}
+
+/// The scalar that stains: the first that does.
+pub(in crate::scene::shallow) fn staining(values: &Values) -> Option<usize> {
+    (0..values.count("scalar"))
+        .find(|index| values.of_many("scalar", *index, "stains").and_then(Value::flag) == Some(true))
+}
+
+/// Concentrations of the scalars in what a pour or a source brings: those that its `carries` names, and the others' own.
+pub(in crate::scene::shallow) fn brought(values: &Values, table: &str, index: usize) -> Vec<f64> {
+    let named = values.of_many(table, index, "carries").and_then(Value::named);
+    let own = |carried: Carried| {
+        named.and_then(|named| named.get(&carried.scalar.name)).copied().unwrap_or(carried.start)
+    };
+    Carried::all_of(values).into_iter().map(own).collect()
+}
+
+/// Checks what single keys of a `[[scalar]]` do not show; those before it are read.
+///
+/// # Errors
+/// A name that no array can have, or that another has; a key that its law has not, or lacks; one too many.
+pub(in crate::scene::shallow) fn check(index: usize, table: &Table, values: &Values) -> Result<()> {
+    let all = Carried::all_of(values);
+    let Carried { scalar, start } = &all[index];
+    let name = &*scalar.name;
+    if index >= MOST {
+        return Err(table.error("name", format!("is one too many: a liquid carries {MOST} scalars at most")));
+    }
+    let is_word = |name: &str| {
+        let is_letter = |byte: u8| byte.is_ascii_alphabetic() || byte == b'_';
+        name.bytes().next().is_some_and(is_letter)
+            && name.bytes().all(|byte| is_letter(byte) || byte.is_ascii_digit())
+    };
+    if !is_word(name) {
+        return Err(table.error("name", "must be of letters, digits and _, and begin with no digit"));
+    }
+    if TAKEN.contains(&name) {
+        return Err(
+            table.error("name", format!("must not be \"{name}\": the surface has an array of that name"))
+        );
+    }
+    if all[..index].iter().any(|other| other.scalar.name == scalar.name) {
+        return Err(table.error("name", format!("must not be \"{name}\": another scalar has that name")));
+    }
+    let law = values.of_many("scalar", index, "law").and_then(Value::text);
+    match (law, table.has("half_life")) {
+        (Some("decays"), false) => {
+            return Err(table.error("half_life", "is missing: a scalar that decays has one"));
+        }
+        (Some("dye" | "ages"), true) => {
+            return Err(table.error("half_life", "is of law = \"decays\": leave it out"));
+        }
+        _ => {}
+    }
+    if start.abs() > scalar.range {
+        return Err(table.error("start", format!("must lie within -{0} to {0}, its range", scalar.range)));
+    }
+    if values.of_many("scalar", index, "stains").and_then(Value::flag) == Some(true) {
+        if values.get("shallow.stains").and_then(Value::flag) != Some(true) {
+            return Err(table.error("stains", "must be false where shallow.stains is"));
+        }
+        if staining(values).is_some_and(|first| first < index) {
+            return Err(table.error("stains", "must be false: another scalar stains"));
+        }
+    }
+    check_thickening(index, table, values, scalar.range)
+}
+
+/// Checks how a scalar thickens the liquid; those before it are read.
+///
+/// # Errors
+/// A key without the others; a concentration out of range; a second scalar that thickens, or a liquid that cannot.
+fn check_thickening(index: usize, table: &Table, values: &Values, range: f64) -> Result<()> {
+    let number = |name: &str| values.of_many("scalar", index, name).and_then(Value::number);
+    if number("thickens_times").is_none() {
+        return match table.has("thickens_to") {
+            true => Err(table.error("thickens_to", "is of a scalar that has `thickens_times`: leave it out")),
+            false => Ok(()),
+        };
+    }
+    let Some(to) = number("thickens_to") else {
+        return Err(table.error("thickens_to", "is missing: a scalar with `thickens_times` has one"));
+    };
+    let from: f64 = values.settled("scalar", Some(index), "thickens_from");
+    for (name, concentration) in [("thickens_from", from), ("thickens_to", to)] {
+        if concentration.abs() > range {
+            return Err(table.error(name, format!("must lie within -{range} to {range}, its range")));
+        }
+    }
+    if from == to {
+        return Err(table.error("thickens_to", format!("must not be `thickens_from`, {from}")));
+    }
+    if thickening(values).is_some_and(|law| law.scalar < index) {
+        return Err(table.error("thickens_times", "is one too many: another scalar thickens the liquid"));
+    }
+    if crate::scene::shallow::params(values).liquid.viscosity == 0.0 {
+        return Err(table.error("thickens_times", "must be left out where shallow.viscosity is 0"));
+    }
+    Ok(())
+}
+
+/// Checks what a pour or a source carries.
+///
+/// # Errors
+/// A name that no scalar has; a concentration beyond its range.
+pub(in crate::scene::shallow) fn check_brought(
+    name: &str,
+    index: usize,
+    table: &Table,
+    values: &Values,
+) -> Result<()> {
+    let Some(named) = values.of_many(name, index, "carries").and_then(Value::named) else { return Ok(()) };
+    let all = Carried::all_of(values);
+    for (name, concentration) in named {
+        let Some(Carried { scalar, .. }) = all.iter().find(|carried| carried.scalar.name == *name) else {
+            return Err(table.error("carries", format!("names `{name}`, which is the name of no [[scalar]]")));
+        };
+        if concentration.abs() > scalar.range {
+            let what = format!(
+                "has {name} = {concentration}, which is not within -{0} to {0}, its range",
+                scalar.range
+            );
+            return Err(table.error("carries", what));
+        }
+    }
+    Ok(())
+}
+
+impl Shallow {
+    /// Sets what a dry liquid carries.
+    ///
+    /// # Errors
+    /// What the library refuses, with the scene's name.
+    pub(in crate::scene::shallow) fn carry(
+        &self,
+        scene: &Scene,
+        liquid: &mut shallow::Shallow,
+    ) -> Result<()> {
+        let scalars: Vec<Scalar> = self.scalars.iter().map(|carried| carried.scalar.clone()).collect();
+        if scalars.is_empty() {
+            return Ok(());
+        }
+        liquid.set_scalars(&scalars).map_err(|error| match error {
+            Error::Argument(what) => Error::file(&scene.path, format!("scalar.1: {what}")),
+            other => other,
+        })
+    }
+
+    /// Sets what comes in through sources, once these are set.
+    ///
+    /// # Errors
+    /// None where the scene was read.
+    pub(in crate::scene::shallow) fn source_scalars(&self, liquid: &mut shallow::Shallow) -> Result<()> {
+        let is_source = |(_, point): &(usize, &Point)| point.name.0 == "source" && !point.carries.is_empty();
+        let mut sources = self.points.iter().enumerate().filter(is_source);
+        sources.try_for_each(|(index, point)| liquid.set_sourced(index, &point.carries))
+    }
+
+    /// What liquid carries that does not say it.
+    pub(in crate::scene::shallow) fn start(&self) -> Vec<f64> {
+        self.scalars.iter().map(|carried| carried.start).collect()
+    }
+}
+
+/// Where each scalar is, by its name: concentration x volume (its own measure x ml).
+pub(in crate::scene::shallow) fn told(
+    liquid: &shallow::Shallow,
+) -> Result<serde_json::Map<String, serde_json::Value>> {
+    let scalars = liquid.scalars().iter().enumerate();
+    scalars
+        .map(|(index, scalar)| {
+            let balance = liquid.scalar_balance(index)?;
+            let ScalarBalance {
+                inside, poured, sourced, drained, absorbed, lost, gained, held, falling, ..
+            } = balance;
+            let ml = |amount: f64| amount / ML;
+            let told = serde_json::json!({
+                "inside_ml": ml(inside),
+                "poured_ml": ml(poured),
+                "sourced_ml": ml(sourced),
+                "drained_ml": ml(drained),
+                "absorbed_ml": ml(absorbed),
+                "lost_ml": ml(lost),
+                "gained_ml": ml(gained),
+                "held_ml": ml(held),
+                "falling_ml": ml(falling),
+                "grown_ml": ml(balance.grown),
+                "dried_ml": ml(balance.dried),
+                "missing": balance.error as f64,
+            });
+            Ok((scalar.name.clone(), told))
+        })
+        .collect()
+}

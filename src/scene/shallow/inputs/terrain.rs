@@ -1,0 +1,222 @@
+//! The terrain of a scene, as its file has it at a frame.
+
+use std::path::Path;
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::geometry::check::orientation::Orientation;
+use crate::geometry::mesh::weld::Weld;
+use crate::geometry::{DVec3, TriMesh};
+#[cfg(feature = "vdb")]
+use crate::io::files::hash;
+#[cfg(feature = "cli")]
+use crate::io::image;
+use crate::io::mesh::{extension, parse_polygons_from};
+use crate::io::records::input_hashes::Seen;
+use crate::motion::Space;
+use crate::scene::shallow::{ImagePlace, Shallow};
+use crate::shallow::columns::grid::{Grid, Heights};
+use crate::shallow::terrain::facing::facing;
+#[cfg(feature = "cli")]
+use crate::shallow::terrain::height;
+#[cfg(feature = "vdb")]
+use crate::shallow::terrain::sampler;
+use crate::shallow::terrain::{Solids, triangles};
+#[cfg(feature = "vdb")]
+use crate::vdb::{FloatGrid, GridClass, file};
+
+/// What the liquid flows over (m).
+pub(in crate::scene::shallow) enum Terrain {
+    /// Triangles.
+    Mesh(TriMesh),
+    /// A grey image around the origin.
+    #[cfg(feature = "cli")]
+    Image(image::Grey, ImagePlace),
+    /// A level set.
+    #[cfg(feature = "vdb")]
+    Grid(FloatGrid),
+}
+
+impl Terrain {
+    /// Reads that of a frame.
+    ///
+    /// # Errors
+    /// A file that cannot be read, has changed since it was read, or needs what this build lacks.
+    pub fn read(shallow: &Shallow, frame: i32, seen: &Seen) -> Result<Self> {
+        let path = shallow.terrain_at(frame);
+        match (&*extension(&path), shallow.image) {
+            ("vdb", _) => of_vdb(&path, seen),
+            ("png", Some(place)) => of_image(&path, place, seen),
+            _ => Ok(Self::Mesh(read_mesh(&path, shallow.space, seen)?)),
+        }
+    }
+
+    /// Turns the closed parts of a mesh outward; returns how.
+    pub fn turn_outward(&mut self) -> Orientation {
+        match self {
+            Self::Mesh(mesh) => {
+                let orientation = facing(mesh);
+                *mesh = orientation.applied_to(std::mem::take(mesh));
+                orientation
+            }
+            #[cfg(any(feature = "cli", feature = "vdb"))]
+            _ => Orientation::default(),
+        }
+    }
+
+    /// Its least and its greatest corner (m).
+    pub fn bounds(&self) -> [DVec3; 2] {
+        match self {
+            Self::Mesh(mesh) => {
+                let (low, high) = mesh.bounds().unwrap_or_default();
+                [low.cast(), high.cast()]
+            }
+            #[cfg(feature = "cli")]
+            Self::Image(image, place) => {
+                let [x, z] = place.size.map(|length| 0.5 * length);
+                let ends =
+                    image.values.iter().fold([1.0f32, 0.0], |[low, high], v| [low.min(*v), high.max(*v)]);
+                let height = |grey: f32| {
+                    let [black, white] = place.heights;
+                    black + f64::from(grey) * (white - black)
+                };
+                [DVec3::new(-x, height(ends[0]), -z), DVec3::new(x, height(ends[1]), z)]
+            }
+            #[cfg(feature = "vdb")]
+            Self::Grid(grid) => {
+                // The active voxels reach beyond the surface by the width of the band.
+                let (low, high) = grid.active_bbox().unwrap_or_default();
+                let band = f64::from(grid.background()).abs();
+                let corner = |at: [i32; 3]| grid.index_to_world(DVec3::from(at.map(f64::from)));
+                let (low, high) = (corner(low), corner(high));
+                let middle = 0.5 * (low + high);
+                let half =
+                    (0.5 * (high - low) - DVec3::repeat(band)).sup(&DVec3::repeat(0.5 * grid.voxel_size()));
+                [middle - half, middle + half]
+            }
+        }
+    }
+
+    /// The solids of all cells.
+    ///
+    /// # Errors
+    /// As those of [`crate::shallow::terrain`]; cancel.
+    #[cfg_attr(not(feature = "vdb"), expect(unused_variables, reason = "OpenVDB's tools take it"))]
+    pub fn solids(&self, ctx: &Context, grid: Grid, heights: Heights) -> Result<Solids> {
+        match self {
+            Self::Mesh(mesh) => triangles::solids(&mesh.positions, &mesh.triangles, grid, heights),
+            #[cfg(feature = "cli")]
+            Self::Image(image, place) => {
+                let [x, z] = place.size;
+                let image = height::Image {
+                    greys: &image.values,
+                    size: image.size,
+                    corner: [-0.5 * x, -0.5 * z],
+                    extent: place.size,
+                    levels: place.heights,
+                };
+                height::of_image(&image, grid, heights)
+            }
+            #[cfg(feature = "vdb")]
+            Self::Grid(level_set) => {
+                let (voxel, between) = (level_set.voxel_size(), level_set.heights());
+                sampler::solids(grid, heights, voxel, between, |places, out| {
+                    ctx.check()?;
+                    level_set.sample_linear(ctx, places, out)
+                })
+            }
+        }
+    }
+
+    /// As triangles, for a picture: an image's pixels, and the surface of a level set.
+    ///
+    /// # Errors
+    /// Cancel, or what OpenVDB reports.
+    #[cfg_attr(not(feature = "vdb"), expect(unused_variables, reason = "OpenVDB's tools take it"))]
+    pub fn mesh(self, ctx: &Context) -> Result<TriMesh> {
+        match self {
+            Self::Mesh(mesh) => Ok(mesh),
+            #[cfg(feature = "cli")]
+            Self::Image(image, place) => Ok(relief(&image, place)),
+            #[cfg(feature = "vdb")]
+            Self::Grid(grid) => crate::vdb::level_set::to_mesh(ctx, &grid, 0.0, 0.0),
+        }
+    }
+}
+
+/// A mesh (m, Y up), whose vertices that are one corner but for rounding ([`Weld`]) have one position: a column between two triangles that
+/// should share an edge would have neither.
+///
+/// # Errors
+/// A file that cannot be read, or that has changed since it was read.
+pub(in crate::scene::shallow) fn read_mesh(path: &Path, space: Space, seen: &Seen) -> Result<TriMesh> {
+    let mut mesh = parse_polygons_from(path, &seen.read(path)?, space.origin)?.into_triangles();
+    let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
+    let weld = Weld::of(&positions, &mesh.triangles);
+    weld.unify(&mut mesh.positions);
+    if let Some(what) = weld.warning() {
+        log::warn!("{}: {what}", path.display());
+    }
+    if !space.keeps_vectors() {
+        mesh.positions.iter_mut().for_each(|place| *place = space.vector(place.cast()).cast());
+    }
+    Ok(mesh)
+}
+
+#[cfg(feature = "cli")]
+fn of_image(path: &Path, place: ImagePlace, seen: &Seen) -> Result<Terrain> {
+    Ok(Terrain::Image(image::parse(path, &seen.read(path)?)?, place))
+}
+
+#[cfg(not(feature = "cli"))]
+fn of_image(path: &Path, _place: ImagePlace, _seen: &Seen) -> Result<Terrain> {
+    Err(Error::file(path, "needs the feature cli, which this frazil was built without"))
+}
+
+/// A point of each pixel, at its middle.
+#[cfg(feature = "cli")]
+fn relief(image: &image::Grey, place: ImagePlace) -> TriMesh {
+    let [across, down] = image.size;
+    let [black, white] = place.heights;
+    let at =
+        |axis: usize, index: usize| place.size[axis] * ((index as f64 + 0.5) / image.size[axis] as f64 - 0.5);
+    let height = |index: usize| black + f64::from(image.values[index]) * (white - black);
+    let point = |index: usize| {
+        crate::geometry::Vec3::new(
+            at(0, index % across) as f32,
+            height(index) as f32,
+            at(1, index / across) as f32,
+        )
+    };
+    let (width, is_square) = (across as u32, |index: &u32| {
+        (*index as usize) % across + 1 < across && (*index as usize) / across + 1 < down
+    });
+    let square = |index: u32| {
+        let [a, b, c, d] = [index, index + width, index + width + 1, index + 1];
+        [[a, b, c], [a, c, d]]
+    };
+    let count = across * down;
+    let triangles = (0..count as u32).filter(is_square).flat_map(square).collect();
+    TriMesh { positions: (0..count).map(point).collect(), triangles }
+}
+
+#[cfg(feature = "vdb")]
+fn of_vdb(path: &Path, seen: &Seen) -> Result<Terrain> {
+    // OpenVDB reads the file itself: it must be the same before and after.
+    seen.hash(path)?;
+    let grid = file::read_named(path, None)?;
+    seen.note(path, hash::of_file(path)?)?;
+    if grid.class() != GridClass::LevelSet {
+        return Err(Error::file(path, format!("grid \"{}\" is not a level set", grid.name())));
+    }
+    if !grid.is_uniform() || grid.active_bbox().is_none() {
+        let what = if grid.is_uniform() { "is empty" } else { "has voxels that are no cubes" };
+        return Err(Error::file(path, format!("grid \"{}\" {what}", grid.name())));
+    }
+    Ok(Terrain::Grid(grid))
+}
+
+#[cfg(not(feature = "vdb"))]
+fn of_vdb(path: &Path, _seen: &Seen) -> Result<Terrain> {
+    Err(Error::file(path, "needs OpenVDB, which this frazil was built without"))
+}

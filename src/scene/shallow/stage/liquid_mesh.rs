@@ -1,0 +1,191 @@
+//! The surface of the liquid, and what is in the air of it, as one mesh, and its files.
+
+use crate::error::Result;
+use crate::geometry::mesh::attributes::{Number, On};
+use crate::geometry::{MeshArray, TriMesh, Vec3};
+use crate::scene::shallow::{Files, Shallow as Of};
+use crate::shallow::Shallow;
+use crate::shallow::free_fall::Droplet;
+use crate::shallow::free_fall::mesh::{Balls, Target as BallTarget};
+use crate::shallow::scalars::MOST;
+use crate::shallow::surface::heights::minimum_heights::{Distance, Lifts};
+use crate::shallow::surface::rim::ledges::Ledges;
+use crate::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target};
+
+/// Least height of a wet vertex above its ground, in cells: the ground does not show through a film (thesis 4.2.4).
+const LEAST_DEPTH: f64 = 0.05;
+/// Depth from which a wet vertex is at its full height, in cells, so that none jumps as its column wets or dries.
+const FADE_DEPTH: f64 = 0.02;
+
+/// Makes meshes; keeps its memory from one to the next.
+#[derive(Default)]
+pub(in crate::scene::shallow) struct Mesher {
+    surface: Surface,
+    balls: Balls,
+    lifts: Lifts,
+    ledges: Option<Ledges>,
+    velocity: Vec<[f32; 2]>,
+    concentrations: [Vec<f32>; MOST],
+    drops: Vec<Droplet>,
+}
+
+/// The surface at a frame, and the drops in the air behind it (m, m/s).
+#[derive(Default)]
+pub(in crate::scene::shallow) struct Drawn {
+    pub mesh: TriMesh,
+    /// Velocities of the surface.
+    pub velocities: Vec<Vec3>,
+    /// Depths; of drops their diameters.
+    pub depths: Vec<f32>,
+    /// Opacities: depth / the depth from which it is opaque, at most 1.
+    pub alpha: Vec<f32>,
+    pub layers: Vec<u32>,
+    /// Vertices from this one on are in the air; none where liquid does not fall.
+    pub falling: Option<usize>,
+    /// Scalars by name.
+    pub scalars: Vec<(String, Vec<f32>)>,
+}
+
+impl Mesher {
+    /// Finds minimum heights over the ground, none where it is no mesh, and where it ends, if a shot wants them.
+    ///
+    /// # Errors
+    /// A mesh with a vertex that is not finite.
+    pub fn fit(&mut self, liquid: &Shallow, ground: Option<TriMesh>, of: &Of) -> Result<()> {
+        let columns = liquid.columns();
+        let ledges = of.skirts.then(|| self.ledges.get_or_insert_default());
+        let Some(TriMesh { positions, triangles }) = &ground else {
+            ledges.into_iter().for_each(|ledges| ledges.find(columns));
+            return Ok(());
+        };
+        if let Some(ledges) = ledges {
+            ledges.fit(columns, positions, triangles)?;
+        }
+        if of.lifts {
+            self.lifts.find(columns, positions, triangles, Distance::default())?;
+        }
+        Ok(())
+    }
+
+    /// The surface of a liquid that is opaque from a depth on (m).
+    ///
+    /// # Errors
+    /// None of a liquid's own columns.
+    pub fn draw(&mut self, liquid: &Shallow, opaque_depth: f64) -> Result<Drawn> {
+        let Self { surface, balls, lifts, ledges, velocity, concentrations, drops } = self;
+        let columns = liquid.columns();
+        velocity.clear();
+        velocity.extend((0..columns.len()).map(|index| liquid.velocity(index)));
+        for (index, concentrations) in concentrations.iter_mut().enumerate().take(liquid.scalars().len()) {
+            concentrations.resize(columns.len(), 0.0);
+            liquid.concentrations(index, concentrations)?;
+        }
+        drops.clear();
+        drops.extend(liquid.drops());
+        let depths = Depths {
+            depth: liquid.depths(),
+            velocity,
+            least: lifts.least(),
+            sunk: lifts.sunk(),
+            ledges: ledges.as_ref(),
+            carried: concentrations.each_ref().map(|numbers| &numbers[..]),
+            ..Depths::default()
+        };
+        let on_ground = surface.count(columns, &depths)?;
+        let all = sum(on_ground, balls.count(drops));
+        let mut drawn = Drawn::with_room(liquid, all, on_ground.vertices);
+        let (mut places, mut speeds) = (vec![0.0; 3 * all.vertices], vec![0.0; 3 * all.vertices]);
+        let cell = columns.grid.cell;
+        let layout = Layout {
+            least_depth: LEAST_DEPTH * cell,
+            fade_depth: if lifts.least().is_empty() { 0.0 } else { FADE_DEPTH * cell },
+            opaque_depth,
+            ..Layout::default()
+        };
+        let mut carried = [const { None }; MOST];
+        carried.iter_mut().zip(&mut drawn.scalars).for_each(|(to, (_, own))| *to = Some(&mut own[..]));
+        let mut target = Target {
+            positions: Some(&mut places),
+            velocities: Some(&mut speeds),
+            depths: Some(&mut drawn.depths),
+            opacities: Some(&mut drawn.alpha),
+            layers: Some(&mut drawn.layers),
+            carried,
+            indices: Indices::U32(drawn.mesh.triangles.as_flattened_mut()),
+            ..Target::default()
+        };
+        surface.build(columns, &depths, &layout, &mut target)?;
+        let (first, triangle) = (on_ground.vertices, on_ground.indices / 3);
+        let mut of_drops = vec![0; all.vertices - first];
+        let mut target = BallTarget {
+            positions: Some(&mut places[3 * first..]),
+            velocities: Some(&mut speeds[3 * first..]),
+            drops: Some(&mut of_drops),
+            indices: Indices::U32(drawn.mesh.triangles[triangle..].as_flattened_mut()),
+            ..BallTarget::default()
+        };
+        balls.build(drops, &layout, &mut target)?;
+        let in_air = drawn.mesh.triangles[triangle..].as_flattened_mut();
+        in_air.iter_mut().for_each(|corner| *corner += first as u32);
+        for (vertex, drop) in (first..).zip(of_drops) {
+            let deep = 2.0 * drops[drop as usize].radius;
+            drawn.depths[vertex] = deep as f32;
+            drawn.alpha[vertex] = (deep / opaque_depth).min(1.0) as f32;
+            for ((_, own), concentration) in drawn.scalars.iter_mut().zip(drops[drop as usize].concentrations)
+            {
+                own[vertex] = concentration;
+            }
+        }
+        let vectors = |numbers: &[f32]| numbers.as_chunks::<3>().0.iter().map(|&v| Vec3::from(v)).collect();
+        drawn.mesh.positions = vectors(&places);
+        drawn.velocities = vectors(&speeds);
+        Ok(drawn)
+    }
+}
+
+/// Counts of two meshes in one.
+fn sum(a: Counts, b: Counts) -> Counts {
+    Counts { vertices: a.vertices + b.vertices, extras: a.extras + b.extras, indices: a.indices + b.indices }
+}
+
+impl Drawn {
+    /// Nothing, with the arrays that a scene's liquid has.
+    pub fn empty(of: &Of) -> Self {
+        let named = |name: &String| (name.clone(), Vec::new());
+        let scalars = of.scalars.iter().map(|carried| named(&carried.scalar.name)).collect();
+        Self { falling: of.params.falls.map(|_| 0), scalars, ..Self::default() }
+    }
+
+    /// Room for a mesh of a liquid, of which so many vertices are its surface.
+    fn with_room(liquid: &Shallow, counts: Counts, on_ground: usize) -> Self {
+        let Counts { vertices, indices, .. } = counts;
+        let scalar = |scalar: &crate::shallow::Scalar| (scalar.name.clone(), vec![0.0; vertices]);
+        Self {
+            mesh: TriMesh { positions: Vec::new(), triangles: vec![[0; 3]; indices / 3] },
+            velocities: Vec::new(),
+            depths: vec![0.0; vertices],
+            alpha: vec![0.0; vertices],
+            layers: vec![0; vertices],
+            falling: liquid.params().falls.map(|_| on_ground),
+            scalars: liquid.scalars().iter().map(scalar).collect(),
+        }
+    }
+
+    /// The arrays that are asked for, besides velocities.
+    pub fn arrays(&self, output: Files) -> Vec<MeshArray> {
+        let array =
+            |name: &str, number, values| MeshArray { name: name.into(), on: On::Vertices, number, values };
+        let floats = |values: &[f32]| values.iter().map(|value| f64::from(*value)).collect();
+        let depth = output.depth.then(|| array("depth", Number::F32, floats(&self.depths)));
+        let alpha = output.alpha.then(|| array("alpha", Number::F32, floats(&self.alpha)));
+        let layers = || self.layers.iter().map(|layer| f64::from(*layer)).collect();
+        let layer = output.layer.then(|| array("layer", Number::U16, layers()));
+        let count = self.layers.len();
+        let in_air = |first: usize| (0..count).map(|vertex| f64::from(u8::from(vertex >= first))).collect();
+        let falling = self.falling.filter(|_| output.falling);
+        let falling = falling.map(|first| array("falling", Number::U8, in_air(first)));
+        let scalars = self.scalars.iter().filter(|_| output.scalars);
+        let scalars = scalars.map(|(name, values)| array(name, Number::F32, floats(values)));
+        depth.into_iter().chain(alpha).chain(layer).chain(falling).chain(scalars).collect()
+    }
+}

@@ -1,0 +1,339 @@
+//! The stage `liquid`: a little liquid flows over a terrain.
+
+pub(in crate::scene::shallow) mod liquid_mesh;
+pub(in crate::scene::shallow) mod liquid_over_time;
+#[cfg(feature = "vdb")]
+mod liquid_volume;
+mod saved_liquid;
+
+use serde_json::json;
+
+use super::inputs::scalars;
+use super::{Inputs, ML, ROLES, Shallow};
+use crate::context::{Context, PhaseTime};
+use crate::error::{Error, Result};
+use crate::geometry::mesh::attributes::{Number, On};
+use crate::geometry::{MeshArray, TriMesh};
+use crate::io::records::manifest::Keeps;
+use crate::io::usd::materials::Look;
+use crate::io::usd::primvars;
+use crate::io::{mesh, usd};
+use crate::scene::run::{
+    CONTENT, Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Report, Settings, Stage, Stepped, Stepping,
+    Stored, To, Volume,
+};
+use crate::scene::schema::keys::{first_of, settings_of};
+use crate::scene::{Scene, System};
+use crate::shallow;
+use crate::shallow::remap::Moved;
+use liquid_mesh::{Drawn, Mesher};
+use liquid_over_time::Course;
+
+/// Name of the stage, and kind of its files.
+const NAME: &str = "liquid";
+/// Kind of its volumes.
+const VOLUME: &str = "volume";
+/// Kind of the files of a terrain with stains.
+const TERRAIN: &str = "terrain";
+/// What the clips of `liquid/` share.
+const MANIFEST: &str = "liquid/liquid.manifest.usda";
+
+/// The stage for a scene.
+pub struct Liquid<'a> {
+    scene: &'a Scene,
+    of: &'a Shallow,
+    inputs: &'a Inputs,
+}
+
+/// The liquid at a frame.
+pub struct State<'a> {
+    course: Course<'a>,
+    mesher: Mesher,
+}
+
+/// Input of the writer: the liquid at a frame, if its files are written.
+pub struct Step(Option<Written>);
+
+struct Written {
+    drawn: Drawn,
+    state: Vec<u8>,
+    /// A .vdb file.
+    volume: Option<Vec<u8>>,
+    /// The terrain and its stains.
+    terrain: Option<(TriMesh, Vec<f32>)>,
+}
+
+impl<'a> Liquid<'a> {
+    /// The stage for a scene.
+    pub fn new(scene: &'a Scene, of: &'a Shallow, inputs: &'a Inputs) -> Self {
+        Self { scene, of, inputs }
+    }
+
+    /// Takes the liquid to a frame, which may be the one that it is at, and tells of points that cannot act any more.
+    fn go(&self, ctx: &Context, course: &mut Course<'a>, frame: i32) -> Result<(shallow::Report, Moved)> {
+        if frame <= course.frame {
+            return Ok(Default::default());
+        }
+        let before = course.resting();
+        let did = course.go(ctx)?;
+        for point in course.resting().iter().filter(|point| !before.contains(point)) {
+            let path = self.scene.path.display();
+            log::warn!(
+                "{path}: {point}: at frame {frame} it lies inside solid or outside of the area, and rests until it does not"
+            );
+        }
+        Ok(did)
+    }
+
+    /// What a frame's files are made from.
+    fn written(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>, made_from: &str) -> Result<Written> {
+        let State { course, mesher } = state;
+        if std::mem::take(&mut course.is_stirred) {
+            ctx.phase("lifts", || mesher.fit(&course.liquid, course.ground(), self.of))?;
+        }
+        let liquid = &course.liquid;
+        let drawn = ctx.phase("surface", || mesher.draw(liquid, self.of.opaque_depth))?;
+        let volume = self.volume(ctx, liquid, to.frame, made_from)?;
+        let state = saved_liquid::save(&course.shapes, &course.points, liquid, course.stains.as_ref());
+        Ok(Written { drawn, state, volume, terrain: course.stained()? })
+    }
+
+    #[cfg(feature = "vdb")]
+    fn volume(
+        &self,
+        ctx: &Context,
+        liquid: &shallow::Shallow,
+        frame: i32,
+        made_from: &str,
+    ) -> Result<Option<Vec<u8>>> {
+        if !self.of.output.vdb {
+            return Ok(None);
+        }
+        liquid_volume::bytes(ctx, self.scene, self.of, liquid, frame, made_from).map(Some)
+    }
+
+    #[cfg(not(feature = "vdb"))]
+    fn volume(
+        &self,
+        _ctx: &Context,
+        _liquid: &shallow::Shallow,
+        _frame: i32,
+        _made_from: &str,
+    ) -> Result<Option<Vec<u8>>> {
+        Ok(None)
+    }
+
+    /// What the liquid looks like in USD.
+    fn look(&self) -> Look {
+        match &*self.of.look {
+            "water" => Look::Water,
+            "paint" => Look::Paint,
+            "honey" => Look::Honey,
+            _ => Look::Blood,
+        }
+    }
+}
+
+impl Stage for Liquid<'_> {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn noun(&self) -> &'static str {
+        "liquid"
+    }
+
+    fn kinds(&self) -> &'static [Kind] {
+        &[
+            Kind { name: NAME, extensions: &["ply", "usda"] },
+            Kind { name: VOLUME, extensions: &["vdb"] },
+            Kind { name: TERRAIN, extensions: &["ply"] },
+        ]
+    }
+
+    fn writes(&self, kind: &str) -> bool {
+        let output = self.of.output;
+        match kind {
+            VOLUME => output.vdb,
+            TERRAIN => self.of.staining.is_some(),
+            _ => output.ply || output.usd,
+        }
+    }
+
+    fn state_extension(&self) -> &'static str {
+        NAME
+    }
+
+    fn keeps_every_state(&self) -> bool {
+        true
+    }
+
+    fn loose_files(&self) -> &'static [&'static str] {
+        if self.of.output.usd { &[MANIFEST] } else { &[] }
+    }
+
+    fn settings(&self) -> Result<Settings> {
+        let seen = &self.inputs.seen;
+        let mut settings = settings_of(self.scene, NAME, seen, ROLES)?;
+        let content = match self.of.sequence() {
+            Some(_) => "of each frame".to_string(),
+            None => seen.hash(&self.of.terrain)?,
+        };
+        settings.insert("shallow.terrain".into(), format!("{CONTENT}{content}"));
+        for (index, obstacle) in self.of.obstacles.iter().enumerate() {
+            if let Some(path) = obstacle.file() {
+                settings
+                    .insert(format!("object[{}].file", index + 1), format!("{CONTENT}{}", seen.hash(path)?));
+            }
+        }
+        Ok(settings)
+    }
+
+    fn of_first_state(&self, settings: &Settings) -> Settings {
+        first_of(System::Shallow, settings, NAME)
+    }
+
+    fn reads(&self, frame: i32) -> Reads {
+        let files = self.of.sequence().map(|_| self.of.terrain_at(frame));
+        Reads { files: files.into_iter().collect(), ahead: Vec::new() }
+    }
+
+    fn keeps(&self, _frame: i32) -> Keeps {
+        Keeps::State
+    }
+
+    fn volumes(&self) -> Vec<Volume> {
+        #[cfg(feature = "vdb")]
+        if self.of.output.vdb {
+            return vec![liquid_volume::of_shot(VOLUME)];
+        }
+        Vec::new()
+    }
+
+    fn clip(&self) -> Option<Clip<'_>> {
+        let arrays = Drawn::empty(self.of).arrays(self.of.output);
+        let primvars = primvars::primvars(&arrays.iter().collect::<Vec<&MeshArray>>());
+        let mesh = MovingMesh { name: NAME.into(), look: self.look(), uvs: None, primvars };
+        Some(Clip { kind: NAME, manifest: MANIFEST, prims: Prims::Meshes(vec![mesh]) })
+    }
+}
+
+impl<'a> Stepping for Liquid<'a> {
+    type State = State<'a>;
+    type Step = Step;
+    type Writer = ();
+
+    fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State<'a>> {
+        let of = (self.scene, self.of, self.inputs);
+        let course = match after {
+            None => Course::begin(ctx, of)?,
+            Some(frame) => {
+                let path = done.state_file(frame)?;
+                let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
+                Course::resume(ctx, of, frame, &bytes).map_err(|error| match error {
+                    Error::Bytes(what) => Error::file(path, what),
+                    other => other,
+                })?
+            }
+        };
+        Ok(State { course, mesher: Mesher::default() })
+    }
+
+    fn step(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>) -> Result<Stepped<Step>> {
+        let ((step, did), phases) = ctx.step(4, || {
+            let did = self.go(ctx, &mut state.course, to.frame)?;
+            let written =
+                to.made_from.map(|made_from| self.written(ctx, state, to, made_from)).transpose()?;
+            Ok((Step(written), did))
+        })?;
+        let report = told(&state.course, did, step.0.as_ref(), phases)?;
+        Ok(Stepped { step, report })
+    }
+
+    fn writer(&self, _ctx: &Context, _state: &State<'a>) -> Result<()> {
+        Ok(())
+    }
+
+    fn writes_alone(&self) -> bool {
+        true
+    }
+
+    fn write(&self, _writer: &mut (), step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
+        let (Some(Written { drawn, state, volume, terrain }), Some(files)) = (step.0, files) else {
+            return Ok(());
+        };
+        let output = self.of.output;
+        let arrays = drawn.arrays(output);
+        let arrays: Vec<&MeshArray> = arrays.iter().collect();
+        if output.ply {
+            let velocities = if output.velocities { &drawn.velocities[..] } else { &[] };
+            let carried = mesh::Carried { velocities, uvs: None, arrays: &arrays };
+            files.save(NAME, "ply", &mesh::ply_bytes(&drawn.mesh, &carried))?;
+        }
+        if output.usd {
+            let frame = usd::MeshFrame {
+                name: NAME,
+                points: &drawn.mesh.positions,
+                velocities: &drawn.velocities,
+                triangles: &drawn.mesh.triangles,
+                uvs: None,
+                arrays: &arrays,
+            };
+            let text = usd::clip(NAME, files.frame, self.scene.shot.fps, usd::Units::OWN, &[frame]);
+            files.save(NAME, "usda", text.as_bytes())?;
+        }
+        if let Some(volume) = volume {
+            files.save(VOLUME, "vdb", &volume)?;
+        }
+        if let Some((mesh, stains)) = terrain {
+            let values = stains.into_iter().map(f64::from).collect();
+            let stain = MeshArray { name: "stain".into(), on: On::Vertices, number: Number::F32, values };
+            let carried = mesh::Carried { velocities: &[], uvs: None, arrays: &[&stain] };
+            files.save(TERRAIN, "ply", &mesh::ply_bytes(&mesh, &carried))?;
+        }
+        files.save_state(&state)
+    }
+}
+
+/// What the report of a frame says.
+fn told(
+    course: &Course<'_>,
+    (report, moved): (shallow::Report, Moved),
+    written: Option<&Written>,
+    phases: Vec<PhaseTime>,
+) -> Result<Report> {
+    let liquid = &course.liquid;
+    let (balance, depths) = (liquid.balance(), liquid.depths());
+    let wet = depths.iter().filter(|depth| **depth > 0).count();
+    let deepest = depths.iter().copied().max().unwrap_or(0);
+    let mesh = written.map(|written| &written.drawn.mesh);
+    let ml = |cubic: f64| cubic / ML;
+    let serde_json::Value::Object(results) = json!({
+        "inside_ml": ml(balance.inside),
+        "poured_ml": ml(balance.poured),
+        "sourced_ml": ml(balance.sourced),
+        "drained_ml": ml(balance.drained),
+        "absorbed_ml": ml(balance.absorbed),
+        "lost_ml": ml(balance.lost),
+        "gained_ml": ml(balance.gained),
+        "falling_ml": ml(balance.falling),
+        "missing_units": balance.error,
+        "drops": liquid.drops().len(),
+        "scalars": scalars::told(liquid)?,
+        "wet_columns": wet,
+        "deepest_m": liquid.columns().heights.length(deepest.into()),
+        "displaced_ml": ml(moved.displaced),
+        "held_ml": ml(moved.held),
+        "resting": course.resting(),
+        "steps": report.steps,
+        "simulated_s": liquid.time(),
+        "emptied_rows": report.emptied,
+        "filled_rows": report.filled,
+        "slowed_rows": report.slowed,
+        "vertices": mesh.map_or(0, |mesh| mesh.positions.len()),
+        "triangles": mesh.map_or(0, |mesh| mesh.triangles.len()),
+    }) else {
+        unreachable!("it is written as an object")
+    };
+    Ok(Report { results, phases })
+}

@@ -1,0 +1,132 @@
+//! How much space the files of a mesh that follows a liquid will need.
+
+use crate::geometry::mesh::attributes::On;
+use crate::geometry::{DetailedMesh, MeshArray};
+use crate::scene::surface::Files;
+
+/// Bytes of a 32-bit float in a text, with what stands around it.
+const TEXT: u64 = 12;
+/// Bytes around an index in a text.
+const AROUND_INDEX: u64 = 2;
+/// Bytes of a vertex in the exact state: its place in 64 bits, the distance that it keeps, its flag. Places hardly pack.
+const STATE_PER_VERTEX: u64 = 3 * 8 + 4 + 1;
+/// More of a mesh that is rebuilt: its displacement since a reference.
+const DRIFT_PER_VERTEX: u64 = 3 * 4;
+/// Bytes of a frame's report and record; parts that the mesh does not cover, of which up to a hundred are listed, make it more.
+const RECORDS: u64 = 6000;
+
+/// Bytes of a frame's files; 0: that kind is not written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::scene::surface) struct FrameSize {
+    ply: u64,
+    obj: u64,
+    usd: u64,
+    /// The exact state, which every frame keeps.
+    state: u64,
+}
+
+impl FrameSize {
+    /// Estimates it for a mesh, which is rebuilt or not.
+    pub fn of(output: Files, is_rebuilt: bool, detail: &DetailedMesh) -> Self {
+        let [vertices, triangles] = counts(detail);
+        let (places, corners) = detail.uvs.as_ref().map_or((0, 0), |uvs| {
+            (uvs.places.len() as u64, uvs.corners.as_ref().map_or(0, |corners| corners.len() as u64))
+        });
+        let index = u64::from(vertices.max(places).max(1).ilog10()) + 1 + AROUND_INDEX;
+        // In .obj files every corner names its texture coordinates, where there are some.
+        let named = if places > 0 { 6 * triangles } else { 3 * triangles };
+        let obj = TEXT * (3 * vertices + 2 * places) + index * named;
+        // Places, velocities and arrays; each face has its count of corners too.
+        let own: usize = detail.arrays.iter().map(|array| array.values.len()).sum();
+        let delta = if output.delta { vertices } else { 0 };
+        let flagged = if output.flagged { vertices } else { 0 };
+        let rebuilt = if output.rebuilt { triangles } else { 0 };
+        let usd = TEXT * (6 * vertices + 2 * places + own as u64 + delta)
+            + index * (3 * triangles + corners)
+            + (1 + AROUND_INDEX) * (triangles + flagged + rebuilt);
+        let if_asked = |is_asked: bool, bytes: u64| if is_asked { bytes } else { 0 };
+        Self {
+            ply: if_asked(output.ply, ply(output, detail)),
+            obj: if_asked(output.obj, obj),
+            usd: if_asked(output.usd, usd),
+            state: (STATE_PER_VERTEX + if_asked(is_rebuilt, DRIFT_PER_VERTEX)) * vertices,
+        }
+    }
+
+    /// Bytes of the largest file but the state: they are written one after the other.
+    pub fn largest(&self) -> u64 {
+        self.ply.max(self.obj).max(self.usd)
+    }
+
+    /// Bytes of all, with report and record.
+    pub fn sum(&self) -> u64 {
+        self.ply + self.obj + self.usd + self.state + RECORDS
+    }
+}
+
+/// Counts of vertices and triangles.
+fn counts(detail: &DetailedMesh) -> [u64; 2] {
+    [detail.mesh.positions.len(), detail.mesh.triangles.len()].map(|count| count as u64)
+}
+
+/// Bytes of a .ply file, which is binary, without its header.
+fn ply(output: Files, detail: &DetailedMesh) -> u64 {
+    let [vertices, triangles] = counts(detail);
+    let attributes =
+        12 * u64::from(output.velocities) + 4 * u64::from(output.delta) + u64::from(output.flagged);
+    let of_face = u64::from(output.rebuilt);
+    // Lists begin with a byte that counts: three indices, and the six coordinates of corners where there are seams.
+    let uvs = detail.uvs.as_ref().map_or(0, |uvs| match uvs.corners {
+        Some(_) => (1 + 6 * 4) * triangles,
+        None => 2 * 4 * vertices,
+    });
+    let own = |array: &MeshArray| {
+        let lists = if array.on == On::Corners { triangles } else { 0 };
+        (array.values.len() * array.number.size()) as u64 + lists
+    };
+    let own: u64 = detail.arrays.iter().map(own).sum();
+    (3 * 4 + attributes) * vertices + (1 + 3 * 4 + of_face) * triangles + uvs + own
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{TriMesh, Uvs, Vec3};
+    use crate::io::mesh::{Carried, ply_bytes};
+
+    #[test]
+    fn a_ply_file_is_as_large_as_said_but_for_its_header() {
+        let mesh = TriMesh {
+            positions: (0..4).map(|n| Vec3::repeat(n as f32)).collect(),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        };
+        let uvs = Uvs { places: vec![[0.5; 2]; 6], corners: Some((0..6).collect()), missing: 0 };
+        let array = |name: &str, on, count: usize| MeshArray {
+            name: name.into(),
+            on,
+            number: crate::geometry::mesh::attributes::Number::F64,
+            values: vec![1.0; count],
+        };
+        let arrays =
+            vec![array("mask", On::Vertices, 4), array("part", On::Faces, 2), array("wet", On::Corners, 6)];
+        let detail = DetailedMesh { mesh, uvs: Some(uvs), arrays };
+        let plain = Files {
+            ply: true,
+            obj: false,
+            usd: false,
+            velocities: false,
+            delta: false,
+            flagged: false,
+            rebuilt: false,
+        };
+        let arrays: Vec<&MeshArray> = detail.arrays.iter().collect();
+        let carried = Carried { velocities: &[], uvs: detail.uvs.as_ref(), arrays: &arrays };
+        let bytes = ply_bytes(&detail.mesh, &carried);
+        let end = b"end_header\n";
+        let header = bytes.windows(end.len()).position(|part| part == end).unwrap() + end.len();
+        assert_eq!(FrameSize::of(plain, true, &detail).ply, (bytes.len() - header) as u64);
+        let moving = Files { velocities: true, delta: true, flagged: true, rebuilt: true, ..plain };
+        let more = 4 * (12 + 4 + 1) + 2;
+        assert_eq!(FrameSize::of(moving, true, &detail).ply, (bytes.len() - header) as u64 + more);
+    }
+}

@@ -1,0 +1,321 @@
+//! How much memory a mesh that follows a liquid will take, before any of it is taken.
+//!
+//! Bytes of each item, from the structures that hold them; lengths in spacings, r:
+//!
+//! | item | of what | bytes |
+//! |---|---|---|
+//! | particle of a frame in memory | place 24, velocity 12, id 8 | 24 to 44 |
+//! | particle of a step | both ends of its way 48, rank 8, velocities at both ends 48 | 56 to 104 |
+//! | particle, while vertices are carried | places before and after 48, in its cell 20 and while sorted 24, its way 12 | 104 |
+//! | node of the grid of maps | coordinate 12, map 112 twice | 236 |
+//! | patch of phi | values twice 512, places in lists and tables 100, crossings 220 | 832 |
+//! | vertex of the particles' surface | place 12 twice, patch 4, connection 8, 2 triangles: twice 12, corners 36 | 156 |
+//! | block of distances | values twice 4096, neighbours and slot 200 | 4296 |
+//! | vertex of the mesh | in three frames 102, projection 130, what is written 87 and 16, in 32 bits twice 24 | 359 |
+//! | triangle of the mesh | in six copies | 72 |
+//!
+//! And where the mesh is rebuilt:
+//!
+//! | item | of what | bytes |
+//! |---|---|---|
+//! | patch of phi, vertex of the particles' surface | once more: those of the next frame | 832, 156 |
+//! | particle of the next frame | place 24, in its cell 20 and while sorted 24 | 68 |
+//! | face of a cell, by area, that the mesh passes through | up to 1.7 edges of the grid, while they are sorted 100 each | 170 |
+//! | block of Gamma | 512 nodes: value 4, in lists with room to grow 64, equation 125 | 98816 |
+//! | triangle near such blocks | in five of them, in 32 bits 132 and a number 4 | 680 |
+//! | vertex of the mesh | in cells 24 and units 12, as cut 25, as it was and is 48, names 12, sizes and drifts in four copies 80, state 36 | 237 |
+//! | triangle of the mesh | on the grid 12, as cut 20, while its edges are looked at 82, state 36 | 150 |
+//! | vertex of the mesh in a coming frame, but for the next | place 24, distance 4, flags 2, size and drift 20, velocities 24, name 8 | 82 |
+//! | triangle of such a mesh | corners twice 24, the mask 8 | 32 |
+//! | particle, where a mesh with ids carries something | its id and its first place | 32 |
+//! | triangle of the first mesh, or of the last edited one, then | in a tree | 84 |
+//! | number that the mesh carries | in two frames 16, state 16; 8 in each coming frame | 32 |
+//! | vertex of a mesh that carries something | where it has its numbers from | 40 |
+//! | triangle of such a mesh | where it has its numbers from 80, in a tree 84 | 164 |
+//!
+//! Gamma is gone when what the mesh carries is brought to what it became: the larger of the two counts. How much of a mesh does not
+//! fit is not known beforehand: a quarter is counted.
+
+use rayon::prelude::*;
+
+use super::disk::FrameSize;
+use crate::geometry::{DVec3, DetailedMesh};
+use crate::scene::surface::Surface;
+use crate::scene::surface::inputs::particle_times::KEPT;
+use crate::surface::Particles;
+
+/// Bytes that every run takes.
+const FIXED: f64 = 64e6;
+/// Bytes of a particle in each frame in memory: place, velocity, id.
+const PARTICLE: [f64; 3] = [24.0, 12.0, 8.0];
+/// Bytes of a particle's way in a step, and of the velocities at both ends of it.
+const WAY: [f64; 2] = [56.0, 48.0];
+/// Bytes of a particle and of a node while the mesh is carried along.
+const CARRYING: [f64; 2] = [104.0, 236.0];
+/// Bytes of a patch, of a vertex of the particles' surface, and of a block of distances.
+const SURFACE: [f64; 3] = [832.0, 156.0, 4296.0];
+/// Bytes of a vertex and of a triangle of the mesh.
+const MESH: [f64; 2] = [359.0, 72.0];
+/// Bytes of a number that the mesh carries, in memory.
+const CARRIED: f64 = 8.0;
+
+/// Where the mesh is rebuilt: bytes of a vertex and of a triangle of the mesh in each coming frame but the next.
+const COMING: [f64; 2] = [82.0, 32.0];
+/// Bytes of a particle's first place with its id, and of a triangle in a tree.
+const REST: f64 = 32.0;
+const TREE: f64 = 84.0;
+/// Bytes of a particle of the next frame, whose surface is made at the same time.
+const AHEAD: f64 = 68.0;
+/// Bytes of a face of a cell that the mesh passes through, of a block of Gamma, and of a triangle near such blocks.
+const CUT: [f64; 3] = [170.0, 98816.0, 680.0];
+/// More bytes of a vertex and of a triangle of the mesh.
+const REBUILT: [f64; 2] = [237.0, 150.0];
+/// More bytes of a number that the mesh carries, and those of a vertex and of a triangle of a mesh that carries any.
+const CARRIED_ON: [f64; 3] = [32.0, 40.0, 164.0];
+/// Share of the mesh that does not fit in a frame: so much of a dam break does while it splashes. Where more does, it takes more.
+const UNFIT: f64 = 0.25;
+/// Blocks of Gamma for each face of a cell in which the mesh does not fit: its own, 8 cells wide, and one on each side.
+const GAMMA: f64 = 3.0 / 64.0;
+
+/// Particles in a cube of two spacings, of which there are 8 in a liquid, from which on it is full.
+const FULL: usize = 4;
+/// Nodes of the grid of maps for each cube of the shell.
+const NODES: f64 = 4.0;
+/// How far distances reach on each side (r): enough for detail of half a spacing.
+const REACH: f64 = 2.0;
+
+/// The most that the particles of any file take.
+#[derive(Debug, Default)]
+pub(in crate::scene::surface) struct Most {
+    /// Bytes of a frame's particles.
+    frame: f64,
+    /// Bytes of their ways.
+    ways: f64,
+    /// Bytes of the work on them.
+    work: f64,
+    /// Bytes of ids and places that stay, for textures.
+    rest: f64,
+    /// Bytes of their surface, made early.
+    ahead: f64,
+    /// Area of their surface (faces of cells).
+    area: f64,
+    /// Edge of a cell (m).
+    edge: f64,
+}
+
+impl Most {
+    /// Counts the particles of a file, whose spacing is `spacing` (m), with cells of `cell` (r).
+    pub fn add(&mut self, particles: &Particles, spacing: f64, cell: f64) {
+        let count = particles.places.len() as f64;
+        let (has_ids, has_velocities) = (!particles.ids.is_empty(), !particles.velocities.is_empty());
+        let [place, velocity, id] = PARTICLE;
+        let each = place + if has_velocities { velocity } else { 0.0 } + if has_ids { id } else { 0.0 };
+        let way = WAY[0] + if has_ids && has_velocities { WAY[1] } else { 0.0 };
+        let shell = shell(&particles.places, spacing) as f64;
+        let [patches, vertices, _] = surface(shell, cell);
+        self.frame = self.frame.max(count * each);
+        self.ways = self.ways.max(count * way);
+        self.work = self.work.max(work(count, shell, cell));
+        self.rest = self.rest.max(if has_ids { count * REST } else { 0.0 });
+        self.ahead = self.ahead.max(count * AHEAD + patches * SURFACE[0] + vertices * SURFACE[1]);
+        self.area = self.area.max(vertices);
+        self.edge = cell * spacing;
+    }
+
+    /// Estimates the memory (bytes) of a run over so many files.
+    pub fn estimate(&self, surface: &Surface, files: usize, detail: &DetailedMesh, frame: &FrameSize) -> u64 {
+        let is_between = surface.speed.fract() != 0.0 || surface.offset.fract() != 0.0;
+        // The first frame's stay there; between two files both ends of a step are interpolated.
+        let held = files.min(KEPT) + 1 + if is_between { 2 } else { 0 };
+        let mesh = of_both(counts(detail), MESH) + numbers(detail) * CARRIED;
+        let particles = held as f64 * self.frame + self.ways + self.work;
+        let rebuilding = if surface.rebuild { self.rebuilding(detail, surface.looks() - 1) } else { 0.0 };
+        (FIXED + particles + mesh + rebuilding) as u64 + frame.largest()
+    }
+
+    /// More bytes where the mesh is rebuilt, and so many frames after the next are kept.
+    ///
+    /// It grows with the particles' surface, by a vertex and two triangles for each face of a cell.
+    fn rebuilding(&self, detail: &DetailedMesh, coming: i32) -> f64 {
+        let own = detail.mesh.area() / self.edge.powi(2);
+        let grown = (self.area - own).max(0.0);
+        let [vertices, triangles] = counts(detail);
+        let now = [vertices + grown, triangles + 2.0 * grown];
+        let mesh = of_both([grown, 2.0 * grown], MESH) + of_both(now, REBUILT);
+        let area = own.max(self.area);
+        let [faces, blocks, near] = CUT;
+        let changing = faces * area + UNFIT * (blocks * GAMMA * area + near * now[1]);
+        let ([number, vertex, triangle], count) = (CARRIED_ON, numbers(detail));
+        let carrying = if count > 0.0 {
+            count * now[1] / triangles.max(1.0) * number + of_both(now, [vertex, triangle])
+        } else {
+            0.0
+        };
+        let coming = f64::from(coming) * (of_both(now, COMING) + count * CARRIED);
+        let source = if count > 0.0 { self.rest + TREE * triangles } else { 0.0 };
+        self.ahead + mesh + coming + source + changing.max(carrying)
+    }
+}
+
+/// Counts of vertices and triangles.
+fn counts(detail: &DetailedMesh) -> [f64; 2] {
+    [detail.mesh.positions.len(), detail.mesh.triangles.len()].map(|count| count as f64)
+}
+
+/// Count of the numbers that a mesh carries: pairs of texture coordinates, and two indices of these, count as one.
+fn numbers(detail: &DetailedMesh) -> f64 {
+    let arrays: usize = detail.arrays.iter().map(|array| array.values.len()).sum();
+    let uvs = detail.uvs.as_ref().map_or(0, |uvs| {
+        uvs.places.len() + uvs.corners.as_ref().map_or(0, |corners| corners.len().div_ceil(2))
+    });
+    (arrays + uvs) as f64
+}
+
+/// Bytes of so many vertices and triangles.
+fn of_both(counts: [f64; 2], bytes: [f64; 2]) -> f64 {
+    counts[0] * bytes[0] + counts[1] * bytes[1]
+}
+
+/// Bytes of the work on so many particles whose shell has so many cubes, with cells of `cell` (r): the mesh is carried along, then
+/// the particles' surface and the distances from it are made.
+fn work(particles: f64, shell: f64, cell: f64) -> f64 {
+    let carrying = CARRYING[0] * particles + CARRYING[1] * NODES * shell;
+    let making: f64 = surface(shell, cell).iter().zip(SURFACE).map(|(count, bytes)| count * bytes).sum();
+    carrying.max(making)
+}
+
+/// Counts of patches, of vertices and of blocks of distances of a surface whose shell has so many cubes, with cells of `cell` (r).
+///
+/// Over a level surface the shell is two cubes thick. Patches of 4 cells lie within 2 r of it on both sides, each cell of its area
+/// has one vertex, and blocks of 8 cells reach as far as distances and half their edge; drops have twice as many blocks.
+fn surface(shell: f64, cell: f64) -> [f64; 3] {
+    let patches = shell * (1.0 + cell) / (12.0 * cell.powi(3));
+    let vertices = shell * 2.0 / cell.powi(2);
+    let blocks = shell * (REACH + 4.0 * cell) / (96.0 * cell.powi(3));
+    [patches, vertices, blocks]
+}
+
+/// Count of the cubes of two spacings (m) around the surface of particles at places (m): those with particles and those beside
+/// them, but for those that are full among full ones.
+fn shell(places: &[DVec3], spacing: f64) -> usize {
+    // Farther cubes are refused later.
+    const FARTHEST: f64 = 1e9;
+    let cube_of = |place: &DVec3| {
+        [0, 1, 2].map(|axis| (place[axis] / (2.0 * spacing)).floor().clamp(-FARTHEST, FARTHEST) as i32)
+    };
+    let mut all: Vec<[i32; 3]> = places.par_iter().with_min_len(4096).map(cube_of).collect();
+    all.par_sort_unstable();
+    let cubes = all.chunk_by(|a, b| a == b);
+    let full: Vec<[i32; 3]> = cubes.filter(|cube| cube.len() >= FULL).map(|cube| cube[0]).collect();
+    all.dedup();
+    let is_inside = |cube: &[i32; 3]| {
+        (-1..=1).all(|x| {
+            (-1..=1).all(|y| {
+                // The three along z are neighbours in the order.
+                let low = [cube[0] + x, cube[1] + y, cube[2] - 1];
+                let at = full.partition_point(|other| *other < low);
+                full.get(at + 2) == Some(&[low[0], low[1], low[2] + 2])
+            })
+        })
+    };
+    let flags: Vec<bool> = all.par_iter().with_min_len(64).map(is_inside).collect();
+    let (mut inside, mut around) = (Vec::new(), Vec::new());
+    for (cube @ [x, y, z], is_inside) in all.into_iter().zip(flags) {
+        if is_inside {
+            inside.push(cube);
+        } else {
+            around.extend((0..27).map(|n| [x + n / 9 - 1, y + n / 3 % 3 - 1, z + n % 3 - 1]));
+        }
+    }
+    around.par_sort_unstable();
+    around.dedup();
+    around.par_iter().filter(|cube| inside.binary_search(cube).is_err()).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::mesh::attributes::{MeshArray, Number, On};
+    use crate::geometry::{TriMesh, Vec3};
+    use crate::mesh_repair::Source;
+    use crate::surface::Node;
+
+    /// Particles in a cube of so many spacings.
+    fn block(side: usize) -> Vec<DVec3> {
+        let at = |n: usize| [n / (side * side), n / side % side, n % side].map(|x| x as f64 + 0.5);
+        (0..side.pow(3)).map(|n| DVec3::from(at(n))).collect()
+    }
+
+    #[test]
+    fn the_shell_lies_around_the_surface() {
+        // A drop of one particle, and a cube of 5 x 5 x 5 cubes, of which the 3 x 3 x 3 in the middle are full among full ones.
+        assert_eq!(shell(&[DVec3::repeat(0.5)], 1.0), 27);
+        assert_eq!(shell(&block(10), 1.0), 7 * 7 * 7 - 3 * 3 * 3);
+        // Drops far from each other, and a place too far for any grid.
+        let drops: Vec<DVec3> = (0..10).map(|n| DVec3::repeat(10.0 * f64::from(n))).collect();
+        assert_eq!(shell(&drops, 1.0), 270);
+        assert_eq!(shell(&[DVec3::repeat(1e300)], 1.0), 27);
+    }
+
+    #[test]
+    fn finer_cells_and_more_surface_take_more() {
+        let cube = shell(&block(20), 1.0) as f64;
+        assert!(work(8000.0, cube, 0.25) > 3.0 * work(8000.0, cube, 0.5));
+        assert!(work(8000.0, 8000.0 * 27.0, 0.5) > 10.0 * work(8000.0, cube, 0.5));
+    }
+
+    /// What rebuilding a cube's mesh takes, with particles at these places, on cells of `cell` (spacings).
+    fn rebuilding(places: Vec<DVec3>, cell: f64, detail: &DetailedMesh) -> f64 {
+        let mut most = Most::default();
+        most.add(&Particles { places, ..Particles::default() }, 1.0, cell);
+        most.rebuilding(detail, 0)
+    }
+
+    #[test]
+    fn rebuilding_takes_more_where_there_is_more_surface() {
+        let cube = DetailedMesh { mesh: TriMesh::cuboid([0.0; 3], [20.0; 3]), ..DetailedMesh::default() };
+        let calm = rebuilding(block(20), 0.5, &cube);
+        // A quarter of 9600 faces of cells is in 112 blocks.
+        assert!(calm > 112.0 * CUT[1] + 9600.0 * CUT[0], "{calm}");
+        // As many particles in a sheet.
+        let sheet = (0..8000).map(|n| DVec3::new(f64::from(n / 90), 0.5, f64::from(n % 90))).collect();
+        let spread = rebuilding(sheet, 0.5, &cube);
+        assert!(spread > 2.0 * calm, "{spread} after {calm}");
+        let fine = rebuilding(block(20), 0.25, &cube);
+        assert!(fine > 3.0 * calm && fine < 10.0 * calm, "{fine} after {calm}");
+    }
+
+    #[test]
+    fn rebuilding_takes_more_where_the_mesh_is_finer_or_carries_much() {
+        let of = |detail: &DetailedMesh| rebuilding(block(20), 0.5, detail);
+        let mut detail =
+            DetailedMesh { mesh: TriMesh::cuboid([0.0; 3], [20.0; 3]), ..DetailedMesh::default() };
+        let plain = of(&detail);
+        // Triangles without area.
+        detail.mesh.positions.extend(vec![Vec3::zeros(); 3000]);
+        detail.mesh.triangles.extend(vec![[0, 1, 1]; 6000]);
+        let finer = of(&detail) - plain;
+        let own = 3000.0 * REBUILT[0] + 6000.0 * (REBUILT[1] + UNFIT * CUT[2]);
+        assert!((finer - own).abs() < 1.0, "{finer} is not {own}");
+        // The first mesh's tree; little is brought to the mesh when Gamma is gone, but a million numbers are more than that.
+        let array = |count: usize| MeshArray {
+            name: "mask".into(),
+            on: On::Vertices,
+            number: Number::F32,
+            values: vec![0.0; count],
+        };
+        detail.arrays = vec![array(3008)];
+        assert_eq!(of(&detail) - plain, finer + 6012.0 * TREE);
+        detail.arrays = vec![array(1_000_000)];
+        let more = of(&detail) - plain - finer;
+        assert!(more > 10e6, "{more}");
+    }
+
+    #[test]
+    fn items_are_as_large_as_the_table_says() {
+        // A node of Gamma, and where its value is: with half as much again to grow and a result of 4 bytes that is 64.
+        assert_eq!(size_of::<Node>() + size_of::<(usize, usize)>(), 40);
+        // A triangle as cut: corners and source.
+        assert_eq!(size_of::<[u32; 3]>() + size_of::<Source>(), 20);
+    }
+}

@@ -1,0 +1,316 @@
+//! Everything that a scene with `[surface]` reads before its first frame.
+
+#[cfg(feature = "vdb")]
+pub(in crate::scene::surface) mod particle_times;
+#[cfg(feature = "vdb")]
+pub(in crate::scene::surface) mod sculpts;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::Surface;
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::geometry::check::faults::Faults;
+use crate::geometry::check::orientation::{Closing, Orientation};
+use crate::geometry::mesh::attributes::{Number, On};
+use crate::geometry::{DetailedMesh, MeshArray, TriMesh, mesh as base_mesh};
+use crate::io::files::sequence::Pattern;
+use crate::io::files::source;
+use crate::io::mesh::{extension, parse_polygons_from};
+use crate::io::records::input_hashes::Seen;
+use crate::mesh_repair::{Prepared, Repaired, carry_attributes, repair};
+use crate::scene::Scene;
+use crate::surface::{Implicit, Isosurface, Particles, estimate_spacing, rough_spacing};
+use particle_times::Liquid;
+
+/// Arrays of the mesh that are written anew in each frame, and those that a moving mesh does not keep.
+pub(super) const REPLACED: [&str; 9] = ["vx", "vy", "vz", "delta", "flagged", "rebuilt", "nx", "ny", "nz"];
+/// How many times as large as the estimate, or as small, a spacing is that looks like a mistake.
+const ODD: f64 = 2.0;
+
+/// What a scene's files hold.
+pub struct Inputs {
+    /// The mesh at the first frame that has particles (m), with what it carries.
+    pub mesh: Arc<DetailedMesh>,
+    /// Share of each vertex' detail that never fades; empty: none.
+    pub(super) lasting: Vec<f32>,
+    /// Initial distance between particles (m).
+    pub spacing: f64,
+    /// The first frame of the shot that has particles; those before it have no mesh.
+    pub begins: i32,
+    /// The particles at that frame: how many there are, and how they are told apart.
+    pub particles: Particles,
+    /// Frames at which an edited mesh takes the place of the tracked one, ascending.
+    pub(super) sculpts: Vec<i32>,
+    /// What the files held when they were read.
+    pub(in crate::scene) seen: Arc<Seen>,
+    /// What about the files should be told, a sentence each; the log has it too.
+    pub warnings: Vec<String>,
+}
+
+impl Inputs {
+    /// Reads the mesh and the particles of the first frame that has any, and sees whether a file of a later frame is missing, which is
+    /// warned of: frames before it can be made. Edited meshes of later frames are looked at, and read again when their frames come.
+    ///
+    /// # Errors
+    /// What the files or keys have wrong, with file and key; cancel.
+    pub fn load(ctx: &Context, scene: &Scene) -> Result<Self> {
+        let (surface, shot) = (scene.surface()?, scene.shot);
+        if Pattern::parse(&surface.particles).is_none() && shot.frames.count() > 1 {
+            let what = "is one file, which never moves: a shot needs a sequence such as spot.%04d.bgeo";
+            return Err(Error::file(&surface.particles, what));
+        }
+        let sculpts = sculpts::frames(surface, shot.frames)?;
+        let seen = Arc::new(Seen::default());
+        let (begins, particles) = first_particles(ctx, scene, surface, &seen)?;
+        let first = surface.files_at(shot.frames, begins).swap_remove(0);
+        if particles.ids.is_empty() && particles.velocities.is_empty() && shot.frames.count() > 1 {
+            let what =
+                "has neither ids nor velocities (attributes id and v): where its particles go is not known";
+            return Err(Error::file(first, what));
+        }
+        let mut warnings: Vec<String> = missing(scene, surface).into_iter().collect();
+        if begins > shot.frames.first {
+            warnings.push(format!(
+                "frames {} to {} have no particles, and get empty meshes: the mesh is that of frame {begins}",
+                shot.frames.first,
+                begins - 1
+            ));
+        }
+        if surface.every && !surface.rebuild {
+            warnings.push(r#"surface.match = "every" does nothing where surface.rebuild is false"#.into());
+        }
+        let estimate = match surface.spacing {
+            Some(_) => rough_spacing(&particles.places),
+            None => estimate_spacing(&particles.places),
+        };
+        let spacing = match (surface.spacing, estimate) {
+            (Some(spacing), _) => spacing,
+            (None, Some(estimate)) => {
+                warnings.push(format!(
+                    "{}: the spacing of the particles is estimated as {estimate:.6} m; surface.spacing sets it",
+                    first.display()
+                ));
+                estimate
+            }
+            (None, None) => {
+                let what = "has too few particles, or too many at one place, to tell their spacing: give surface.spacing";
+                return Err(Error::file(first, what));
+            }
+        };
+        if let Some(estimate) = estimate.filter(|estimate| !(1.0 / ODD..=ODD).contains(&(spacing / estimate)))
+        {
+            warnings.push(format!(
+                "{}: surface.spacing is {spacing} m, but particles lie {estimate:.6} m apart",
+                first.display()
+            ));
+        }
+        // The mesh is made, or written, with 32-bit numbers where the particles are.
+        let far = base_mesh::farthest(particles.places.iter());
+        let name = first.display().to_string();
+        warnings.extend(base_mesh::too_far(&name, far, 1.0, surface.cell * spacing, base_mesh::BY_KEY));
+        let mut mesh = match &surface.mesh {
+            Some(path) => {
+                let (mesh, warning) = read_mesh(ctx, surface, path, &seen, spacing)?;
+                warnings.extend(warning);
+                mesh
+            }
+            None => {
+                let mesh = reconstructed(ctx, &particles, spacing, surface.cell)
+                    .map_err(|error| told(&first, error))?;
+                DetailedMesh { mesh, ..DetailedMesh::default() }
+            }
+        };
+        if surface.mesh.is_some() {
+            warnings.extend(odd_size(&mesh.mesh, particles.places.len(), spacing));
+        }
+        let fades = surface.half_life.is_some() || surface.fade != 0.0;
+        let lasting = match &surface.mesh {
+            Some(path) if fades => lasting(&mesh).map_err(|what| Error::file(path, what))?,
+            // A mesh that is rebuilt keeps it in its states: a later frame may be the first that fades.
+            Some(_) if surface.rebuild => lasting(&mesh).unwrap_or_default(),
+            _ => Vec::new(),
+        };
+        mesh.arrays.retain(|array| !REPLACED.contains(&&*array.name));
+        let mesh = Arc::new(mesh);
+        let mut inputs = Self { mesh, lasting, spacing, begins, particles, sculpts, seen, warnings };
+        let of_sculpts = sculpts::check(ctx, surface, &inputs)?;
+        inputs.warnings.extend(of_sculpts);
+        inputs.warnings.iter().for_each(|warning| log::warn!("{warning}"));
+        Ok(inputs)
+    }
+}
+
+/// A mesh in a file, in metres, and closed where it is to be rebuilt; with what about it should be told, in a sentence.
+///
+/// # Errors
+/// A file that cannot be read, or that has changed since it was read; a mesh that encloses nothing, where it is to be rebuilt; cancel.
+pub(super) fn read_mesh(
+    ctx: &Context,
+    surface: &Surface,
+    path: &Path,
+    seen: &Seen,
+    spacing: f64,
+) -> Result<(DetailedMesh, Option<String>)> {
+    let bytes = seen.read(path)?;
+    // Vertices that no face names follow nothing.
+    let mut mesh = parse_polygons_from(path, &bytes, surface.space.origin)?.into_detailed().without_unused();
+    let space = surface.space;
+    mesh.mesh.positions.iter_mut().for_each(|p| *p = space.vector(p.cast()).cast());
+    let orientation = Orientation::of_mesh(&mesh.mesh, Closing::Caps);
+    let mesh = orientation.applied_to_detailed(mesh);
+    let doubts = || orientation.warning().map(|what| format!("{}: {what}", path.display()));
+    if !surface.rebuild {
+        let warning = faults(path, &mesh.mesh).or_else(doubts);
+        return Ok((mesh, warning));
+    }
+    let (mesh, warning) = closed(ctx, mesh, spacing * surface.cell).map_err(|error| told(path, error))?;
+    Ok((mesh, warning.map(|warning| format!("{}: {warning}", path.display())).or_else(doubts)))
+}
+
+/// What is painted to last in the array `detail` of the vertices: shares 0..=1, of bytes 0 to 255.
+pub(super) fn lasting(mesh: &DetailedMesh) -> std::result::Result<Vec<f32>, String> {
+    let is_it = |array: &&MeshArray| array.name == "detail" && array.on == On::Vertices;
+    let Some(array) = mesh.arrays.iter().find(is_it) else { return Ok(Vec::new()) };
+    let whole = if array.number == Number::U8 { 255.0 } else { 1.0 };
+    let shares: Vec<f32> = array.values.iter().map(|value| (value / whole) as f32).collect();
+    match shares.iter().position(|share| !(0.0..=1.0).contains(share)) {
+        Some(at) => Err(format!("detail of vertex {} is {}, not within 0 to 1", at + 1, shares[at])),
+        None => Ok(shares),
+    }
+}
+
+/// Every file of particles that the shot reads, each once.
+pub(super) fn all_files(scene: &Scene, surface: &Surface) -> Vec<PathBuf> {
+    let frames = scene.shot.frames;
+    let [from, to] = [frames.first, frames.last].map(|frame| surface.time(frames, frame));
+    surface.files(from, to)
+}
+
+/// That a closed mesh holds much less, or more, than so many particles of a spacing (m), in a sentence. The particles' own surface lies half
+/// a spacing above the outermost ones: of thin sheets and small drops it holds more than they are.
+fn odd_size(mesh: &TriMesh, particles: usize, spacing: f64) -> Option<String> {
+    let (own, liquid) = (mesh.volume(), particles as f64 * spacing.powi(3));
+    let is_odd = own < liquid / ODD || own > ODD * liquid + mesh.area() * spacing;
+    (mesh.is_closed() && is_odd).then(|| {
+        format!(
+            "the mesh holds {own:.4} m3, and the first frame's {particles} particles {liquid:.4} m3: are both in the same unit?"
+        )
+    })
+}
+
+/// The first frame of the shot that has particles, and these.
+///
+/// # Errors
+/// A file that cannot be read up to there; none of the shot has any; cancel.
+fn first_particles(ctx: &Context, scene: &Scene, surface: &Surface, seen: &Seen) -> Result<(i32, Particles)> {
+    let frames = scene.shot.frames;
+    let mut liquid = Liquid::new(surface, scene.shot, seen);
+    for frame in frames.first..=frames.last {
+        ctx.check()?;
+        let particles = liquid.at(surface.time(frames, frame))?;
+        if !particles.places.is_empty() {
+            return Ok((frame, Particles::clone(&particles)));
+        }
+    }
+    let what = match frames.count() {
+        1 => "holds no particles".into(),
+        _ => format!("holds no particles at any frame of the shot, {frames}"),
+    };
+    Err(Error::file(&surface.particles, what))
+}
+
+/// Which file of the shot is missing, and which frames can therefore not be made, in a sentence.
+fn missing(scene: &Scene, surface: &Surface) -> Option<String> {
+    let frames = scene.shot.frames;
+    let lacks = |frame: i32| {
+        let before = frame.saturating_sub(1).max(frames.first);
+        let files = surface.files(surface.time(frames, before), surface.time(frames, frame));
+        files.into_iter().find_map(|path| Some((frame, source::open(&path).err()?)))
+    };
+    let (frame, error) = (frames.first..=frames.last).find_map(lacks)?;
+    Some(format!("{error}: frame {frame} and those after it cannot be made"))
+}
+
+/// The particles' own surface.
+fn reconstructed(ctx: &Context, particles: &Particles, spacing: f64, cell: f64) -> Result<TriMesh> {
+    let phi = Implicit::new(ctx, &particles.places, spacing, cell * spacing)?;
+    Ok(Isosurface::new(&phi).mesh(&phi))
+}
+
+fn told(path: &Path, error: Error) -> Error {
+    match error {
+        Error::Argument(what) => Error::file(path, what),
+        other => other,
+    }
+}
+
+/// The mesh as it can be rebuilt: a closed 2-manifold by index that does not cross itself, repaired in cells of an edge (m) where it is
+/// not; and what was done, in a sentence.
+fn closed(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(DetailedMesh, Option<String>)> {
+    let faults = ctx.pool().install(|| Faults::of(&mesh.mesh));
+    let crossings = faults.crossings + faults.corner_crossings + faults.folds + faults.overlaps;
+    let is_closed = faults.by_index.is_watertight();
+    let is_outward = faults.volume > 0.0 && faults.inverted_parts == 0;
+    if is_closed && is_outward && crossings == 0 {
+        return Ok((mesh, None));
+    }
+    let repaired = repair(ctx, &mesh.mesh, cell)?;
+    let kept = repaired.report.kept_triangles;
+    if is_only_joined(&mesh.mesh, &repaired) {
+        let joined = repaired.report.prepared.joined_vertices;
+        log::info!("{joined} vertices are joined with others that are the same corners");
+        let detail = carry_attributes(&mesh, repaired.mesh, &repaired.vertices, &repaired.sources, None);
+        return Ok((detail, None));
+    }
+    let lost = repaired.report.losses.warning(repaired.report.cell);
+    let mut what = Vec::new();
+    if !is_closed {
+        what.push("is not closed as its indices have it");
+    } else if !is_outward {
+        what.push("is inside out in parts");
+    }
+    if crossings > 0 {
+        what.push("crosses itself");
+    }
+    let warning = format!(
+        "it {}: it was repaired, as `frazil mesh repair --cell {:.6}` does; {kept} of {} triangles are as they were \
+         (surface.rebuild = false follows it as it is){}",
+        what.join(" and "),
+        repaired.report.cell,
+        mesh.mesh.triangles.len(),
+        lost.map_or(String::new(), |lost| format!("; {lost}")),
+    );
+    let detail = carry_attributes(&mesh, repaired.mesh, &repaired.vertices, &repaired.sources, None);
+    Ok((detail, Some(warning)))
+}
+
+/// Whether all that a repair did was to join vertices that are one corner: the mesh was triangle soup, and closed.
+fn is_only_joined(mesh: &TriMesh, Repaired { report, .. }: &Repaired) -> bool {
+    let joined = Prepared { joined_vertices: report.prepared.joined_vertices, ..Prepared::default() };
+    report.prepared == joined && report.rebuilt_cells == 0 && report.kept_triangles == mesh.triangles.len()
+}
+
+/// What about a mesh matters for what follows, in a sentence.
+fn faults(path: &Path, mesh: &TriMesh) -> Option<String> {
+    // Corners of .stl files are no shared vertices: each triangle would go its own way.
+    if extension(path) == "stl" {
+        return Some(format!(
+            "{}: .stl files do not say which triangles share their corners: a .ply or .obj file follows better",
+            path.display()
+        ));
+    }
+    let faults = Faults::of(mesh);
+    let open = (faults.open_edges > 0).then(|| format!("{} open edges", faults.open_edges));
+    let crossings = faults.crossings + faults.corner_crossings + faults.folds;
+    let crossed = (crossings > 0).then(|| format!("{crossings} pairs of triangles that cross"));
+    let what: Vec<String> = open.into_iter().chain(crossed).collect();
+    (!what.is_empty()).then(|| {
+        format!(
+            "{}: has {}: it follows as it is, but nothing says there what is inside (`frazil mesh check`)",
+            path.display(),
+            what.join(" and ")
+        )
+    })
+}

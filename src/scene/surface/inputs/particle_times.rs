@@ -1,0 +1,143 @@
+//! The particles of a sequence at the frames of a shot: the sequence may start later, and run faster or slower.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::geometry::points::Values;
+use crate::io::files::{hash, source};
+use crate::io::mesh::extension;
+use crate::io::particles::{self, Cloud};
+use crate::io::records::input_hashes::Seen;
+use crate::scene::surface::Surface;
+use crate::scene::{Shot, changes_since, partial};
+use crate::surface::{Particles, interpolate};
+use crate::vdb::points;
+
+/// Names of velocities and of ids in files, in lower case.
+const VELOCITIES: [&str; 4] = ["v", "vel", "velocity", "velocities"];
+const IDS: [&str; 4] = ["id", "ids", "particle_id", "particleid"];
+
+/// The points of any file of particles, in its own space.
+///
+/// # Errors
+/// A file that cannot be read, or that holds only what changed since another frame.
+pub fn read_cloud(path: &Path, seen: &Seen) -> Result<Cloud> {
+    if extension(path) != "vdb" {
+        return particles::parse(path, &seen.read(path)?);
+    }
+    source::open(path)?;
+    // OpenVDB reads the file itself: it must be the same before and after.
+    seen.hash(path)?;
+    if let Some(since) = changes_since(path)? {
+        return Err(Error::file(path, partial(since)));
+    }
+    let cloud = points::read(path, None)?.into();
+    seen.note(path, hash::of_file(path)?)?;
+    Ok(cloud)
+}
+
+/// The particles of a file (m, m/s).
+///
+/// # Errors
+/// As [`read_cloud`]; values that are not finite, two particles with one id.
+pub(in crate::scene::surface) fn read(path: &Path, surface: &Surface, seen: &Seen) -> Result<Particles> {
+    let cloud = read_cloud(path, seen)?;
+    let named = |names: &'static [&str]| {
+        let is_it = |name: &str| names.contains(&&*name.to_lowercase());
+        cloud
+            .attributes
+            .iter()
+            .filter(move |attribute| is_it(&attribute.name))
+            .map(|attribute| &attribute.values)
+    };
+    let (count, space) = (cloud.places.len(), surface.space);
+    let brought = |speed: [f32; 3]| space.vector(DVec3::from(speed.map(f64::from))).cast::<f32>().into();
+    let velocities = named(&VELOCITIES).find_map(|values| match values {
+        Values::Vector(column) => Some((0..count).map(|point| brought(column.get(point))).collect()),
+        _ => None,
+    });
+    let ids = named(&IDS).find_map(|values| match values {
+        Values::Long(column) => Some((0..count).map(|point| column.get(point)).collect()),
+        Values::Int(column) => Some((0..count).map(|point| column.get(point).into()).collect()),
+        _ => None,
+    });
+    let places = cloud.places.iter().map(|place| space.place(*place)).collect();
+    let (velocities, ids) = (velocities.unwrap_or_default(), ids.unwrap_or_default());
+    let particles = Particles { places, velocities, ids };
+    particles.validate().map_err(|error| Error::file(path, error.to_string()))?;
+    Ok(particles)
+}
+
+/// The particles of a shot, read as they are needed.
+pub(in crate::scene::surface) struct Liquid<'a> {
+    surface: &'a Surface,
+    shot: Shot,
+    seen: &'a Seen,
+    /// Those of the last files, by their numbers.
+    kept: Vec<(i32, Arc<Particles>)>,
+}
+
+/// Files that are kept: those around two frames.
+pub(in crate::scene::surface) const KEPT: usize = 4;
+
+impl<'a> Liquid<'a> {
+    pub fn new(surface: &'a Surface, shot: Shot, seen: &'a Seen) -> Self {
+        Self { surface, shot, seen, kept: Vec::new() }
+    }
+
+    /// The times (frames of the sequence) by which the mesh goes from the frame before to a frame: every file on the way, so that a
+    /// fast sequence loses nothing.
+    pub fn way(&self, frame: i32) -> Vec<f64> {
+        let time = |frame: i32| self.surface.time(self.shot.frames, frame);
+        let (from, to) = (time(frame - 1), time(frame));
+        let between = (from.floor() as i32 + 1..to.ceil() as i32).map(f64::from);
+        std::iter::once(from).chain(between).chain([to]).collect()
+    }
+
+    /// Time between two frames of the sequence (s).
+    pub fn file_time(&self) -> f64 {
+        1.0 / self.shot.fps
+    }
+
+    /// The particles at a time (frames of the sequence).
+    ///
+    /// # Errors
+    /// A file that cannot be read; one with neither ids nor velocities, where the time is between two.
+    pub fn at(&mut self, time: f64) -> Result<Arc<Particles>> {
+        let (below, share) = (time.floor(), time - time.floor());
+        let from = self.file(below as i32)?;
+        if share == 0.0 {
+            return Ok(from);
+        }
+        let to = self.file(below as i32 + 1)?;
+        interpolate(&from, &to, self.file_time(), share)
+            .map(Arc::new)
+            .map_err(|error| self.told(below, error))
+    }
+
+    /// An error about what the particles at a time lack, with their file.
+    pub fn told(&self, time: f64, error: Error) -> Error {
+        match error {
+            Error::Argument(what) => Error::file(self.path(time.floor() as i32), what),
+            other => other,
+        }
+    }
+
+    fn path(&self, file: i32) -> PathBuf {
+        self.surface.files(f64::from(file), f64::from(file)).swap_remove(0)
+    }
+
+    fn file(&mut self, file: i32) -> Result<Arc<Particles>> {
+        if let Some((_, particles)) = self.kept.iter().find(|(number, _)| *number == file) {
+            return Ok(particles.clone());
+        }
+        let particles = Arc::new(read(&self.path(file), self.surface, self.seen)?);
+        if self.kept.len() == KEPT {
+            self.kept.remove(0);
+        }
+        self.kept.push((file, particles.clone()));
+        Ok(particles)
+    }
+}

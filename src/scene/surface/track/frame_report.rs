@@ -1,0 +1,60 @@
+//! What the report of a frame says of a mesh that follows a liquid.
+
+use serde_json::json;
+
+use crate::scene::run::Report;
+use crate::surface::{Apart, Change, StepReport, Tracker};
+
+/// Parts apart from the mesh that a report lists.
+const LISTED: usize = 100;
+
+/// The report of a frame, of so many particles; whether an edited mesh was put in the mesh's place.
+pub(in crate::scene::surface) fn told(
+    report: &StepReport,
+    particles: usize,
+    tracker: &Tracker,
+    is_resculpted: bool,
+) -> Report {
+    let (drops, bubbles): (Vec<&Apart>, Vec<&Apart>) =
+        report.apart.iter().partition(|apart| apart.volume >= 0.0);
+    let listed: Vec<serde_json::Value> = report
+        .apart
+        .iter()
+        .take(LISTED)
+        .map(|apart| json!({ "at_m": <[f64; 3]>::from(apart.place), "volume_m3": apart.volume }))
+        .collect();
+    let changed = |number: fn(&Change) -> usize| report.change.as_ref().map_or(0, number);
+    let serde_json::Value::Object(mut results) = json!({
+        "particles": particles,
+        "born": report.born,
+        "died": report.died,
+        "resculpted": is_resculpted,
+        "vertices": tracker.vertices().len(),
+        "flagged": report.flagged(),
+        "jumped": report.jumped,
+        "lost": report.lost,
+        "uncovered": report.uncovered,
+        "changed_cells": changed(|change| change.flagged_cells),
+        "rebuilt_cells": changed(|change| change.rebuilt_cells),
+        "rebuilt_rung": changed(|change| change.rung),
+        "matching_iterations": changed(|change| change.iterations),
+        "made_triangles": changed(|change| change.made_triangles()),
+        "dry_parts": changed(|change| change.dry),
+        "specks": changed(|change| change.specks),
+        "drops": drops.len(),
+        "drops_m3": drops.iter().fold(0.0, |sum, drop| sum + drop.volume),
+        "bubbles": bubbles.len(),
+        "bubbles_m3": bubbles.iter().fold(0.0, |sum, bubble| sum - bubble.volume),
+        "apart": listed,
+        "parts": report.parts,
+        "volume_m3": tracker.mesh().volume(),
+        "particles_triangles": report.triangles,
+    }) else {
+        unreachable!("it is written as an object")
+    };
+    let warnings: Vec<&String> = report.warnings().collect();
+    if !warnings.is_empty() {
+        results.insert("warnings".into(), json!(warnings));
+    }
+    Report { results, phases: report.phases.clone() }
+}

@@ -1,0 +1,248 @@
+//! The stage `surface`: a detailed mesh follows the particles of a liquid.
+
+#[cfg(feature = "vdb")]
+mod frame_report;
+#[cfg(feature = "vdb")]
+mod saved_arrays;
+#[cfg(feature = "vdb")]
+mod tracked_shot;
+#[cfg(feature = "vdb")]
+mod vertex_paths;
+
+use std::sync::Arc;
+
+use super::{Inputs, Surface};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::geometry::mesh::attributes::{Number, On};
+use crate::geometry::{DetailedMesh, MeshArray, TriMesh, Vec3};
+use crate::io::records::manifest::Keeps;
+use crate::io::usd::materials::Look;
+use crate::io::usd::primvars;
+use crate::io::{mesh, usd};
+use crate::mesh_repair::Traced;
+use crate::scene::run::{
+    CONTENT, Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Settings, Stage, Stepped, Stepping, Stored, To,
+};
+use crate::scene::schema::keys::{first_of, settings_of};
+use crate::scene::{Scene, System};
+use tracked_shot::{At, Walk, reads};
+
+/// Name of the stage, and kind of its files.
+const NAME: &str = "surface";
+/// What the clips of `surface/` share.
+const MANIFEST: &str = "surface/surface.manifest.usda";
+
+/// The stage for a scene.
+pub struct Track<'a> {
+    scene: &'a Scene,
+    surface: &'a Surface,
+    inputs: &'a Inputs,
+}
+
+/// Input of the writer: the mesh at a frame, if its files are written.
+pub struct Step(Option<Written>);
+
+struct Written {
+    places: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    /// What the mesh carries; none: what it began with.
+    detail: Option<Arc<DetailedMesh>>,
+    velocities: Vec<Vec3>,
+    delta: Vec<f32>,
+    flags: Vec<bool>,
+    state: Vec<u8>,
+}
+
+impl Written {
+    /// Of a frame without particles.
+    fn nothing(carried: &DetailedMesh, state: Vec<u8>) -> Self {
+        Self {
+            places: Vec::new(),
+            triangles: Vec::new(),
+            detail: Some(Arc::new(carried.emptied())),
+            velocities: Vec::new(),
+            delta: Vec::new(),
+            flags: Vec::new(),
+            state,
+        }
+    }
+}
+
+impl<'a> Track<'a> {
+    /// The stage for a scene.
+    pub fn new(scene: &'a Scene, surface: &'a Surface, inputs: &'a Inputs) -> Self {
+        Self { scene, surface, inputs }
+    }
+
+    /// The arrays that each frame has anew, but for the mask of what was made: a mesh to which nothing was done yet has none of its own.
+    fn arrays(&self, delta: &[f32], flags: &[bool], unmade: Option<usize>) -> Vec<MeshArray> {
+        let array = |name: &str, on, number, values| MeshArray { name: name.into(), on, number, values };
+        let output = self.surface.output;
+        let delta = output.delta.then(|| {
+            let values = delta.iter().map(|delta| f64::from(*delta)).collect();
+            array("delta", On::Vertices, Number::F32, values)
+        });
+        let flagged = output.flagged.then(|| {
+            let values = flags.iter().map(|flag| f64::from(u8::from(*flag))).collect();
+            array("flagged", On::Vertices, Number::U8, values)
+        });
+        let unmade = unmade.filter(|_| output.rebuilt);
+        let rebuilt = unmade.map(|faces| array(Traced::MASK, On::Faces, Number::U8, vec![0.0; faces]));
+        delta.into_iter().chain(flagged).chain(rebuilt).collect()
+    }
+
+    /// The arrays that the mesh carries, as they are written.
+    fn carried<'m>(&self, detail: &'m DetailedMesh) -> impl Iterator<Item = &'m MeshArray> {
+        let is_written = self.surface.output.rebuilt;
+        detail.arrays.iter().filter(move |array| is_written || array.name != Traced::MASK)
+    }
+}
+
+impl Stage for Track<'_> {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn noun(&self) -> &'static str {
+        "mesh"
+    }
+
+    fn kinds(&self) -> &'static [Kind] {
+        &[Kind { name: NAME, extensions: &["ply", "usda", "obj"] }]
+    }
+
+    fn writes(&self, _kind: &str) -> bool {
+        let output = self.surface.output;
+        output.ply || output.usd || output.obj
+    }
+
+    fn state_extension(&self) -> &'static str {
+        NAME
+    }
+
+    fn keeps_every_state(&self) -> bool {
+        true
+    }
+
+    fn loose_files(&self) -> &'static [&'static str] {
+        if self.surface.output.usd { &[MANIFEST] } else { &[] }
+    }
+
+    fn settings(&self) -> Result<Settings> {
+        let seen = &self.inputs.seen;
+        let mut settings = settings_of(self.scene, NAME, seen, &[])?;
+        settings.insert("surface.particles".into(), format!("{CONTENT}of each frame"));
+        settings.insert("surface.spacing".into(), format!("{:?}", self.inputs.spacing));
+        if self.surface.resculpt.is_some() {
+            settings.insert("surface.resculpt".into(), format!("{CONTENT}of each frame"));
+        }
+        if let Some(path) = &self.surface.mesh {
+            settings.insert("surface.mesh".into(), format!("{CONTENT}{}", seen.hash(path)?));
+        }
+        Ok(settings)
+    }
+
+    fn of_first_state(&self, settings: &Settings) -> Settings {
+        first_of(System::Surface, settings, NAME)
+    }
+
+    fn reads(&self, frame: i32) -> Reads {
+        reads(self.scene, self.surface, self.inputs, frame)
+    }
+
+    fn keeps(&self, _frame: i32) -> Keeps {
+        Keeps::State
+    }
+
+    fn clip(&self) -> Option<Clip<'_>> {
+        let (mesh, of_frame) = (&self.inputs.mesh, self.arrays(&[], &[], Some(0)));
+        let arrays: Vec<&MeshArray> = self.carried(mesh).chain(&of_frame).collect();
+        let primvars = primvars::primvars(&arrays);
+        let uvs = mesh.uvs.as_ref();
+        let meshes = vec![MovingMesh { name: NAME.into(), look: Look::Object, uvs, primvars }];
+        Some(Clip { kind: NAME, manifest: MANIFEST, prims: Prims::Meshes(meshes) })
+    }
+}
+
+impl<'a> Stepping for Track<'a> {
+    type State = Walk<'a>;
+    type Step = Step;
+    type Writer = ();
+
+    fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<Walk<'a>> {
+        let Some(frame) = after else {
+            // A mesh that is not where the particles are is refused before anything is written.
+            return Walk::begin(ctx, self.scene, self.surface, self.inputs);
+        };
+        let path = done.state_file(frame)?;
+        let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
+        let params = self.surface.params(self.inputs.spacing);
+        let kept = saved_arrays::resume(params, &self.inputs.mesh, &bytes);
+        let kept = kept.map_err(|error| Error::file(path, error.to_string()))?;
+        Walk::resume(ctx, (self.scene, self.surface, self.inputs), frame, kept)
+    }
+
+    fn step(&self, ctx: &Context, walk: &mut Walk<'a>, to: &To<'_>) -> Result<Stepped<Step>> {
+        walk.go(ctx, to.frame)?;
+        let At { tracker, detail, report, source, is_dry, .. } = walk.now();
+        let written = || {
+            let carried = detail.as_deref().unwrap_or(&self.inputs.mesh);
+            let state = saved_arrays::save(tracker, carried, source.sculpted);
+            if *is_dry {
+                return Ok(Written::nothing(carried, state));
+            }
+            let (places, velocities) = walk.shown(ctx)?;
+            Ok(Written {
+                places: usd::to_floats(&places),
+                triangles: tracker.triangles().to_vec(),
+                detail: detail.clone(),
+                velocities,
+                delta: tracker.delta().to_vec(),
+                flags: tracker.flags().to_vec(),
+                state,
+            })
+        };
+        let step = to.made_from.map(|_| written()).transpose()?;
+        Ok(Stepped { step: Step(step), report: report.clone() })
+    }
+
+    fn writer(&self, _ctx: &Context, _walk: &Walk<'a>) -> Result<()> {
+        Ok(())
+    }
+
+    fn writes_alone(&self) -> bool {
+        true
+    }
+
+    fn write(&self, _writer: &mut (), step: Step, files: Option<&mut FrameFiles>) -> Result<()> {
+        let (Some(step), Some(files)) = (step.0, files) else { return Ok(()) };
+        let (output, detail) = (self.surface.output, step.detail.as_deref().unwrap_or(&self.inputs.mesh));
+        let has_mask = detail.arrays.iter().any(|array| array.name == Traced::MASK);
+        let unmade = (!has_mask).then_some(step.triangles.len());
+        let of_frame = self.arrays(&step.delta, &step.flags, unmade);
+        let arrays: Vec<&MeshArray> = self.carried(detail).chain(&of_frame).collect();
+        let velocities = if output.velocities { &step.velocities[..] } else { &[] };
+        let mesh = TriMesh { positions: step.places, triangles: step.triangles };
+        let carried = mesh::Carried { velocities, uvs: detail.uvs.as_ref(), arrays: &arrays };
+        if output.ply {
+            files.save(NAME, "ply", &mesh::ply_bytes(&mesh, &carried))?;
+        }
+        if output.obj {
+            files.save(NAME, "obj", &mesh::obj_bytes(&mesh, &carried))?;
+        }
+        if output.usd {
+            let frame = usd::MeshFrame {
+                name: NAME,
+                points: &mesh.positions,
+                velocities: &step.velocities,
+                triangles: &mesh.triangles,
+                uvs: detail.uvs.as_ref(),
+                arrays: &arrays,
+            };
+            let text = usd::clip(NAME, files.frame, self.scene.shot.fps, usd::Units::OWN, &[frame]);
+            files.save(NAME, "usda", text.as_bytes())?;
+        }
+        files.save_state(&step.state)
+    }
+}

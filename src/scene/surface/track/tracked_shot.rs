@@ -1,0 +1,498 @@
+//! The mesh from frame to frame: it steps with the liquid, carries its arrays through changes, and is exchanged for an edited one
+//! where there is one. Some frames are known ahead, for velocities and for changes that are seen before they happen.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::frame_report::told;
+use super::saved_arrays::Kept;
+use super::vertex_paths::Trail;
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::geometry::check::deviation::NearestTree;
+use crate::geometry::{DVec3, DetailedMesh, TriMesh, Vec3};
+use crate::io::usd;
+use crate::mesh_repair::{Traced, carry_attributes};
+use crate::scene::run::{Reads, Report};
+use crate::scene::surface::inputs::particle_times::Liquid;
+use crate::scene::surface::inputs::sculpts::{path_at, read_sculpt};
+use crate::scene::surface::{Inputs, Surface};
+use crate::scene::{Frames, Scene};
+use crate::surface::{
+    Change, Displaced, Eased, Leads, Params, Particles, Rest, StepReport, TOO_FAR, Tracker, displaced, eased,
+    uncrossed,
+};
+
+/// A scene's liquid, and the mesh that goes along.
+pub struct Walk<'a> {
+    scene: &'a Scene,
+    surface: &'a Surface,
+    inputs: &'a Inputs,
+    liquid: Liquid<'a>,
+    /// The frame of the first of `known`.
+    frame: i32,
+    /// The mesh at a frame, and at those that follow it as far as they are needed; at least one.
+    known: VecDeque<At>,
+    /// The first frame that could not be made ahead: beyond the shot's end, or one that fails.
+    end: Option<i32>,
+    /// Whether what is wrong with the particles was said.
+    has_warned: bool,
+}
+
+/// A mesh as an artist made it: that of the first frame, or an edited one.
+#[derive(Clone)]
+pub(in crate::scene::surface) struct Source {
+    /// The frame of an edited one.
+    pub sculpted: Option<i32>,
+    mesh: Arc<DetailedMesh>,
+    /// The particles at its frame, where they have ids and the mesh carries anything and is rebuilt, and its triangles.
+    rest: Option<Arc<(Rest, NearestTree)>>,
+}
+
+/// The mesh at a frame, with what led there.
+pub struct At {
+    pub tracker: Tracker,
+    /// What it carries; none: what the first mesh does.
+    pub detail: Option<Arc<DetailedMesh>>,
+    /// What the frame's report says.
+    pub report: Report,
+    way: Way,
+    leads: Leads,
+    pub(in crate::scene::surface) source: Source,
+    /// Whether the frame has no particles: its files then hold no mesh.
+    pub(in crate::scene::surface) is_dry: bool,
+}
+
+/// How the vertices of the frame before went to a frame.
+#[derive(Default)]
+pub(in crate::scene::surface) struct Way {
+    /// Velocities over it (m/s) of the vertices of the frame before; empty at the first frame.
+    pub of_before: Vec<Vec3>,
+    /// Velocities over it of the vertices at its end.
+    pub of_after: Vec<Vec3>,
+}
+
+impl<'a> Walk<'a> {
+    /// The mesh at the first frame; none where that has no particles.
+    ///
+    /// # Errors
+    /// A mesh that is not where the first particles are, and what a tracker refuses; cancel.
+    pub fn begin(ctx: &Context, scene: &'a Scene, surface: &'a Surface, inputs: &'a Inputs) -> Result<Self> {
+        let first = scene.shot.frames.first;
+        // Also where particles come later: a mesh that does not fit them is refused before anything is written.
+        let begun = first_mesh(ctx, surface, inputs)?;
+        let at = if inputs.begins == first { begun } else { without_mesh(surface, inputs)? };
+        Ok(Self::at((scene, surface, inputs), first, at))
+    }
+
+    /// Goes on from a mesh that was kept at a frame.
+    ///
+    /// # Errors
+    /// Particles or an edited mesh that can no longer be read.
+    pub fn resume(
+        ctx: &Context,
+        of @ (_, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs),
+        frame: i32,
+        Kept { mut tracker, detail, sculpted }: Kept,
+    ) -> Result<Self> {
+        if !tracker.is_rebuilt() {
+            tracker.set_lasting(inputs.lasting.clone()).map_err(|error| of_first(surface, error))?;
+        }
+        let detail = detail.map(|detail| {
+            let triangles = tracker.triangles().to_vec();
+            Arc::new(DetailedMesh { mesh: TriMesh { positions: Vec::new(), triangles }, ..detail })
+        });
+        let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
+        let (report, way, leads) = (nothing_told(), Way::default(), Leads::default());
+        // Nothing of this frame is written again.
+        let at = At { tracker, detail, report, way, leads, source, is_dry: false };
+        let mut walk = Self::at(of, frame, at);
+        if let Some(sculpted) = sculpted {
+            let source = match read_sculpt(ctx, surface, inputs, sculpted)? {
+                Some(sculpt) => {
+                    let particles = walk.particles(sculpted)?;
+                    Source::of(ctx, surface.rebuild, Some(sculpted), Arc::new(sculpt.mesh), &particles)
+                }
+                None => {
+                    log::warn!(
+                        "the edited mesh of frame {sculpted} is gone: what is made takes its texture from the mesh beside it"
+                    );
+                    Source { sculpted: Some(sculpted), rest: None, ..walk.now().source.clone() }
+                }
+            };
+            walk.known[0].source = source;
+        }
+        Ok(walk)
+    }
+
+    fn at((scene, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs), frame: i32, at: At) -> Self {
+        let liquid = Liquid::new(surface, scene.shot, &inputs.seen);
+        Self {
+            scene,
+            surface,
+            inputs,
+            liquid,
+            frame,
+            known: VecDeque::from([at]),
+            end: None,
+            has_warned: false,
+        }
+    }
+
+    /// Goes on to a frame, and as far ahead as that needs.
+    ///
+    /// # Errors
+    /// Files that cannot be read; what a step refuses; cancel.
+    pub fn go(&mut self, ctx: &Context, frame: i32) -> Result<()> {
+        while self.frame < frame {
+            if self.known.len() == 1 {
+                let next = self.next(ctx, self.frame + 1)?;
+                self.known.push_back(next);
+            }
+            self.known.pop_front();
+            self.frame += 1;
+        }
+        for coming in frame + self.known.len() as i32..=frame + self.surface.looks() {
+            match self.look(ctx, coming)? {
+                Some(next) => self.known.push_back(next),
+                None => break,
+            }
+        }
+        Ok(())
+    }
+
+    /// The mesh at the frame that it went to.
+    pub fn now(&self) -> &At {
+        &self.known[0]
+    }
+
+    /// Places (m) of its vertices as they are shown: those that a change will take away already go towards what it makes; with the
+    /// velocities that lead to the next frame's (m/s), or where that is not known from the one before.
+    ///
+    /// # Errors
+    /// Cancel.
+    pub fn shown(&self, ctx: &Context) -> Result<(Vec<DVec3>, Vec<Vec3>)> {
+        let now = self.now();
+        let mut places = now.tracker.vertices().to_vec();
+        let mut velocities = match self.known.get(1) {
+            Some(next) => next.way.of_before.clone(),
+            None if now.way.of_after.is_empty() => vec![Vec3::zeros(); places.len()],
+            None => now.way.of_after.clone(),
+        };
+        let moved = self.displaced(ctx, 0)?;
+        moved.iter().for_each(|(vertex, by)| places[*vertex as usize] += by);
+        let Some(next) = self.known.get(1) else { return Ok((places, velocities)) };
+        let mut then: Vec<Displaced> = self.displaced(ctx, 1)?;
+        then = then.into_iter().filter_map(|(at, by)| Some((next.leads.before(at)?, by))).collect();
+        then.sort_unstable_by_key(|(vertex, _)| *vertex);
+        let of = |list: &[Displaced], vertex: u32| {
+            let at = list.binary_search_by_key(&vertex, |(vertex, _)| *vertex);
+            at.map_or(DVec3::zeros(), |at| list[at].1)
+        };
+        for Eased { vertex, now: asked, next: asked_next } in self.eased(0) {
+            let now = of(&moved, vertex);
+            // What goes in the step arrives as nearly as it has come.
+            let to = match next.leads.takes(vertex) {
+                true if asked != DVec3::zeros() => asked_next * (now.norm() / asked.norm()),
+                true => asked_next,
+                false => of(&then, vertex),
+            };
+            velocities[vertex as usize] += ((to - now) * self.scene.shot.fps).cast::<f32>();
+        }
+        Ok((places, velocities))
+    }
+
+    /// The vertices of a frame that is known which are moved for changes to come.
+    fn eased(&self, index: usize) -> Vec<Eased> {
+        eased(self.known.iter().skip(index + 1).map(|at| &at.leads), self.surface.ahead as usize)
+    }
+
+    /// By how much they are, as far as the mesh does not pass through itself.
+    fn displaced(&self, ctx: &Context, index: usize) -> Result<Vec<Displaced>> {
+        let tracker = &self.known[index].tracker;
+        uncrossed(ctx, tracker.vertices(), tracker.triangles(), displaced(&self.eased(index)))
+    }
+
+    /// The frame after those that are known, where it is there: beyond the shot's end a cache need not have it.
+    fn look(&mut self, ctx: &Context, frame: i32) -> Result<Option<At>> {
+        let last = self.scene.shot.frames.last;
+        if self.end.is_some_and(|end| frame >= end) {
+            return Ok(None);
+        }
+        if frame <= last {
+            return match self.next(ctx, frame) {
+                // It ends the shot when its turn comes: the frames before it are there and are written first.
+                Err(error) if !matches!(error, Error::Cancelled) => {
+                    self.end = Some(frame);
+                    Ok(None)
+                }
+                next => next.map(Some),
+            };
+        }
+        let files = self.surface.between(self.scene.shot.frames, frame - 1, frame);
+        if !self.surface.reads_ahead() || !files.iter().all(|path| path.is_file()) {
+            return Ok(None);
+        }
+        match self.next(ctx, frame) {
+            Err(error) if !matches!(error, Error::Cancelled) => {
+                let what = match frame - last {
+                    1 => format!("frame {last} has the velocities of the frame before"),
+                    _ => format!("changes from frame {frame} on are not eased in"),
+                };
+                log::warn!("{error}; {what}");
+                self.end = Some(frame);
+                Ok(None)
+            }
+            next => next.map(Some),
+        }
+    }
+
+    /// The mesh at a frame, from the last that is known, which is the one before.
+    fn next(&mut self, ctx: &Context, frame: i32) -> Result<At> {
+        if frame < self.inputs.begins {
+            return without_mesh(self.surface, self.inputs);
+        }
+        if frame == self.inputs.begins {
+            let mut at = first_mesh(ctx, self.surface, self.inputs)?;
+            at.leads = Leads::cut(at.tracker.vertices().len());
+            let particles = Arc::new(self.inputs.particles.clone());
+            let sculpted = self.resculpt(ctx, &mut at, frame, &particles)?;
+            if let Some(report) = sculpted {
+                at.report = told(&report, particles.places.len(), &at.tracker, true);
+            }
+            return Ok(at);
+        }
+        let phases = ctx.collect();
+        let last = self.known.len() - 1;
+        let before = &mut self.known[last];
+        let (mut tracker, mut detail, source) =
+            (before.tracker.clone(), before.detail.clone(), before.source.clone());
+        // The surface that was made ahead is the next one's.
+        before.tracker.forget_ahead();
+        let mut trail = Trail::of(tracker.vertices());
+        let way = self.liquid.way(frame);
+        let (mut report, mut leads) = (StepReport::default(), Leads::default());
+        let mut from = self.liquid.at(way[0])?;
+        // What the step after each goes to; beyond the shot it need not be there.
+        let beyond = self.liquid.way(frame + 1)[1];
+        let is_there = self.surface.rebuild && frame < self.scene.shot.frames.last;
+        let behind = way[2..].iter().copied().map(Some).chain([is_there.then_some(beyond)]);
+        for (ends, behind) in way.windows(2).zip(behind) {
+            let to = self.liquid.at(ends[1])?;
+            let dt = (ends[1] - ends[0]) * self.liquid.file_time();
+            if let Some(behind) = behind
+                && let Ok(particles) = self.liquid.at(behind)
+            {
+                tracker.set_ahead(particles);
+            }
+            let triangles = self.surface.eases().then(|| tracker.triangles().to_vec());
+            let step = tracker.step(ctx, &from, &to, dt).map_err(|error| self.liquid.told(ends[0], error))?;
+            let share = (ends[1] - way[0]) / (way[way.len() - 1] - way[0]);
+            match &step.change {
+                Some(change) => {
+                    trail.follow(&change.before, share);
+                    if let Some(triangles) = triangles {
+                        leads = leads.then(&Leads::of(ctx, change, &triangles, self.inputs.spacing)?);
+                    }
+                    let own = detail.as_deref().unwrap_or(&self.inputs.mesh);
+                    detail = Some(Arc::new(match tracker.vertices() {
+                        [] => own.emptied(),
+                        _ => carried(ctx, own, &source, (&tracker, change), &to)?,
+                    }));
+                    trail.change(change);
+                }
+                None => trail.follow(tracker.vertices(), share),
+            }
+            report = report.followed_by(step);
+            from = to;
+        }
+        let way = trail.way(tracker.vertices(), tracker.triangles(), self.scene.shot.fps);
+        let is_dry = from.places.is_empty();
+        let mut at = At { tracker, detail, report: nothing_told(), way, leads, source, is_dry };
+        let sculpted = self.resculpt(ctx, &mut at, frame, &from)?;
+        let is_resculpted = sculpted.is_some();
+        let report = sculpted.into_iter().fold(report, StepReport::followed_by);
+        let report = StepReport { phases: phases.times(), ..report };
+        report.new_warnings(&mut self.has_warned).for_each(|warning| log::warn!("frame {frame}: {warning}"));
+        at.report = told(&report, from.places.len(), &at.tracker, is_resculpted);
+        Ok(at)
+    }
+
+    /// Puts the edited mesh of a frame in the place of the one that came there, if there is one; what that did.
+    fn resculpt(
+        &self,
+        ctx: &Context,
+        at: &mut At,
+        frame: i32,
+        particles: &Particles,
+    ) -> Result<Option<StepReport>> {
+        let Some(sculpt) = read_sculpt(ctx, self.surface, self.inputs, frame)? else { return Ok(None) };
+        if particles.places.is_empty() {
+            log::warn!("{}: is left out, as frame {frame} has no particles", sculpt.path.display());
+            return Ok(None);
+        }
+        let refused = |error| match error {
+            Error::Argument(what) => Error::file(&sculpt.path, what),
+            other => other,
+        };
+        let old = ctx.pool().install(|| NearestTree::new(&at.tracker.mesh()));
+        let triangles = at.tracker.triangles().to_vec();
+        let report =
+            at.tracker.resculpt(ctx, &sculpt.mesh.mesh, sculpt.lasting, particles).map_err(refused)?;
+        // Vertices of the edited mesh go as the mesh before went beside them.
+        let velocity = |place: &DVec3| {
+            let corner = old.nearest(*place).map(|near| triangles[near.triangle][0] as usize);
+            corner.and_then(|corner| at.way.of_after.get(corner).copied()).unwrap_or_default()
+        };
+        at.way.of_after = at.tracker.vertices().iter().map(velocity).collect();
+        at.leads = std::mem::take(&mut at.leads).then(&Leads::cut(at.tracker.vertices().len()));
+        let mesh = Arc::new(sculpt.mesh);
+        at.source = Source::of(ctx, self.surface.rebuild, Some(frame), mesh.clone(), particles);
+        at.detail = Some(mesh);
+        Ok(Some(report))
+    }
+
+    /// The particles at a frame.
+    fn particles(&mut self, frame: i32) -> Result<Arc<Particles>> {
+        self.liquid.at(self.surface.time(self.scene.shot.frames, frame))
+    }
+}
+
+/// The mesh at the first frame that has particles.
+fn first_mesh(ctx: &Context, surface: &Surface, inputs: &Inputs) -> Result<At> {
+    let params = surface.params(inputs.spacing);
+    let begun = ctx.step(4, || Tracker::begin(ctx, params, &inputs.mesh.mesh, &inputs.particles));
+    let ((mut tracker, report), phases) = begun.map_err(|error| of_first(surface, error))?;
+    tracker.set_lasting(inputs.lasting.clone()).map_err(|error| of_first(surface, error))?;
+    let report = StepReport { phases, ..report };
+    let report = told(&report, inputs.particles.places.len(), &tracker, false);
+    let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
+    let (way, leads) = (Way::default(), Leads::default());
+    Ok(At { tracker, detail: None, report, way, leads, source, is_dry: false })
+}
+
+/// A frame before the first particles.
+fn without_mesh(surface: &Surface, inputs: &Inputs) -> Result<At> {
+    let tracker = Tracker::without_mesh(surface.params(inputs.spacing))?;
+    let report = told(&StepReport::default(), 0, &tracker, false);
+    let source = Source { sculpted: None, mesh: inputs.mesh.clone(), rest: None };
+    let (way, leads) = (Way::default(), Leads::default());
+    let detail = Some(Arc::new(inputs.mesh.emptied()));
+    Ok(At { tracker, detail, report, way, leads, source, is_dry: true })
+}
+
+/// An error of the first mesh, with its file.
+fn of_first(surface: &Surface, error: Error) -> Error {
+    match error {
+        Error::Argument(what) if what.starts_with(TOO_FAR) => Error::file(&surface.particles, what),
+        Error::Argument(what) => Error::file(surface.mesh.as_ref().unwrap_or(&surface.particles), what),
+        other => other,
+    }
+}
+
+/// Before anything is known.
+fn nothing_told() -> Report {
+    Report { results: serde_json::Map::new(), phases: Vec::new() }
+}
+
+impl Source {
+    fn of(
+        ctx: &Context,
+        is_rebuilt: bool,
+        sculpted: Option<i32>,
+        mesh: Arc<DetailedMesh>,
+        particles: &Particles,
+    ) -> Self {
+        let is_traced = is_rebuilt && (mesh.uvs.is_some() || !mesh.arrays.is_empty());
+        let rest = if is_traced { Rest::of(particles) } else { None };
+        let tree = || ctx.pool().install(|| NearestTree::new(&mesh.mesh));
+        let rest = rest.map(|rest| Arc::new((rest, tree())));
+        Self { sculpted, mesh, rest }
+    }
+}
+
+/// What a mesh carries after a change; its places are those of the change.
+fn carried(
+    ctx: &Context,
+    own: &DetailedMesh,
+    source: &Source,
+    (tracker, change): (&Tracker, &Change),
+    particles: &Particles,
+) -> Result<DetailedMesh> {
+    let triangles = own.mesh.triangles.clone();
+    let mesh = TriMesh { positions: usd::to_floats(&change.before), triangles };
+    let old = DetailedMesh { mesh, uvs: own.uvs.clone(), arrays: own.arrays.clone() };
+    let spacing = tracker.params().spacing;
+    let (places, tree) = match source.rest.as_deref() {
+        Some((rest, tree)) => (rest.of_change(ctx, particles, spacing, change)?, Some(tree)),
+        None => (Vec::new(), None),
+    };
+    let traced = Traced { first: &source.mesh, tree, places: &places, spacing };
+    let (origins, sources) = (&change.origins, &change.sources);
+    ctx.phase("carry", || {
+        let mut out = carry_attributes(&old, tracker.mesh(), origins, sources, Some(&traced));
+        // The tracker has them.
+        out.mesh.positions = Vec::new();
+        Ok(out)
+    })
+}
+
+impl Surface {
+    /// How the mesh follows particles of a spacing (m).
+    pub(in crate::scene::surface) fn params(&self, spacing: f64) -> Params {
+        Params {
+            spacing,
+            cell: self.cell,
+            change: self.change,
+            weighting: self.weighting,
+            half_life: self.half_life.unwrap_or(f64::INFINITY),
+            fade: self.fade,
+            rebuild: self.rebuild,
+            every: self.every,
+            min_drop: self.min_drop,
+        }
+    }
+
+    /// How many frames are made ahead: one for velocities; for those that the vertices go towards a change they have to be known in the
+    /// frame after too.
+    pub(in crate::scene::surface) fn looks(&self) -> i32 {
+        if self.eases() { self.ahead + 1 } else { 1 }
+    }
+
+    /// Whether frames to come show in a frame's files.
+    fn reads_ahead(&self) -> bool {
+        self.output.velocities || self.output.usd || self.eases()
+    }
+
+    fn eases(&self) -> bool {
+        self.rebuild && self.ahead > 0
+    }
+
+    /// The files from a frame of the shot to another.
+    fn between(&self, shot: Frames, from: i32, to: i32) -> Vec<PathBuf> {
+        self.files(self.time(shot, from), self.time(shot, to))
+    }
+}
+
+/// The files that are read for a frame.
+pub(in crate::scene::surface) fn reads(
+    scene: &Scene,
+    surface: &Surface,
+    inputs: &Inputs,
+    frame: i32,
+) -> Reads {
+    let frames = scene.shot.frames;
+    let before = if frame == frames.first { frame } else { frame - 1 };
+    let particles = surface.between(frames, before, frame);
+    let sculpt = |frame: i32| path_at(surface, &inputs.sculpts, frame);
+    let mut ahead = Vec::new();
+    if surface.reads_ahead() {
+        let last = frame + surface.looks();
+        ahead = surface.between(frames, frame, last);
+        // What is read anyway is not of the coming frames alone.
+        ahead.retain(|path| !particles.contains(path));
+        ahead.extend((frame + 1..=last).filter_map(sculpt));
+    }
+    Reads { files: particles.into_iter().chain(sculpt(frame)).collect(), ahead }
+}

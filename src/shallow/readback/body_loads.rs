@@ -1,0 +1,254 @@
+//! What the liquid does to the bodies in it: pressure and drag, for tools that a hand feels, and how much they displace.
+//!
+//! A body is a pillar in each cell that it covers (`terrain/shapes.rs`). Its faces are where liquid touches pillars: below, above, and beside, where the pillar of one
+//! cell and the liquid of the next are at the same height. On a face acts the weight of the liquid above it, rho g (eta - y), with the head of a
+//! flooded column in place of eta, to the pillar's exact integral; a ball that is all under has the buoyancy of its pillars. Against a face that
+//! the liquid runs into acts the pressure of a stagnant jet, rho w^2 / 2, and along each face the shear of a film, of a flooded gap, or of a wall half a cell away.
+
+use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::shallow::columns::Columns;
+use crate::shallow::columns::grid::Grid;
+use crate::shallow::pipes::joints::Side;
+use crate::shallow::solver::SLACK;
+use crate::shallow::system::Shallow;
+use crate::shallow::terrain::shapes::Shape;
+
+/// Least height of a flooded gap in which a body is held back (cells): of the pillars of a round one some come as close to the ground as they like.
+const LEAST_GAP: f64 = 0.05;
+
+/// What acts on a body.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Load {
+    /// Force of the liquid's weight (N): buoyancy, and what deeper liquid on one side does.
+    pub pressure: [f64; 3],
+    /// Force of its motion over the body (N).
+    pub drag: [f64; 3],
+    /// Torque of both about the body's middle (N m).
+    pub torque: [f64; 3],
+    /// Volume of the body below the surface of the liquid (m3): that of a flooded column below, else the mean of what is beside it.
+    pub displaced: f64,
+    /// Area of its faces that touch liquid (m2), of pillars.
+    pub wetted: f64,
+}
+
+/// What is known of a body while its faces are looked at.
+struct Feeling<'a> {
+    liquid: &'a Shallow,
+    density: f64,
+    velocity: DVec3,
+    middle: DVec3,
+    pressure: DVec3,
+    drag: DVec3,
+    torque: DVec3,
+    wetted: f64,
+    /// Units beside it: of contact, and times its surface and its base.
+    contact: f64,
+    levels: f64,
+    bases: f64,
+}
+
+/// A face: its middle, how far below that the weight of the liquid acts (m), which way the liquid pushes it, and how large it is.
+struct Face {
+    at: DVec3,
+    lower: f64,
+    push: DVec3,
+    area: f64,
+}
+
+impl Shallow {
+    /// What the liquid does to each of [`Shallow::bodies`] now; `velocities` are theirs (m/s), `density` is the liquid's (kg/m3; blood 1,060, water 1,000). What stands
+    /// below a body is as the last step has found it: after [`Shallow::set_bodies`] a step comes first. Allocates nothing.
+    ///
+    /// # Errors
+    /// `Argument`: a density that is not positive and finite, not one velocity and one place for each body, a velocity that is not finite.
+    pub fn loads(&self, density: f64, velocities: &[[f64; 3]], out: &mut [Load]) -> Result<()> {
+        if !(density > 0.0 && density.is_finite()) {
+            return Err(Error::argument(format!("density = {density} kg/m3 is not positive and finite")));
+        }
+        let bodies = self.bodies();
+        for (what, given) in [("velocities", velocities.len()), ("places", out.len())] {
+            if given != bodies.len() {
+                let count = bodies.len();
+                return Err(Error::argument(format!(
+                    "{given} {what} are not one for each of {count} bodies"
+                )));
+            }
+        }
+        if let Some(body) = velocities.iter().position(|velocity| !velocity.iter().all(|v| v.is_finite())) {
+            return Err(Error::argument(format!("the velocity of body {body} is not finite")));
+        }
+        for ((body, velocity), out) in bodies.iter().zip(velocities).zip(out) {
+            *out = self.load(body, density, DVec3::from(*velocity));
+        }
+        Ok(())
+    }
+
+    fn load(&self, body: &Shape, density: f64, velocity: DVec3) -> Load {
+        let Columns { grid, heights, .. } = &self.columns;
+        let mut feeling = Feeling {
+            liquid: self,
+            density,
+            velocity,
+            middle: body.middle(),
+            pressure: DVec3::zeros(),
+            drag: DVec3::zeros(),
+            torque: DVec3::zeros(),
+            wetted: 0.0,
+            contact: 0.0,
+            levels: 0.0,
+            bases: 0.0,
+        };
+        body.each(grid, heights, |cell, solid| feeling.pillar(cell, solid));
+        let around = [feeling.levels, feeling.bases].map(|sum| sum / feeling.contact);
+        let mut units = 0.0;
+        body.each(grid, heights, |cell, solid| units += self.under(cell, solid, around));
+        Load {
+            pressure: feeling.pressure.into(),
+            drag: feeling.drag.into(),
+            torque: feeling.torque.into(),
+            displaced: units * grid.cell * grid.cell * heights.unit,
+            wetted: feeling.wetted,
+        }
+    }
+
+    /// The columns below and above a pillar, where these are of it.
+    fn ends(&self, cell: [usize; 2], [bottom, top]: [i32; 2]) -> [Option<usize>; 2] {
+        let columns = &self.columns;
+        let mut ends = [None; 2];
+        for column in columns.of_cell(cell) {
+            if columns.ceilings()[column] == bottom {
+                ends[0] = Some(column);
+            }
+            if columns.bases()[column] == top {
+                ends[1] = Some(column);
+            }
+        }
+        ends
+    }
+
+    /// The height (units) that the liquid of a column stands at, or would without a ceiling; none where it is dry.
+    fn stands(&self, column: usize) -> Option<f64> {
+        let depth = self.flow.depth[column];
+        let eta = f64::from(self.columns.bases()[column]) + f64::from(depth);
+        (depth > 0).then(|| eta + f64::from(self.flow.heads()[column].max(0.0)))
+    }
+
+    /// Whether a column is flooded up to its ceiling, but for as little as the flow takes for full.
+    fn is_full(&self, column: usize) -> bool {
+        let room = self.columns.ceilings()[column] - self.columns.bases()[column];
+        self.flow.depth[column] > 0 && room - self.flow.depth[column] <= room / SLACK
+    }
+
+    /// The mean velocity of a column (m/s).
+    fn stream(&self, column: usize) -> DVec3 {
+        let [u, w] = self.velocity(column).map(f64::from);
+        DVec3::new(u, 0.0, w)
+    }
+
+    /// How much of a pillar is below the surface (units of height); the surface beside the body, and the ground there, are at `around`.
+    fn under(&self, cell: [usize; 2], [bottom, top]: [i32; 2], [level, ground]: [f64; 2]) -> f64 {
+        let [below, above] = self.ends(cell, [bottom, top]);
+        let (bottom, top) = (f64::from(bottom), f64::from(top));
+        let is_covered = above.is_some_and(|above| self.flow.depth[above] > 0);
+        let level = match below {
+            // What was pushed up onto a body that stands out of the liquid does not say that it is under.
+            _ if is_covered => level,
+            Some(below) => self.stands(below).filter(|_| self.is_full(below)).unwrap_or(f64::NAN),
+            None => level,
+        };
+        let bottom = if below.is_some() { bottom } else { bottom.max(ground) };
+        // Where nothing says how high liquid stands there is none.
+        if level.is_nan() { 0.0 } else { (level.min(top) - bottom).max(0.0) }
+    }
+}
+
+impl Feeling<'_> {
+    /// Adds what acts on the faces of a pillar.
+    fn pillar(&mut self, cell: [usize; 2], [bottom, top]: [i32; 2]) {
+        let Columns { grid, heights, .. } = &self.liquid.columns;
+        let (area, [x, z]) = (grid.cell * grid.cell, grid.centre(cell));
+        let [below, above] = self.liquid.ends(cell, [bottom, top]);
+        let depth = |column: usize| heights.length(f64::from(self.liquid.flow.depth[column]));
+        let face = |end: i32, push: f64| Face {
+            at: DVec3::new(x, heights.metres(end), z),
+            lower: 0.0,
+            push: DVec3::new(0.0, push, 0.0),
+            area,
+        };
+        // Between a film and the body above it is air.
+        if let Some((column, level)) = self.stands(below.filter(|&below| self.liquid.is_full(below))) {
+            // A flooded gap: what flows through it, and what the body drags along.
+            let sheared = 6.0 * self.liquid.stream(column) - self.velocity;
+            let shear = 1.0 / depth(column).max(LEAST_GAP * grid.cell);
+            self.face(&face(bottom, 1.0), level - f64::from(bottom), column, sheared * shear);
+        }
+        if let Some((column, level)) = self.stands(above) {
+            // A film; one that is thinner than a cell goes with the body, the more so the thinner it is.
+            let sheared = 3.0 * (self.liquid.stream(column) - self.velocity);
+            let thick = depth(column);
+            let shear = if thick < grid.cell { thick / (grid.cell * grid.cell) } else { 1.0 / thick };
+            self.face(&face(top, -1.0), level - f64::from(top), column, sheared * shear);
+        }
+        for side in [Side::East, Side::West, Side::South, Side::North] {
+            if let Some(beside) = side.cell(cell, grid.size) {
+                self.side(grid, cell, beside, [bottom, top]);
+            }
+        }
+    }
+
+    /// A column with liquid, and where it stands (units).
+    fn stands(&self, column: Option<usize>) -> Option<(usize, f64)> {
+        let column = column?;
+        Some((column, self.liquid.stands(column)?))
+    }
+
+    /// Adds what the liquid of an adjacent cell does.
+    fn side(&mut self, grid: &Grid, cell: [usize; 2], beside: [usize; 2], solid: [i32; 2]) {
+        let columns = &self.liquid.columns;
+        let out = [0, 1].map(|axis| beside[axis] as f64 - cell[axis] as f64);
+        let [x, z] = grid.centre(cell);
+        for column in columns.of_cell(beside) {
+            let Some(level) = self.liquid.stands(column) else { continue };
+            let base = columns.bases()[column];
+            let low = solid[0].max(base);
+            let high = solid[1].min(base + self.liquid.flow.depth[column]);
+            if low >= high {
+                continue;
+            }
+            let (contact, middle) = (f64::from(high - low), 0.5 * (f64::from(low) + f64::from(high)));
+            self.contact += contact;
+            self.levels += contact * level;
+            self.bases += contact * f64::from(base);
+            let height = columns.heights.low + middle * columns.heights.unit;
+            let half = 0.5 * grid.cell;
+            let face = Face {
+                at: DVec3::new(x + half * out[0], height, z + half * out[1]),
+                // The moment of what grows downward.
+                lower: columns.heights.length(contact * contact / (12.0 * (level - middle))),
+                push: DVec3::new(-out[0], 0.0, -out[1]),
+                area: columns.heights.length(contact) * grid.cell,
+            };
+            let sheared = (self.liquid.stream(column) - self.velocity) * (2.0 / grid.cell);
+            self.face(&face, level - middle, column, sheared);
+        }
+    }
+
+    /// Adds what a column does to a face that lies so far (units) below where it stands;  `sheared` is the shear rate along
+    /// it (1/s).
+    fn face(&mut self, face: &Face, head: f64, column: usize, sheared: DVec3) {
+        let liquid = self.liquid;
+        let weight = -liquid.params.gravity[1] * liquid.columns.heights.length(head);
+        let into = (liquid.stream(column) - self.velocity).dot(&face.push);
+        let stagnant = if into > 0.0 { 0.5 * into * into } else { 0.0 };
+        let along = sheared - face.push * sheared.dot(&face.push);
+        let friction = along * liquid.params.liquid.viscosity_at(along.norm());
+        let [pressure, drag] =
+            [face.push * weight, face.push * stagnant + friction].map(|of| of * (self.density * face.area));
+        self.pressure += pressure;
+        self.drag += drag;
+        let arm = face.at - self.middle;
+        self.torque += (arm - DVec3::y() * face.lower).cross(&pressure) + arm.cross(&drag);
+        self.wetted += face.area;
+    }
+}

@@ -1,0 +1,5 @@
+//! What hosts read of a liquid: snapshots, probes, loads on bodies.
+
+pub mod body_loads;
+pub mod probe;
+pub mod snapshot;

@@ -1,0 +1,236 @@
+//! The arrays of a liquid, as the threads that work on bands of its rows see them: their own rows, which they change, and copies of those
+//! before and behind, as they were at the start of the step.
+
+use std::ops::Range;
+
+use crate::shallow::columns::{Columns, STRIP};
+use crate::shallow::pipes::Links;
+use crate::shallow::scalars::MOST;
+use crate::shallow::solver::links::LinkFlow;
+
+/// Rows that a band sees beyond its own: three of which transfers are found, and one of depths.
+pub const BEYOND: usize = 4;
+
+/// A run of rows of all arrays; indices of columns and links count from where they start.
+pub struct Part<'a> {
+    /// First column index.
+    pub start: usize,
+    /// First link.
+    pub first_link: usize,
+    /// H (units).
+    pub depth: &'a mut [i32],
+    /// Flux to the east and to the south (units a step).
+    pub flux: [&'a mut [f32]; 2],
+    /// What truncation left of both (units).
+    pub left: [&'a mut [f32]; 2],
+    /// Flux of links, what truncation left, and their transfers.
+    pub links: LinkPart<'a>,
+    /// Amounts of scalars; empty without them.
+    pub amounts: [&'a mut [f64]; MOST],
+}
+
+/// Links of a run of rows.
+pub struct LinkPart<'a> {
+    /// Flux (units a step).
+    pub flux: &'a mut [f32],
+    /// What truncation left (units).
+    pub left: &'a mut [f32],
+    /// Transfer in this step (units).
+    pub transfer: &'a mut [f32],
+    /// What went over it freely; empty without scalars.
+    pub fallen: [&'a mut [f64]; MOST],
+}
+
+/// Copies of the rows beside a band.
+#[derive(Debug, Clone, Default)]
+pub struct Copy {
+    /// Which rows.
+    pub rows: Range<usize>,
+    depth: Vec<i32>,
+    flux: [Vec<f32>; 2],
+    left: [Vec<f32>; 2],
+    links: LinkFlow,
+    amounts: [Vec<f64>; MOST],
+}
+
+/// The three parts that a band sees: before it, its own, behind it.
+pub struct Parts<'a> {
+    /// The band's own rows.
+    pub rows: Range<usize>,
+    /// The first row that it sees.
+    pub first: usize,
+    parts: [Part<'a>; 3],
+}
+
+impl Copy {
+    /// Takes some rows of a liquid.
+    pub fn take(&mut self, columns: &Columns, links: &Links, rows: Range<usize>, liquid: &Part) {
+        let (columns, links) = (indices(columns, &rows), link_range(links, &rows));
+        self.rows = rows;
+        // One strip more for whoever reads the column to the east of the last one.
+        self.depth.clear();
+        self.depth.extend_from_slice(&liquid.depth[columns.start..columns.end + STRIP]);
+        for axis in 0..2 {
+            copy(&mut self.flux[axis], &liquid.flux[axis][columns.clone()]);
+            copy(&mut self.left[axis], &liquid.left[axis][columns.clone()]);
+        }
+        for (own, amounts) in self.amounts.iter_mut().zip(&liquid.amounts) {
+            copy(own, if amounts.is_empty() { &[] } else { &amounts[columns.clone()] });
+        }
+        copy(&mut self.links.flux, &liquid.links.flux[links.clone()]);
+        copy(&mut self.links.left, &liquid.links.left[links.clone()]);
+        copy(&mut self.links.transfer, &liquid.links.transfer[links.clone()]);
+        for (own, fallen) in self.links.fallen.iter_mut().zip(&liquid.links.fallen) {
+            copy(own, if fallen.is_empty() { &[] } else { &fallen[links.clone()] });
+        }
+    }
+
+    /// The copies, as a part.
+    pub fn part(&mut self, columns: &Columns, links: &Links) -> Part<'_> {
+        let start = indices(columns, &self.rows).start;
+        let first_link = link_range(links, &self.rows).start;
+        Part {
+            start,
+            first_link,
+            ..Part::new(
+                &mut self.depth,
+                self.flux.each_mut().map(Vec::as_mut_slice),
+                self.left.each_mut().map(Vec::as_mut_slice),
+                &mut self.links,
+                self.amounts.each_mut().map(Vec::as_mut_slice),
+            )
+        }
+    }
+}
+
+fn copy<T: Clone>(to: &mut Vec<T>, from: &[T]) {
+    to.clear();
+    to.extend_from_slice(from);
+}
+
+/// Arrays of scalars in two parts; those that are empty have none.
+type Halves<'a> = ([&'a mut [f64]; MOST], [&'a mut [f64]; MOST]);
+
+fn split(all: [&mut [f64]; MOST], at: usize) -> Halves<'_> {
+    let [mut before, mut behind] = [(); 2].map(|()| [(); MOST].map(|()| &mut [][..]));
+    for (scalar, numbers) in all.into_iter().enumerate() {
+        (before[scalar], behind[scalar]) = numbers.split_at_mut(at.min(numbers.len()));
+    }
+    (before, behind)
+}
+
+impl<'a> Part<'a> {
+    /// All of a liquid.
+    pub fn new(
+        depth: &'a mut [i32],
+        flux: [&'a mut [f32]; 2],
+        left: [&'a mut [f32]; 2],
+        links: &'a mut LinkFlow,
+        amounts: [&'a mut [f64]; MOST],
+    ) -> Self {
+        Self {
+            start: 0,
+            first_link: 0,
+            depth,
+            flux,
+            left,
+            links: LinkPart {
+                flux: &mut links.flux,
+                left: &mut links.left,
+                transfer: &mut links.transfer,
+                fallen: links.fallen.each_mut().map(Vec::as_mut_slice),
+            },
+            amounts,
+        }
+    }
+
+    /// Divides it before a row.
+    pub fn split(self, columns: &Columns, links: &Links, row: usize) -> [Self; 2] {
+        let index = indices(columns, &(row..row)).start;
+        let link = link_range(links, &(row..row)).start;
+        let (at, at_link) = (index - self.start, link - self.first_link);
+        let [flux_east, flux_south] = self.flux.map(|numbers| numbers.split_at_mut(at));
+        let [left_east, left_south] = self.left.map(|numbers| numbers.split_at_mut(at));
+        let depth = self.depth.split_at_mut(at);
+        let flux = self.links.flux.split_at_mut(at_link);
+        let left = self.links.left.split_at_mut(at_link);
+        let transfer = self.links.transfer.split_at_mut(at_link);
+        let amounts = split(self.amounts, at);
+        let fallen = split(self.links.fallen, at_link);
+        [
+            Self {
+                start: self.start,
+                first_link: self.first_link,
+                depth: depth.0,
+                flux: [flux_east.0, flux_south.0],
+                left: [left_east.0, left_south.0],
+                links: LinkPart { flux: flux.0, left: left.0, transfer: transfer.0, fallen: fallen.0 },
+                amounts: amounts.0,
+            },
+            Self {
+                start: index,
+                first_link: link,
+                depth: depth.1,
+                flux: [flux_east.1, flux_south.1],
+                left: [left_east.1, left_south.1],
+                links: LinkPart { flux: flux.1, left: left.1, transfer: transfer.1, fallen: fallen.1 },
+                amounts: amounts.1,
+            },
+        ]
+    }
+}
+
+impl<'a> Parts<'a> {
+    /// A band's rows, and copies of those before and behind.
+    pub fn new(rows: Range<usize>, before: Part<'a>, own: Part<'a>, behind: Part<'a>) -> Self {
+        Self { first: rows.start.saturating_sub(BEYOND), rows, parts: [before, own, behind] }
+    }
+
+    /// The part that a row is in.
+    #[inline(always)]
+    pub fn of(&mut self, row: usize) -> &mut Part<'a> {
+        let part = self.place(row);
+        &mut self.parts[part]
+    }
+
+    /// The part that a row is in, to read.
+    #[inline(always)]
+    pub fn see(&self, row: usize) -> &Part<'a> {
+        &self.parts[self.place(row)]
+    }
+
+    /// The parts of a row and of the next one, where these are two.
+    #[inline(always)]
+    pub fn both(&mut self, row: usize) -> (&mut Part<'a>, Option<&mut Part<'a>>) {
+        let (own, next) = (self.place(row), self.place(row + 1));
+        if own == next {
+            (&mut self.parts[own], None)
+        } else {
+            let (low, high) = self.parts.split_at_mut(next);
+            (&mut low[own], Some(&mut high[0]))
+        }
+    }
+
+    #[inline(always)]
+    fn place(&self, row: usize) -> usize {
+        if row < self.rows.start {
+            0
+        } else if row < self.rows.end {
+            1
+        } else {
+            2
+        }
+    }
+}
+
+/// Column indices of some rows.
+pub fn indices(columns: &Columns, rows: &Range<usize>) -> Range<usize> {
+    let count = columns.grid.size[1];
+    let start = |row: usize| if row < count { columns.row(row).start * STRIP } else { columns.len() };
+    start(rows.start)..start(rows.end)
+}
+
+/// Links that some rows own.
+pub fn link_range(links: &Links, rows: &Range<usize>) -> Range<usize> {
+    links.rows[rows.start] as usize..links.rows[rows.end] as usize
+}

@@ -1,0 +1,284 @@
+//! A step on several threads: each works on a band of rows.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::band_views::{BEYOND, Copy, Part, Parts};
+use super::buffers::Rows;
+use super::{Ground, Stepped};
+use crate::shallow::columns::{Columns, STRIP, strip_of};
+use crate::shallow::solver::flux::Step;
+use crate::shallow::solver::pressurised::network::SLACK;
+use crate::shallow::solver::transfers::scale;
+
+/// Columns from which on a step is divided among threads: below, starting them takes longer than they save.
+pub const LEAST_COLUMNS: usize = 100_000;
+/// Least rows of a band, so that what neighbours compute twice is little.
+const LEAST_ROWS: usize = 32;
+
+/// A band of rows and its buffers.
+#[derive(Debug, Clone)]
+struct Band {
+    rows: Range<usize>,
+    buffers: Rows,
+    before: Copy,
+    behind: Copy,
+    stepped: Stepped,
+}
+
+/// For each row, whether it has columns that might fill up to their ceiling in a step, and whether it might have such that are full.
+#[derive(Clone, Copy)]
+pub struct Filling<'a> {
+    pub may_fill: &'a [bool],
+    pub may_be_full: &'a [bool],
+}
+
+/// The bands of a domain.
+#[derive(Debug, Clone)]
+pub struct Bands {
+    list: Vec<Band>,
+    /// Least room between base and ceiling in each row (units).
+    clearance: Vec<i32>,
+    /// At least the greatest depth in each row (units).
+    deepest: Vec<i32>,
+    /// Whether columns of each row might fill up to their ceiling in this step.
+    may_fill: Vec<bool>,
+    /// The least room that a column of each row then has (units).
+    room: Vec<f32>,
+    /// Whether they might be full.
+    may_be_full: Vec<bool>,
+    /// Bound of the inflow of a column, in multiples of the greatest depth beside it and its own.
+    takes: i64,
+    /// Count of scalars that the liquid carries.
+    scalars: usize,
+}
+
+impl Bands {
+    /// One band over columns that have at most so many pipes each.
+    pub fn new(columns: &Columns, pipes: usize) -> Self {
+        let count = columns.grid.size[1];
+        let mut bands = Self {
+            list: Vec::new(),
+            clearance: (0..count).map(|row| clearance(columns, row)).collect(),
+            deepest: vec![0; count],
+            may_fill: vec![false; count],
+            room: vec![0.0; count],
+            may_be_full: vec![false; count],
+            takes: pipes as i64 + 1,
+            scalars: 0,
+        };
+        bands.divide(columns, 1);
+        bands
+    }
+
+    /// Memory (bytes).
+    pub fn bytes(&self) -> usize {
+        let woken = |band: &Band| band.stepped.woken.capacity() * size_of::<u32>();
+        let bands: usize = self.list.iter().map(|band| band.buffers.bytes() + woken(band)).sum();
+        bands
+            + size_of_val(&self.clearance[..])
+            + size_of_val(&self.deepest[..])
+            + size_of_val(&self.room[..])
+            + 2 * self.may_fill.len()
+    }
+
+    /// Divides the rows among so many threads, by their columns; unless they are already.
+    pub fn divide(&mut self, columns: &Columns, threads: usize) {
+        let rows = columns.grid.size[1];
+        let wanted = if columns.len() < LEAST_COLUMNS { 1 } else { threads.min(rows / LEAST_ROWS).max(1) };
+        if self.list.len() == wanted {
+            return;
+        }
+        let strips = columns.strips().len();
+        let (mut start, scalars) = (0, self.scalars);
+        let band = |number: usize| {
+            let end = if number + 1 == wanted {
+                rows
+            } else {
+                // So many strips are before it, and at least the least rows.
+                let before = strips * (number + 1) / wanted;
+                let left = (wanted - 1 - number) * LEAST_ROWS;
+                let even = (0..rows).find(|&row| columns.row(row).end >= before).unwrap_or(rows);
+                even.clamp(start + LEAST_ROWS, rows - left)
+            };
+            let rows = start..end;
+            start = end;
+            Band {
+                rows,
+                buffers: Rows::new(columns, scalars),
+                before: Copy::default(),
+                behind: Copy::default(),
+                stepped: Stepped { woken: Vec::with_capacity(strips), ..Stepped::default() },
+            }
+        };
+        self.list = (0..wanted).map(band).collect();
+    }
+
+    /// Makes buffers for liquid that carries so many scalars.
+    pub fn carry(&mut self, columns: &Columns, scalars: usize) {
+        let threads = self.list.len();
+        self.scalars = scalars;
+        self.list.clear();
+        self.divide(columns, threads);
+    }
+
+    /// Measures rows again after their columns have changed.
+    pub(in crate::shallow) fn refit(
+        &mut self,
+        columns: &Columns,
+        pipes: usize,
+        rows: Range<usize>,
+        depth: &[i32],
+    ) {
+        self.takes = pipes as i64 + 1;
+        for row in rows.clone() {
+            self.clearance[row] = clearance(columns, row);
+            let depths = &depth[super::band_views::indices(columns, &(row..row + 1))];
+            self.deepest[row] = depths.iter().copied().max().unwrap_or(0);
+        }
+        for band in &mut self.list {
+            band.buffers.widen(columns, rows.clone());
+            band.stepped.woken.reserve(columns.strips().len());
+        }
+    }
+
+    /// Says that a column of a row has this depth (units).
+    pub fn deepen(&mut self, row: usize, depth: i32) {
+        self.deepest[row] = self.deepest[row].max(depth);
+    }
+
+    /// At least the greatest depth (units).
+    pub fn deepest(&self) -> i32 {
+        self.deepest.iter().copied().max().unwrap_or(0)
+    }
+
+    /// At least the greatest depth of each row (units).
+    pub(in crate::shallow) fn row_depths(&self) -> &[i32] {
+        &self.deepest
+    }
+
+    /// As [`Bands::row_depths`], to restore them.
+    pub(in crate::shallow) fn row_depths_mut(&mut self) -> &mut [i32] {
+        &mut self.deepest
+    }
+
+    /// Rows that [`Bands::find_filling`] has found.
+    pub fn filling(&self) -> Filling<'_> {
+        Filling { may_fill: &self.may_fill, may_be_full: &self.may_be_full }
+    }
+
+    /// Finds the rows with columns that might fill up; whether there is one.
+    pub fn find_filling(&mut self) -> bool {
+        let mut any = false;
+        for row in 0..self.deepest.len() {
+            let around = row.saturating_sub(1)..(row + 2).min(self.deepest.len());
+            let deepest = self.deepest[around].iter().copied().max().unwrap_or(0);
+            self.may_fill[row] = self.takes * i64::from(deepest) > i64::from(self.clearance[row]);
+            self.room[row] = scale::room(0, self.clearance[row], self.deepest[row]);
+            self.may_be_full[row] = self.deepest[row] >= self.clearance[row] - self.clearance[row] / SLACK;
+            any |= self.may_fill[row];
+        }
+        any
+    }
+
+    /// One step; `ground` gets its rows that may fill from here.
+    pub fn step(&mut self, step: &Step, ground: &Ground, liquid: Part) {
+        let Self { list, deepest, may_fill, room, .. } = self;
+        let ground = Ground { may_fill, room, ..*ground };
+        let (columns, links) = (ground.columns, &ground.pipes.links);
+        let rows = columns.grid.size[1];
+        for band in &mut *list {
+            let Range { start, end } = band.rows;
+            band.before.take(columns, links, start.saturating_sub(BEYOND)..start, &liquid);
+            band.behind.take(columns, links, end..(end + BEYOND).min(rows), &liquid);
+        }
+        run(list, step, &ground, liquid, deepest);
+    }
+
+    /// Whether a step is divided.
+    pub fn are_several(&self) -> bool {
+        self.list.len() > 1
+    }
+
+    /// What the bands did, one after another.
+    pub fn results(&mut self) -> impl Iterator<Item = &mut Stepped> {
+        self.list.iter_mut().map(|band| &mut band.stepped)
+    }
+}
+
+/// Runs bands side by side.
+fn run(bands: &mut [Band], step: &Step, ground: &Ground, liquid: Part, deepest: &mut [i32]) {
+    match bands {
+        [] => {}
+        [band] => {
+            let (columns, links) = (ground.columns, &ground.pipes.links);
+            let (before, behind) = (band.before.part(columns, links), band.behind.part(columns, links));
+            let mut parts = Parts::new(band.rows.clone(), before, liquid, behind);
+            band.buffers.step(step, ground, &mut parts, deepest, &mut band.stepped);
+        }
+        _ => {
+            let (first, others) = bands.split_at_mut(bands.len() / 2);
+            let (row, start) = (others[0].rows.start, first[0].rows.start);
+            let [low, high] = liquid.split(ground.columns, &ground.pipes.links, row);
+            let (deepest_low, deepest_high) = deepest.split_at_mut(row - start);
+            rayon::join(
+                || run(first, step, ground, low, deepest_low),
+                || run(others, step, ground, high, deepest_high),
+            );
+        }
+    }
+}
+
+/// Runs the steps of a frame while the other threads of the pool stay awake for their bands: to wake one takes longer than a band of a step.
+/// Without a free thread the frame's own does all.
+pub fn attended<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
+    let done = AtomicBool::new(false);
+    let ended = &done;
+    let work = move || {
+        // Also when the work panics.
+        let _end = End(ended);
+        work()
+    };
+    rayon::join(work, || attend(threads.saturating_sub(1), ended)).0
+}
+
+/// Takes jobs of the pool until the frame is done, on so many threads.
+fn attend(threads: usize, ended: &AtomicBool) {
+    let wait = || {
+        while !ended.load(Ordering::Acquire) {
+            if rayon::yield_now() != Some(rayon::Yield::Executed) {
+                std::hint::spin_loop();
+            }
+        }
+    };
+    if threads > 1 {
+        rayon::join(wait, || attend(threads - 1, ended));
+    } else {
+        wait();
+    }
+}
+
+/// Sets a flag when it is dropped.
+struct End<'a>(&'a AtomicBool);
+
+impl Drop for End<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Release);
+    }
+}
+
+/// Least room between base and ceiling of a row's columns (units).
+fn clearance(columns: &Columns, row: usize) -> i32 {
+    let mut least = i32::MAX;
+    for strip in columns.row(row) {
+        let present = columns.present(strip);
+        let (base, ceiling) = (strip_of(columns.bases(), strip), strip_of(columns.ceilings(), strip));
+        for x in 0..STRIP {
+            // What has no room at all is a wall.
+            let is_room = present >> x & 1 == 1 && ceiling[x] > base[x];
+            let room = if is_room { ceiling[x] - base[x] } else { i32::MAX };
+            least = least.min(room);
+        }
+    }
+    least
+}

@@ -1,0 +1,102 @@
+//! What is kept of a band's rows between their fluxes and their new depths.
+
+use std::ops::Range;
+
+use super::positions::PAD;
+use crate::shallow::columns::{Columns, STRIP};
+use crate::shallow::solver::transfers::scalars::Lanes;
+
+/// Rows whose buffers are kept: a power of two, over the five that are in use at a time.
+pub const RING: usize = 8;
+/// Sweeps that find K_max.
+pub const SWEEPS: usize = 2;
+
+/// What is known of a row between its fluxes and its new depths; indices as the row's columns, behind [`PAD`].
+#[derive(Debug, Clone)]
+pub struct Buffer {
+    /// Transfers to the east and to the south (units).
+    pub east: Vec<f32>,
+    pub south: Vec<f32>,
+    /// K_min of each column, if one is not 1.
+    pub least: Vec<f32>,
+    pub is_less: bool,
+    /// Whether a column may fill up in this step.
+    pub may_fill: bool,
+    /// K_max of each column, after each sweep, if one is not 1.
+    pub most: [Vec<f32>; SWEEPS],
+    pub is_full: bool,
+}
+
+impl Buffer {
+    /// All factors are 1.
+    pub fn clear(&mut self) {
+        (self.is_less, self.may_fill, self.is_full) = (false, false, false);
+    }
+}
+
+/// Buffers of a band's rows in work.
+#[derive(Debug, Clone)]
+pub struct Rows {
+    pub ring: [Buffer; RING],
+    /// For neighbours that are not there, and factors that are all 1.
+    pub zeros: Vec<f32>,
+    pub ones: Vec<f32>,
+    /// Sums over links, by column; 0 between steps.
+    pub linked: Vec<i64>,
+    /// What the rows carry.
+    pub carried: Lanes,
+}
+
+impl Rows {
+    /// Buffers for rows of these columns, whose liquid carries so many scalars.
+    pub fn new(columns: &Columns, scalars: usize) -> Self {
+        let room = room(columns, 0..columns.grid.size[1]);
+        let buffer = Buffer {
+            east: vec![0.0; room],
+            south: vec![0.0; room],
+            least: vec![1.0; room],
+            is_less: false,
+            may_fill: false,
+            most: std::array::from_fn(|_| vec![1.0; room]),
+            is_full: false,
+        };
+        Self {
+            ring: std::array::from_fn(|_| buffer.clone()),
+            zeros: vec![0.0; room],
+            ones: vec![1.0; room],
+            linked: vec![0; room],
+            carried: Lanes::new(scalars, room),
+        }
+    }
+
+    /// Makes buffers as wide as the widest of some rows.
+    pub(in crate::shallow::solver) fn widen(&mut self, columns: &Columns, rows: Range<usize>) {
+        let room = room(columns, rows);
+        if room <= self.zeros.len() {
+            return;
+        }
+        for Buffer { east, south, least, most, .. } in &mut self.ring {
+            [east, south].into_iter().for_each(|transfers| transfers.resize(room, 0.0));
+            std::iter::once(least).chain(most).for_each(|factors| factors.resize(room, 1.0));
+        }
+        self.zeros.resize(room, 0.0);
+        self.ones.resize(room, 1.0);
+        self.linked.resize(room, 0);
+        self.carried.widen(room);
+    }
+
+    /// Memory (bytes).
+    pub fn bytes(&self) -> usize {
+        let numbers = |buffer: &Buffer| {
+            let all = [&buffer.east, &buffer.south, &buffer.least, &buffer.most[0], &buffer.most[1]];
+            all.iter().map(|numbers| size_of_val(&numbers[..])).sum::<usize>()
+        };
+        let none = size_of_val(&self.zeros[..]) + size_of_val(&self.ones[..]) + size_of_val(&self.linked[..]);
+        self.ring.iter().map(numbers).sum::<usize>() + none + self.carried.bytes()
+    }
+}
+
+/// Numbers of a buffer for the widest of some rows.
+fn room(columns: &Columns, rows: Range<usize>) -> usize {
+    rows.map(|row| columns.row(row).len()).max().unwrap_or(0) * STRIP + 2 * PAD
+}

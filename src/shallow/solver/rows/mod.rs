@@ -1,0 +1,414 @@
+//! A step, row by row: fluxes, their scaling and the new depths follow each other at a distance of a few rows, so that what one
+//! has read or written is still in the cache for the next (thesis Alg. 4.1, lines 1 to 4).
+//!
+//! When the front is at row r, the fluxes and K_min of r are computed; with these the pipes of r - 1 can be scaled. Where there are
+//! ceilings, K_max of r - 1 follows, and that of r - 2 once more, with the room that outflow makes. The transfers of the row behind these
+//! are then final, and its depths change; nothing in front reads that row again. A band starts some rows before its own rows and ends
+//! some rows after them, on copies, so that it finds the same numbers there as its neighbours.
+
+pub(in crate::shallow::solver) mod band_views;
+pub(in crate::shallow) mod bands;
+pub(in crate::shallow::solver) mod buffers;
+pub(in crate::shallow::solver) mod positions;
+
+use super::active::Active;
+use super::fast_films::Fast;
+use super::flux::{Carried, Kind, Of, Row, Step, flux_row, greater, solved_row};
+use super::lateral_friction::Walls;
+use super::links::{Outside, indices_of};
+use super::overflow_edges::Lips;
+use super::pressurised::network::Network;
+use super::transfers::inflow_limit::most_through_links;
+use super::transfers::scale;
+use super::transfers::whole_units::{find_woken, move_units};
+use crate::numeric::cpu::dispatch;
+use crate::shallow::columns::{Columns, NONE, STRIP};
+use crate::shallow::pipes::Pipes;
+use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::amounts::{Act, Changes};
+use band_views::Parts;
+use buffers::{Buffer, RING, Rows, SWEEPS};
+use positions::{PAD, Place};
+
+/// What a step is made on.
+pub struct Ground<'a> {
+    /// Columns.
+    pub columns: &'a Columns,
+    /// Pipes between them.
+    pub pipes: &'a Pipes,
+    /// Strips that are worked on.
+    pub active: &'a Active,
+    /// What flows through full columns.
+    pub network: &'a Network,
+    /// Films whose inertia counts less.
+    pub fast: &'a Fast,
+    /// Friction beside pipes.
+    pub walls: &'a Walls,
+    /// Links that liquid falls freely from.
+    pub lips: &'a Lips,
+    /// Whether what is slow may come to rest.
+    pub may_rest: bool,
+    /// Rows with columns that may fill up,
+    pub may_fill: &'a [bool],
+    /// and the least room that each row's columns have (units).
+    pub room: &'a [f32],
+    /// What the laws of scalars do.
+    pub acts: &'a [Act],
+}
+
+impl Ground<'_> {
+    /// Whether there is nothing to do in a row.
+    #[inline(always)]
+    fn is_idle(&self, row: usize) -> bool {
+        let links = &self.pipes.links;
+        row >= self.columns.grid.size[1]
+            || self.active.row(row).is_empty()
+                && (links.row(row).is_empty() && links.columns_of(row).is_empty() || self.active.rests(row))
+                && self.network.is_empty()
+    }
+}
+
+/// What a band of a step did.
+#[derive(Debug, Clone, Default)]
+pub struct Stepped {
+    /// Rows with columns that would have given more than they have, with such that would have taken more than there is room for, and with fast
+    /// films that were held back.
+    pub scaled: [u32; 3],
+    /// What went out of the domain.
+    pub outside: Outside,
+    /// Strips that got wet.
+    pub woken: Vec<u32>,
+    /// What happened to scalars.
+    pub carried: [Changes; MOST],
+}
+
+impl Rows {
+    /// One step of a band of rows; `deepest` receives the greatest depth of each (units).
+    pub fn step(
+        &mut self,
+        step: &Step,
+        ground: &Ground,
+        parts: &mut Parts,
+        deepest: &mut [i32],
+        stepped: &mut Stepped,
+    ) {
+        /// A copy of the step for each kind of flow and each set of instructions.
+        macro_rules! run {
+            ($($viscous:literal $whole:literal $thins:literal)*) => {
+                match (step.drag > 0.0, step.is_whole, step.drag > 0.0 && step.thinning.is_some()) {
+                    $(($viscous, $whole, $thins) => {
+                        #[inline(always)]
+                        fn body(rows: &mut Rows, step: &Step, ground: &Ground, parts: &mut Parts, deepest: &mut [i32], stepped: &mut Stepped) {
+                            rows.run::<Of<$viscous, $whole, $thins>>(step, ground, parts, deepest, stepped);
+                        }
+                        let rows = self;
+                        dispatch!(body(rows: &mut Rows, step: &Step, ground: &Ground, parts: &mut Parts, deepest: &mut [i32], stepped: &mut Stepped))
+                    })*
+                    (false, _, true) => unreachable!("only viscosity thins"),
+                }
+            };
+        }
+        run!(true true true true true false true false true true false false false true false false false false)
+    }
+
+    #[inline(always)]
+    fn run<K: Kind>(
+        &mut self,
+        step: &Step,
+        ground: &Ground,
+        parts: &mut Parts,
+        deepest: &mut [i32],
+        stepped: &mut Stepped,
+    ) {
+        let count = ground.columns.grid.size[1];
+        let behind = if ground.may_fill.contains(&true) { 1 + SWEEPS } else { 1 };
+        let own = parts.rows.clone();
+        let start = own.start.saturating_sub(1 + behind);
+        let mut idle = 0;
+        for front in start..own.end + behind {
+            idle = if ground.is_idle(front) { idle + 1 } else { 0 };
+            if idle > behind + 1 {
+                self.ring[front % RING].clear();
+                if let Some(row) = front.checked_sub(behind).filter(|row| own.contains(row)) {
+                    deepest[row - own.start] = ground.active.asleep_depth(row);
+                }
+                continue;
+            }
+            if front < count {
+                let is_held = self.drive::<K>(step, ground, parts, front);
+                stepped.scaled[2] += u32::from(is_held && own.contains(&front));
+                if !ground.network.is_empty() {
+                    self.shut(ground, parts, front);
+                }
+                if !self.carried.is_empty() {
+                    self.carried.find_levels(ground, parts, front);
+                }
+                let over = self.find_least(ground, parts, front);
+                stepped.scaled[0] += u32::from(over && own.contains(&front));
+            }
+            // The row that is so far behind the front, if the band has begun with it.
+            let at = |distance: usize| front.checked_sub(distance).filter(|row| (start..count).contains(row));
+            if let Some(row) = at(1) {
+                self.shrink(ground, parts, row);
+            }
+            if let Some(row) = at(1).filter(|_| behind > 1) {
+                let is_full = self.find_most(ground, parts, row);
+                stepped.scaled[1] += u32::from(is_full && own.contains(&row));
+            }
+            if let Some(row) = at(2).filter(|_| behind > 1) {
+                self.find_more(ground, parts, row);
+            }
+            if let Some(row) = at(behind).filter(|row| row + 1 >= own.start) {
+                self.fit(ground, parts, row);
+                self.move_links(ground, parts, row, &mut stepped.outside);
+                if own.contains(&row) {
+                    deepest[row - own.start] = self.transfer(ground, parts, row, &mut stepped.woken);
+                }
+                if !self.carried.is_empty() {
+                    self.carry(ground, parts, row, &mut stepped.carried);
+                }
+            }
+        }
+    }
+
+    /// Fluxes of a row's pipes; whether fast films were held back.
+    #[inline(always)]
+    fn drive<K: Kind>(&mut self, step: &Step, ground: &Ground, parts: &mut Parts, row: usize) -> bool {
+        let Ground { columns, pipes, active, fast, .. } = ground;
+        let (light, is_fast) = (fast.light(), fast.row(row));
+        let (walls, is_walled) = (ground.walls, K::VISCOUS && !K::WHOLE && ground.walls.row(row));
+        let start = columns.row(row).start * STRIP;
+        let buffer = &mut self.ring[row % RING];
+        buffer.clear();
+        let (own, beyond) = parts.both(row);
+        let ([flux_east, flux_south], [left_east, left_south]) = (&mut own.flux, &mut own.left);
+        let (mut end, mut is_held) = (0, false);
+        for span in active.row(row) {
+            let at = PAD + span.first as usize - start;
+            if at != end {
+                buffer.east[at - 1] = 0.0;
+            }
+            end = at + span.len as usize;
+            let depth = &own.depth[span.first as usize - own.start..];
+            // Behind the last strip of a band no depth follows: it is driven by itself, on a copy with the next row's first.
+            let (mut last, len) = ([0; STRIP + 1], span.len as usize);
+            let cut = if depth.len() > len { len } else { len - STRIP };
+            if cut < len {
+                last[..STRIP].copy_from_slice(&depth[cut..len]);
+                last[STRIP] = beyond.as_ref().map_or(0, |next| next.depth[0]);
+            }
+            for (place, len) in [(0, cut), (cut, len - cut)].into_iter().filter(|(_, len)| *len > 0) {
+                let (first, at) = (span.first as usize + place, at + place);
+                let mine = first - own.start;
+                let south = if span.south == NONE { first } else { span.south as usize + place };
+                let south_depth = match &beyond {
+                    Some(next) if span.south != NONE => &next.depth[south - next.start..],
+                    _ => &own.depth[south - own.start..],
+                };
+                let row = Row {
+                    base: &columns.bases()[first..],
+                    depth: if place < cut { depth } else { &last },
+                    south_base: &columns.bases()[south..],
+                    south_depth,
+                    open: [&pipes.east[first..], &pipes.south[first..]],
+                    light: &light[first..],
+                    is_light: &fast.strips()[first / STRIP..],
+                };
+                let (mine, at) = (mine..mine + len, at..at + len);
+                let carried = Carried {
+                    flux: [&mut flux_east[mine.clone()], &mut flux_south[mine.clone()]],
+                    left: [&mut left_east[mine.clone()], &mut left_south[mine]],
+                    transfer: [&mut buffer.east[at.clone()], &mut buffer.south[at]],
+                };
+                if is_walled {
+                    let solved = walls.solved().map(|flux| &flux[first..]);
+                    if is_fast {
+                        is_held |= solved_row::<true>(step, &row, solved, carried);
+                    } else {
+                        solved_row::<false>(step, &row, solved, carried);
+                    }
+                } else {
+                    is_held |= match (K::VISCOUS && !K::WHOLE && is_fast, ground.may_rest) {
+                        (true, true) => flux_row::<K, true, true>(step, &row, carried),
+                        (true, false) => flux_row::<K, true, false>(step, &row, carried),
+                        (false, true) => flux_row::<K, false, true>(step, &row, carried),
+                        (false, false) => flux_row::<K, false, false>(step, &row, carried),
+                    };
+                }
+            }
+        }
+        if !pipes.links.is_empty() {
+            let (start, first_link) = (own.start, own.first_link);
+            let next = beyond.as_ref().map(|next| (next.start, &*next.depth));
+            let depth = |index: usize| match next {
+                Some((start, depth)) if index >= start => depth[index - start],
+                _ => own.depth[index - start],
+            };
+            own.links.drive::<K>(step, columns, &pipes.links, ground.lips, (row, first_link), depth);
+        }
+        is_held
+    }
+
+    /// What the network moves, behind the fluxes of all pipes of a row.
+    fn shut(&mut self, ground: &Ground, parts: &mut Parts, row: usize) {
+        let (place, buffer) = (Place::new(ground.columns, row), &mut self.ring[row % RING]);
+        let part = parts.of(row);
+        let (start, first_link) = (part.start, part.first_link);
+        let (depth, transfer) = (&mut *part.depth, &mut *part.links.transfer);
+        ground.network.move_units(
+            &indices_of(ground.columns, row),
+            &ground.pipes.links.row(row),
+            |column, units| depth[column as usize - start] += units,
+            |column| buffer.east[place.of(column)] = 0.0,
+            |column| buffer.south[place.of(column)] = 0.0,
+            |link| transfer[link as usize - first_link] = 0.0,
+        );
+    }
+
+    /// K_min of a row's columns; whether one is not 1.
+    #[inline(always)]
+    fn find_least(&mut self, ground: &Ground, parts: &Parts, row: usize) -> bool {
+        let Ground { columns, pipes, active, .. } = ground;
+        let part = parts.see(row);
+        let [own, north] =
+            self.ring.get_disjoint_mut([row % RING, (row + RING - 1) % RING]).expect("two rows");
+        let place = Place::new(columns, row);
+        let (mut over, may_fill, mut into) = (false, ground.may_fill[row], [0.0; STRIP]);
+        for span in active.row(row) {
+            let (at, len) = (place.of(span.first), span.len as usize);
+            let around = place.around(&own.east, &own.south, &north.south, &self.zeros, span);
+            let depth = &part.depth[span.first as usize - part.start..];
+            let out = &mut own.least[at..at + len];
+            over |= if may_fill {
+                scale::outflow::<true>(depth, &around, out, &mut into)
+            } else {
+                scale::outflow::<false>(depth, &around, out, &mut into)
+            };
+        }
+        if !pipes.links.columns_of(row).is_empty() {
+            let sums = &mut self.linked;
+            each_link(ground, parts, row, true, |column, units| sums[place.of(column)] += units);
+            for &column in pipes.links.columns_of(row) {
+                own.least[place.of(column)] += std::mem::take(&mut sums[place.of(column)]) as f32;
+            }
+            // Few columns have links, but any may be over now.
+            over = true;
+        }
+        if may_fill {
+            let linked = most_through_links(ground, parts, row, &mut self.linked);
+            own.may_fill =
+                into.into_iter().fold(0.0, greater) + linked > ground.room[row] || !ground.network.is_empty();
+        }
+        let mut is_less = false;
+        if over {
+            for span in active.row(row) {
+                let (at, len) = (place.of(span.first), span.len as usize);
+                let depth = &part.depth[span.first as usize - part.start..];
+                is_less |= scale::least(depth, &mut own.least[at..at + len]) < 1.0;
+            }
+        }
+        own.is_less = is_less;
+        is_less
+    }
+
+    /// Multiplies a row's transfers by K_min.
+    #[inline(always)]
+    fn shrink(&mut self, ground: &Ground, parts: &mut Parts, row: usize) {
+        let [own, south] = self.ring.get_disjoint_mut([row % RING, (row + 1) % RING]).expect("two rows");
+        let south_is_less = south.is_less && row + 1 < ground.columns.grid.size[1];
+        if !own.is_less && !south_is_less {
+            return;
+        }
+        let least = if own.is_less { &own.least } else { &self.ones };
+        let beyond = if south_is_less { &south.least } else { &self.ones };
+        let place = Place::new(ground.columns, row);
+        let part = parts.of(row);
+        let [flux_east, flux_south] = &mut part.flux;
+        for span in ground.active.row(row) {
+            let (at, len) = (place.of(span.first), span.len as usize);
+            let mine = span.first as usize - part.start;
+            let factor = place.beside(least, beyond, &self.ones, span);
+            scale::shrink(
+                &factor,
+                &mut own.east[at..at + len],
+                &mut own.south[at..at + len],
+                &mut flux_east[mine..mine + len],
+                &mut flux_south[mine..mine + len],
+            );
+        }
+        let first_link = part.first_link;
+        let factor = |column| place.pick(least, beyond, column);
+        part.links.scale(&ground.pipes.links, ground.lips, (row, first_link), true, factor);
+    }
+
+    /// Moves what a row's links transfer, from and to the band's own columns.
+    fn move_links(&self, ground: &Ground, parts: &mut Parts, row: usize, outside: &mut Outside) {
+        let links = &ground.pipes.links;
+        if links.row(row).is_empty() {
+            return;
+        }
+        let is_own = parts.rows.contains(&row);
+        let own = band_views::indices(ground.columns, &parts.rows);
+        let mut elsewhere = Outside::default();
+        let outside = if is_own { outside } else { &mut elsewhere };
+        let (part, next) = parts.both(row);
+        let (first_link, start) = (part.first_link, part.start);
+        let depth = &mut *part.depth;
+        let mut next = next.map(|next| (next.start, &mut *next.depth));
+        part.links.move_units(links, ground.lips, (row, first_link), outside, |column, units| {
+            if own.contains(&column) {
+                match &mut next {
+                    Some((start, depth)) if column >= *start => depth[column - *start] += units,
+                    _ => depth[column - start] += units,
+                }
+            }
+        });
+    }
+
+    /// Moves a row's transfers; returns its greatest new depth.
+    #[inline(always)]
+    fn transfer(&mut self, ground: &Ground, parts: &mut Parts, row: usize, woken: &mut Vec<u32>) -> i32 {
+        let [own, north] =
+            self.ring.get_disjoint_mut([row % RING, (row + RING - 1) % RING]).expect("two rows");
+        let place = Place::new(ground.columns, row);
+        let part = parts.of(row);
+        let mut deepest = [0; STRIP];
+        for span in ground.active.row(row) {
+            let (mine, len) = (span.first as usize - part.start, span.len as usize);
+            let around = place.around(&own.east, &own.south, &north.south, &self.zeros, span);
+            let depth = &mut part.depth[mine..mine + len];
+            move_units(&around, depth, &mut deepest);
+            let strip = span.first / STRIP as u32;
+            let marks = [ground.active.wet(), ground.active.moving()].map(|marks| &marks[strip as usize..]);
+            find_woken(&around, depth, marks, |place| woken.push(strip + place as u32));
+        }
+        deepest.into_iter().fold(ground.active.asleep_depth(row), i32::max)
+    }
+
+    /// Moves what a row's transfers take along; its depths are final.
+    fn carry(&mut self, ground: &Ground, parts: &mut Parts, row: usize, changes: &mut [Changes; MOST]) {
+        let Self { carried, ring, .. } = self;
+        let Buffer { east, south, .. } = &ring[row % RING];
+        carried.move_links(ground, parts, row, changes);
+        carried.move_row(ground, parts, row, [east, south], changes);
+    }
+}
+
+/// Calls `add` with each column of a row that gives through a link, or takes, and how much.
+pub(super) fn each_link(
+    ground: &Ground,
+    parts: &Parts,
+    row: usize,
+    gives: bool,
+    mut add: impl FnMut(u32, i64),
+) {
+    let links = &ground.pipes.links;
+    if links.columns_of(row).is_empty() {
+        return;
+    }
+    let within = indices_of(ground.columns, row);
+    for owner in row.saturating_sub(1).max(parts.first)..row + 1 {
+        let part = parts.see(owner);
+        part.links.each(links, ground.lips, (owner, part.first_link), &within, gives, &mut add);
+    }
+}

@@ -1,0 +1,137 @@
+//! K_max: what comes into columns is scaled to the room that they have (thesis 4.1.1). Few rows have columns that could fill up in a step: those are
+//! known from the sums of what is to come, before they are scaled.
+
+use super::scale;
+use crate::shallow::solver::flux::{greater, lesser};
+use crate::shallow::solver::rows::band_views::Parts;
+use crate::shallow::solver::rows::buffers::{RING, Rows};
+use crate::shallow::solver::rows::positions::Place;
+use crate::shallow::solver::rows::{Ground, each_link};
+
+impl Rows {
+    /// K_max of a row's columns, as if nothing left them; whether one is not 1.
+    #[inline(always)]
+    pub(in crate::shallow::solver) fn find_most(
+        &mut self,
+        ground: &Ground,
+        parts: &Parts,
+        row: usize,
+    ) -> bool {
+        let Ground { columns, active, .. } = ground;
+        let part = parts.see(row);
+        let [own, north] =
+            self.ring.get_disjoint_mut([row % RING, (row + RING - 1) % RING]).expect("two rows");
+        if !own.may_fill {
+            return false;
+        }
+        let place = Place::new(columns, row);
+        let [most, _] = &mut own.most;
+        for span in active.row(row) {
+            let (at, len) = (place.of(span.first), span.len as usize);
+            let around = place.around(&own.east, &own.south, &north.south, &self.zeros, span);
+            scale::inflow(&around, &mut most[at..at + len]);
+        }
+        let sums = &mut self.linked;
+        each_link(ground, parts, row, false, |column, units| sums[place.of(column)] += units);
+        for &column in ground.pipes.links.columns_of(row) {
+            most[place.of(column)] += std::mem::take(&mut sums[place.of(column)]) as f32;
+        }
+        let mut is_full = false;
+        for span in active.row(row) {
+            let (at, first, len) = (place.of(span.first), span.first as usize, span.len as usize);
+            let (base, ceiling) = (&columns.bases()[first..], &columns.ceilings()[first..]);
+            let depth = &part.depth[first - part.start..];
+            is_full |= scale::find_most(base, ceiling, depth, &mut most[at..at + len]) < 1.0;
+        }
+        own.is_full = is_full;
+        is_full
+    }
+
+    /// K_max of a row's columns once more, with the room that what leaves them makes.
+    #[inline(always)]
+    pub(in crate::shallow::solver) fn find_more(&mut self, ground: &Ground, parts: &Parts, row: usize) {
+        let Ground { columns, pipes, active, .. } = ground;
+        let part = parts.see(row);
+        let rows = [row % RING, (row + RING - 1) % RING, (row + 1) % RING];
+        let [own, north, south] = self.ring.get_disjoint_mut(rows).expect("three rows");
+        if !own.is_full {
+            return;
+        }
+        let place = Place::new(columns, row);
+        let count = columns.grid.size[1];
+        let beyond = if row + 1 < count && south.is_full { &south.most[0] } else { &self.ones };
+        let before = if row > 0 && north.is_full { &north.most[0] } else { &self.ones };
+        let [first_most, most] = &mut own.most;
+        for span in active.row(row) {
+            let (at, first, len) = (place.of(span.first), span.first as usize, span.len as usize);
+            let around = place.around(&own.east, &own.south, &north.south, &self.zeros, span);
+            let near = place.beside(first_most, beyond, &self.ones, span);
+            let north_most = place.north(before, &self.ones, span);
+            for x in 0..len {
+                let i = first + x;
+                let k = first_most[at + x];
+                most[at + x] = k;
+                if k < 1.0 {
+                    let along = greater(around.east[x], 0.0) * near.own[x + 1]
+                        - lesser(around.west[x], 0.0) * first_most[at + x - 1];
+                    let across = greater(around.south[x], 0.0) * near.south[x]
+                        - lesser(around.north[x], 0.0) * north_most[x];
+                    // Truncation takes up to a unit from each.
+                    let leaves = greater((along + across) * scale::MARGIN - 4.0, 0.0);
+                    let room =
+                        scale::room(columns.bases()[i], columns.ceilings()[i], part.depth[i - part.start]);
+                    let along = greater(around.west[x], 0.0) - lesser(around.east[x], 0.0);
+                    let across = greater(around.north[x], 0.0) - lesser(around.south[x], 0.0);
+                    most[at + x] = scale::most(along + across, room + leaves).max(k);
+                }
+            }
+        }
+        // What comes through links is not in the sum: their columns keep the first sweep's.
+        for &column in pipes.links.columns_of(row) {
+            most[place.of(column)] = first_most[place.of(column)];
+        }
+    }
+
+    /// Multiplies a row's transfers by K_max.
+    #[inline(always)]
+    pub(in crate::shallow::solver) fn fit(&mut self, ground: &Ground, parts: &mut Parts, row: usize) {
+        let [own, south] = self.ring.get_disjoint_mut([row % RING, (row + 1) % RING]).expect("two rows");
+        let south_is_full = south.is_full && row + 1 < ground.columns.grid.size[1];
+        if !own.is_full && !south_is_full {
+            return;
+        }
+        let most = if own.is_full { &own.most[1] } else { &self.ones };
+        let beyond = if south_is_full { &south.most[1] } else { &self.ones };
+        let place = Place::new(ground.columns, row);
+        let part = parts.of(row);
+        let [flux_east, flux_south] = &mut part.flux;
+        for span in ground.active.row(row) {
+            let (at, len) = (place.of(span.first), span.len as usize);
+            let mine = span.first as usize - part.start;
+            let factor = place.beside(most, beyond, &self.ones, span);
+            scale::fit(
+                &factor,
+                &mut own.east[at..at + len],
+                &mut own.south[at..at + len],
+                &mut flux_east[mine..mine + len],
+                &mut flux_south[mine..mine + len],
+            );
+        }
+        let first_link = part.first_link;
+        let factor = |column| place.pick(most, beyond, column);
+        part.links.scale(&ground.pipes.links, ground.lips, (row, first_link), false, factor);
+    }
+}
+
+/// The most that is to come into a column of a row through links (units); `sums` are 0, before and behind.
+pub(in crate::shallow::solver) fn most_through_links(
+    ground: &Ground,
+    parts: &Parts,
+    row: usize,
+    sums: &mut [i64],
+) -> f32 {
+    let place = Place::new(ground.columns, row);
+    each_link(ground, parts, row, false, |column, units| sums[place.of(column)] += units);
+    let columns = ground.pipes.links.columns_of(row).iter();
+    columns.map(|&column| std::mem::take(&mut sums[place.of(column)])).max().unwrap_or(0) as f32
+}

@@ -1,0 +1,72 @@
+//! Iterative limiter of integer transfers: no column gives more than it has or takes more than it has room for.
+//!
+//! All are cut at once in each round, by integers, so that nothing depends on an order: first to what their givers have, then, until nothing
+//! is over, to what their takers have room for with what they give. Each cut makes others safer as givers, and may leave them too little room
+//! as takers: that is for the next round.
+
+use crate::shallow::columns::NONE;
+use crate::shallow::solver::pressurised::network::Edge;
+use crate::shallow::solver::stop::Stop;
+
+/// Rounds in which inflow is cut in proportion; then it is cut to nothing.
+const CUTS: usize = 64;
+
+/// A column at an end of such a transfer.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::shallow::solver) struct Party {
+    /// Its index.
+    pub column: u32,
+    /// Units that it has, and that it has room for.
+    pub has: i64,
+    pub room: i64,
+    /// Units that it gives and takes in this round.
+    pub gives: i64,
+    pub takes: i64,
+}
+
+/// Cuts the units of transfers, unless it is stopped.
+pub(in crate::shallow::solver) fn settle(parties: &mut [Party], edges: &mut [Edge], stop: &Stop) {
+    count(parties, edges);
+    for edge in edges.iter_mut() {
+        if let Some(giver) = parties.get(edge.ends[usize::from(edge.units < 0)] as usize)
+            && giver.gives > giver.has
+        {
+            edge.units = share(edge.units, giver.has, giver.gives);
+        }
+    }
+    for round in 0.. {
+        count(parties, edges);
+        if parties.iter().all(|party| party.takes - party.gives <= party.room) || stop.is_asked() {
+            return;
+        }
+        for edge in edges.iter_mut() {
+            let taker = edge.ends[usize::from(edge.units > 0)];
+            if let Some(taker) = parties.get(taker as usize).filter(|_| taker != NONE)
+                && taker.takes - taker.gives > taker.room
+            {
+                let fits = if round < CUTS { taker.room + taker.gives } else { 0 };
+                edge.units = share(edge.units, fits, taker.takes);
+            }
+        }
+    }
+}
+
+/// units x part / whole, toward zero.
+fn share(units: i64, part: i64, whole: i64) -> i64 {
+    (i128::from(units) * i128::from(part) / i128::from(whole)) as i64
+}
+
+fn count(parties: &mut [Party], edges: &[Edge]) {
+    for party in parties.iter_mut() {
+        (party.gives, party.takes) = (0, 0);
+    }
+    for edge in edges.iter().filter(|edge| edge.units != 0) {
+        let giver = usize::from(edge.units < 0);
+        if let Some(party) = parties.get_mut(edge.ends[giver] as usize) {
+            party.gives += edge.units.abs();
+        }
+        if let Some(party) = parties.get_mut(edge.ends[1 - giver] as usize) {
+            party.takes += edge.units.abs();
+        }
+    }
+}

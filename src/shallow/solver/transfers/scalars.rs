@@ -1,0 +1,293 @@
+//! What transfers take along of the scalars: of each the share of the amount that the transfer is of the depth, at the concentration with which the
+//! step begins (behind what flooded passages move, which comes first).
+//!
+//! It follows the rows of a step (`rows.rs`): the levels of the row in front, and, when the transfers of a row are final, what these take along.
+
+use super::whole_units::take_along;
+use crate::numeric::cpu::dispatch;
+use crate::shallow::columns::{NONE, STRIP, strip_mut, strip_of};
+use crate::shallow::scalars::amounts::{Act, Changes};
+use crate::shallow::scalars::shares::{LEVELS, MOST, integer, level, nearest, share};
+use crate::shallow::solver::overflow_edges::{Fall, Lips};
+use crate::shallow::solver::pressurised::network::{At, Network};
+use crate::shallow::solver::rows::Ground;
+use crate::shallow::solver::rows::band_views::{Parts, indices};
+use crate::shallow::solver::rows::buffers::RING;
+use crate::shallow::solver::rows::positions::Place;
+
+/// What is kept of a scalar in the rows of a band in work; indices as in `Buffer`.
+#[derive(Debug, Clone)]
+struct Lane {
+    /// Concentrations (levels).
+    level: [Vec<f64>; RING],
+    /// Amounts that go to the south, of a row and the one before.
+    south: [Vec<f64>; 2],
+    /// Amounts that go to the east.
+    east: Vec<f64>,
+}
+
+/// All scalars.
+#[derive(Debug, Clone, Default)]
+pub struct Lanes {
+    lanes: Vec<Lane>,
+    /// For neighbours that are not there.
+    none: Vec<f64>,
+}
+
+impl Lanes {
+    /// So many scalars, in rows of so many numbers.
+    pub fn new(count: usize, room: usize) -> Self {
+        let numbers = || vec![0.0; room];
+        let lane = |_| Lane {
+            level: std::array::from_fn(|_| numbers()),
+            south: std::array::from_fn(|_| numbers()),
+            east: numbers(),
+        };
+        Self { lanes: (0..count).map(lane).collect(), none: if count > 0 { numbers() } else { Vec::new() } }
+    }
+
+    /// Whether there is no scalar.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.lanes.is_empty()
+    }
+
+    /// Makes room for rows of so many numbers.
+    pub fn widen(&mut self, room: usize) {
+        for Lane { level, south, east } in &mut self.lanes {
+            level.iter_mut().chain(south).for_each(|numbers| numbers.resize(room, 0.0));
+            east.resize(room, 0.0);
+        }
+        if !self.lanes.is_empty() {
+            self.none.resize(room, 0.0);
+        }
+    }
+
+    /// Memory (bytes).
+    pub fn bytes(&self) -> usize {
+        (self.lanes.len() * (RING + 3) + 1) * size_of_val(&self.none[..])
+    }
+
+    /// Finds the concentrations in a row, from the depths that its transfers are scaled by.
+    #[inline(never)]
+    pub fn find_levels(&mut self, ground: &Ground, parts: &Parts, row: usize) {
+        let (part, place) = (parts.see(row), Place::new(ground.columns, row));
+        for (lane, amounts) in self.lanes.iter_mut().zip(&part.amounts) {
+            let levels = &mut lane.level[row % RING];
+            for span in ground.active.row(row) {
+                let (at, mine, len) =
+                    (place.of(span.first), span.first as usize - part.start, span.len as usize);
+                let own = mine..mine + len;
+                find_levels(&amounts[own.clone()], &part.depth[own], &mut levels[at..at + len]);
+            }
+        }
+    }
+
+    /// Moves what the links of a row take along, from and to the band's own columns.
+    #[inline(never)]
+    pub fn move_links(&self, ground: &Ground, parts: &mut Parts, row: usize, changes: &mut [Changes; MOST]) {
+        let links = &ground.pipes.links;
+        let (is_own, own) = (parts.rows.contains(&row), indices(ground.columns, &parts.rows));
+        let place = Place::new(ground.columns, row);
+        let (part, mut next) = parts.both(row);
+        for (scalar, lane) in self.lanes.iter().enumerate() {
+            let [levels, beyond] = [row, row + 1].map(|row| &lane.level[row % RING]);
+            for link in links.row(row) {
+                // As whole units move.
+                let units = part.links.transfer[link - part.first_link] as i32;
+                if units == 0 {
+                    continue;
+                }
+                let (from, to, fall) = (links.from[link], links.to[link], ground.lips.at(link));
+                // From outside comes what is like the liquid inside.
+                let giver = if units > 0 || to == NONE { from } else { to };
+                let moved = share(place.pick(levels, beyond, giver), f64::from(units));
+                let mut change = |column: u32, amount: f64| {
+                    let column = column as usize;
+                    if own.contains(&column) {
+                        match &mut next {
+                            Some(next) if column >= next.start => {
+                                next.amounts[scalar][column - next.start] += amount;
+                            }
+                            _ => part.amounts[scalar][column - part.start] += amount,
+                        }
+                    }
+                };
+                if fall != Fall::No {
+                    let fallen = if units > 0 { moved } else { -moved };
+                    change(giver, -fallen);
+                    part.links.fallen[scalar][link - part.first_link] = fallen;
+                    continue;
+                }
+                change(from, -moved);
+                match to {
+                    NONE if is_own && units > 0 => changes[scalar].lost += i128::from(integer(moved)),
+                    NONE if is_own => changes[scalar].gained -= i128::from(integer(moved)),
+                    NONE => {}
+                    to => change(to, moved),
+                }
+            }
+        }
+    }
+
+    /// Finds what a row's transfers to the east and to the south take along, and moves it, if the row is the band's own; then the laws act.
+    #[inline(never)]
+    pub fn move_row(
+        &mut self,
+        ground: &Ground,
+        parts: &mut Parts,
+        row: usize,
+        [east, south]: [&[f32]; 2],
+        changes: &mut [Changes; MOST],
+    ) {
+        let is_own = parts.rows.contains(&row);
+        let (part, place) = (parts.of(row), Place::new(ground.columns, row));
+        let Self { lanes, none } = self;
+        for (scalar, (lane, act)) in lanes.iter_mut().zip(ground.acts).enumerate() {
+            let [levels, beyond] =
+                [&lane.level[row % RING], &lane.level[(row + 1) % RING]].map(|levels| &levels[..]);
+            let [own_south, north] = lane.south.get_disjoint_mut([row % 2, (row + 1) % 2]).expect("two rows");
+            for span in ground.active.row(row) {
+                let (at, len) = (place.of(span.first), span.len as usize);
+                let beside = place.beside(levels, beyond, none, span);
+                take_along(beside.own, beside.south, &south[at..], &mut own_south[at..at + len]);
+                if is_own {
+                    take_along(beside.own, &beside.own[1..], &east[at..], &mut lane.east[at..at + len]);
+                }
+            }
+            if !is_own {
+                continue;
+            }
+            let (mut end, changes) = (0, &mut changes[scalar]);
+            for span in ground.active.row(row) {
+                let (at, mine, len) =
+                    (place.of(span.first), span.first as usize - part.start, span.len as usize);
+                if at != end {
+                    lane.east[at - 1] = 0.0;
+                }
+                end = at + len;
+                let around = [
+                    &lane.east[at..at + len],
+                    &lane.east[at - 1..at - 1 + len],
+                    &own_south[at..at + len],
+                    &place.north(north, none, span)[..len],
+                ];
+                let (depth, amount) =
+                    (&part.depth[mine..mine + len], &mut part.amounts[scalar][mine..mine + len]);
+                changes.dried += i128::from(move_amounts(&around, depth, amount));
+                if *act != Act::default() {
+                    changes.grown += i128::from(obey(*act, depth, amount));
+                }
+            }
+        }
+    }
+}
+
+/// Concentrations of columns. A plain loop: of strips in a loop, as they are elsewhere, the compiler would gather one number of each.
+fn find_levels(amount: &[f64], depth: &[i32], levels: &mut [f64]) {
+    dispatch!(body(amount: &[f64], depth: &[i32], levels: &mut [f64]));
+
+    #[inline(always)]
+    fn body(amount: &[f64], depth: &[i32], levels: &mut [f64]) {
+        for ((out, amount), depth) in levels.iter_mut().zip(amount).zip(depth) {
+            *out = level(*amount, *depth);
+        }
+    }
+}
+
+/// Moves amounts that go to the east, come from the west, go to the south and come from the north; returns what stays behind in columns that ran
+/// dry, which is taken from them: it is at most half of the smallest amount for each pipe.
+fn move_amounts(around: &[&[f64]; 4], depth: &[i32], amount: &mut [f64]) -> i64 {
+    return dispatch!(body(around: &[&[f64]; 4], depth: &[i32], amount: &mut [f64]) -> i64);
+
+    #[inline(always)]
+    fn body([east, west, south, north]: &[&[f64]; 4], depth: &[i32], amount: &mut [f64]) -> i64 {
+        let mut dried = [0.0; STRIP];
+        for strip in 0..amount.len() / STRIP {
+            let along = [strip_of(east, strip), strip_of(west, strip)];
+            let across = [strip_of(south, strip), strip_of(north, strip)];
+            move_strip(along, across, strip_of(depth, strip), strip_mut(amount, strip), &mut dried);
+        }
+        integer(dried.iter().sum())
+    }
+
+    #[inline(always)]
+    fn move_strip(
+        [east, west]: [&[f64; STRIP]; 2],
+        [south, north]: [&[f64; STRIP]; 2],
+        depth: &[i32; STRIP],
+        amount: &mut [f64; STRIP],
+        dried: &mut [f64; STRIP],
+    ) {
+        for x in 0..STRIP {
+            let now = amount[x] + ((west[x] - east[x]) + (north[x] - south[x]));
+            let is_dry = depth[x] == 0;
+            amount[x] = if is_dry { 0.0 } else { now };
+            dried[x] += if is_dry { now } else { 0.0 };
+        }
+    }
+}
+
+/// Changes amounts by a law; returns their sum's growth.
+fn obey(act: Act, depth: &[i32], amount: &mut [f64]) -> i64 {
+    return dispatch!(body(act: Act, depth: &[i32], amount: &mut [f64]) -> i64);
+
+    #[inline(always)]
+    fn body(act: Act, depth: &[i32], amount: &mut [f64]) -> i64 {
+        let mut grown = [0; STRIP];
+        for strip in 0..amount.len() / STRIP {
+            obey_strip(act, strip_of(depth, strip), strip_mut(amount, strip), &mut grown);
+        }
+        grown.iter().sum()
+    }
+
+    #[inline(always)]
+    fn obey_strip(act: Act, depth: &[i32; STRIP], amount: &mut [f64; STRIP], grown: &mut [i64; STRIP]) {
+        for x in 0..STRIP {
+            let depth = f64::from(depth[x]);
+            let before = amount[x];
+            let kept = before - nearest(before * act.loses);
+            let older = kept + depth * act.grows;
+            let most = depth * LEVELS;
+            let now = if act.grows > 0.0 && older > most { most } else { older };
+            amount[x] = now;
+            grown[x] += integer(now - before);
+        }
+    }
+}
+
+impl Network {
+    /// Moves what the network's units take along, at the concentrations before; `depth` is that before, too. `fallen` gets what goes over lips.
+    pub fn carry(
+        &self,
+        depth: &[i32],
+        (lips, fallen): (&Lips, &mut [f64]),
+        amounts: &mut [f64],
+        levels: &mut Vec<f64>,
+        changes: &mut Changes,
+    ) {
+        let of = |column: u32| level(amounts[column as usize], depth[column as usize]);
+        levels.clear();
+        levels.extend(self.parties.iter().map(|party| of(party.column)));
+        for edge in self.edges.iter().filter(|edge| edge.units != 0) {
+            let [from, to] = edge.ends;
+            if let At::Link(link) = edge.at
+                && lips.at(link as usize) != Fall::No
+            {
+                let giver = if from == NONE { to } else { from } as usize;
+                let moved = share(levels[giver], edge.units.abs() as f64);
+                amounts[self.parties[giver].column as usize] -= moved;
+                fallen[link as usize] = moved;
+                continue;
+            }
+            let giver = if edge.units > 0 || to == NONE { from } else { to };
+            let moved = share(levels[giver as usize], edge.units as f64);
+            amounts[self.parties[from as usize].column as usize] -= moved;
+            match self.parties.get(to as usize) {
+                Some(party) => amounts[party.column as usize] += moved,
+                None if edge.units > 0 => changes.lost += i128::from(integer(moved)),
+                None => changes.gained -= i128::from(integer(moved)),
+            }
+        }
+    }
+}

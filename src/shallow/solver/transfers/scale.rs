@@ -1,0 +1,210 @@
+//! Scaling of transfers, so that no column gives more than it has or takes more than it has room for (thesis 4.1.1, K_min and K_max).
+//!
+//! A pipe's transfer is multiplied by one K_min, of the column that gives, and one K_max, of the one that takes: what leaves one column
+//! arrives in the other. K_max depends on what leaves the column in the same step, which depends on the K_max of others: it is found in
+//! sweeps, from below, so that it is safe after each.
+
+use crate::shallow::columns::{STRIP, strip_from, strip_mut, strip_of};
+use crate::shallow::solver::flux::{greater, lesser};
+
+/// Depths and room are counted as this much less, and sums of four or more rounded transfers stay within them.
+pub const MARGIN: f32 = 1.0 - 1.0 / (1u32 << 20) as f32;
+
+/// The transfers (units) of a span's pipes on all sides; `west` begins one before `east`, so that each column's is at its place.
+pub struct Around<'a> {
+    /// To the east.
+    pub east: &'a [f32],
+    /// From the west.
+    pub west: &'a [f32],
+    /// To the south.
+    pub south: &'a [f32],
+    /// From the north.
+    pub north: &'a [f32],
+}
+
+impl<'a> Around<'a> {
+    /// Those of a strip of the span: to the east, from the west, to the south, and from the north.
+    #[inline(always)]
+    pub fn strip(&self, strip: usize) -> [&'a [f32; STRIP]; 4] {
+        [self.east, self.west, self.south, self.north].map(|numbers| strip_of(numbers, strip))
+    }
+}
+
+/// One number of the columns of a span, and of those around them.
+pub struct Beside<'a, T = f32> {
+    /// The span's own, and one more: the columns to the east.
+    pub own: &'a [T],
+    /// Those to the south.
+    pub south: &'a [T],
+}
+
+/// The depth that a column can give (units): a dry one keeps what is less than a unit.
+#[inline(always)]
+fn spare(depth: i32) -> f32 {
+    (depth.max(1)) as f32 * MARGIN
+}
+
+/// Sums what is to leave each column; whether it is more than the column has anywhere. Where columns may fill up, `into` is raised to the most that is to
+/// come into one of each place.
+#[inline(always)]
+pub fn outflow<const FILLS: bool>(
+    depth: &[i32],
+    around: &Around,
+    out: &mut [f32],
+    into: &mut [f32; STRIP],
+) -> bool {
+    let mut over = [0; STRIP];
+    for strip in 0..out.len() / STRIP {
+        let around = around.strip(strip);
+        outflow_of::<FILLS>(strip_of(depth, strip), &around, strip_mut(out, strip), &mut over, into);
+    }
+    over != [0; STRIP]
+}
+
+#[inline(always)]
+fn outflow_of<const FILLS: bool>(
+    depth: &[i32; STRIP],
+    around: &[&[f32; STRIP]; 4],
+    out: &mut [f32; STRIP],
+    over: &mut [i32; STRIP],
+    into: &mut [f32; STRIP],
+) {
+    let [east, west, south, north] = around;
+    for x in 0..STRIP {
+        let along = greater(east[x], 0.0) - lesser(west[x], 0.0);
+        let across = greater(south[x], 0.0) - lesser(north[x], 0.0);
+        out[x] = along + across;
+        over[x] |= i32::from(out[x] > spare(depth[x]));
+        if FILLS {
+            into[x] = greater(into[x], coming(around, x));
+        }
+    }
+}
+
+/// Turns what is to leave each column into K_min; returns the least.
+#[inline(always)]
+pub fn least(depth: &[i32], out: &mut [f32]) -> f32 {
+    let mut least = [1.0; STRIP];
+    for strip in 0..out.len() / STRIP {
+        least_of(strip_of(depth, strip), strip_mut(out, strip), &mut least);
+    }
+    least.into_iter().fold(1.0, lesser)
+}
+
+#[inline(always)]
+fn least_of(depth: &[i32; STRIP], out: &mut [f32; STRIP], least: &mut [f32; STRIP]) {
+    for x in 0..STRIP {
+        let spare = spare(depth[x]);
+        out[x] = if out[x] > spare { spare / out[x] } else { 1.0 };
+        least[x] = lesser(out[x], least[x]);
+    }
+}
+
+/// Multiplies transfers and fluxes by K_min of the columns that give.
+#[inline(always)]
+pub fn shrink(
+    least: &Beside,
+    east: &mut [f32],
+    south: &mut [f32],
+    flux_east: &mut [f32],
+    flux_south: &mut [f32],
+) {
+    scale(least, east, south, flux_east, flux_south, |own, other| [own, other]);
+}
+
+/// Multiplies transfers and fluxes by K_max of the columns that take.
+#[inline(always)]
+pub fn fit(
+    most: &Beside,
+    east: &mut [f32],
+    south: &mut [f32],
+    flux_east: &mut [f32],
+    flux_south: &mut [f32],
+) {
+    scale(most, east, south, flux_east, flux_south, |own, other| [other, own]);
+}
+
+/// Multiplies by the factors that `order` puts first where liquid flows away from a column, and by the others where it flows towards it.
+#[inline(always)]
+fn scale(
+    factor: &Beside,
+    east: &mut [f32],
+    south: &mut [f32],
+    flux_east: &mut [f32],
+    flux_south: &mut [f32],
+    order: impl for<'a> Fn(&'a [f32; STRIP], &'a [f32; STRIP]) -> [&'a [f32; STRIP]; 2],
+) {
+    for strip in 0..east.len() / STRIP {
+        let own = strip_of(factor.own, strip);
+        let factors = order(own, strip_from(factor.own, strip * STRIP + 1));
+        scale_strip(factors, strip_mut(east, strip), strip_mut(flux_east, strip));
+        let factors = order(own, strip_of(factor.south, strip));
+        scale_strip(factors, strip_mut(south, strip), strip_mut(flux_south, strip));
+    }
+}
+
+#[inline(always)]
+fn scale_strip([away, towards]: [&[f32; STRIP]; 2], transfer: &mut [f32; STRIP], flux: &mut [f32; STRIP]) {
+    for x in 0..STRIP {
+        // What moves nothing has neither giver nor taker.
+        let (away, towards) = (away[x], towards[x]);
+        let k = if transfer[x] > 0.0 { away } else { 1.0 };
+        let k = if transfer[x] < 0.0 { towards } else { k };
+        transfer[x] *= k;
+        flux[x] *= k;
+    }
+}
+
+/// Sums what is to come into each column.
+#[inline(always)]
+pub fn inflow(around: &Around, into: &mut [f32]) {
+    for strip in 0..into.len() / STRIP {
+        inflow_of(&around.strip(strip), strip_mut(into, strip));
+    }
+}
+
+#[inline(always)]
+fn inflow_of(around: &[&[f32; STRIP]; 4], into: &mut [f32; STRIP]) {
+    for (x, into) in into.iter_mut().enumerate() {
+        *into = coming(around, x);
+    }
+}
+
+/// What is to come into a column. Where transfers are scaled, it is less or the same, also as rounded.
+#[inline(always)]
+fn coming([east, west, south, north]: &[&[f32; STRIP]; 4], x: usize) -> f32 {
+    let along = greater(west[x], 0.0) - lesser(east[x], 0.0);
+    let across = greater(north[x], 0.0) - lesser(south[x], 0.0);
+    along + across
+}
+
+/// The room of a column (units).
+#[inline(always)]
+pub fn room(base: i32, ceiling: i32, depth: i32) -> f32 {
+    (ceiling - base - depth).max(0) as f32 * MARGIN
+}
+
+/// K_max of a column, of what is to come in and the room for it.
+#[inline(always)]
+pub fn most(into: f32, room: f32) -> f32 {
+    if into > room { room / into } else { 1.0 }
+}
+
+/// Turns what is to come into each column into K_max, as if nothing left; returns the least.
+#[inline(always)]
+pub fn find_most(base: &[i32], ceiling: &[i32], depth: &[i32], into: &mut [f32]) -> f32 {
+    let mut least = [1.0; STRIP];
+    for strip in 0..into.len() / STRIP {
+        let columns = [base, ceiling, depth].map(|numbers| strip_of(numbers, strip));
+        most_of(columns, strip_mut(into, strip), &mut least);
+    }
+    least.into_iter().fold(1.0, lesser)
+}
+
+#[inline(always)]
+fn most_of([base, ceiling, depth]: [&[i32; STRIP]; 3], into: &mut [f32; STRIP], least: &mut [f32; STRIP]) {
+    for x in 0..STRIP {
+        into[x] = most(into[x], room(base[x], ceiling[x], depth[x]));
+        least[x] = lesser(into[x], least[x]);
+    }
+}

@@ -1,0 +1,346 @@
+//! Where liquid comes in and goes out: sources, drains, orifices and absorbers, at the end of each step (thesis Alg. 4.1, line 5).
+//!
+//! Each moves whole units. What its rate asks for is shared equally by the columns in its circle; what is left of the division waits for the
+//! next step, so that a source delivers its rate to a unit a column. What finds no room in them waits, too, but no more than a step asks for: a
+//! source in a cavity that is full stands still, and does not make up for it when the cavity opens.
+
+mod pour;
+
+use super::columns::Columns;
+use super::scalars::amounts::Account;
+use super::scalars::shares::{Levels, MOST};
+use super::solver::Flow;
+use crate::error::{Error, Result};
+
+/// A source, a drain or an absorber.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlowPoint {
+    /// What it does.
+    pub kind: Kind,
+    /// Its centre (m).
+    pub at: [f64; 3],
+    /// Columns whose centres lie within so much of it, seen from above (m); the nearest one, if none does.
+    pub radius: f64,
+    /// Volume per second (m3/s), 0 and up; 1 ml is 1e-6 m3. Of an orifice the most that goes out.
+    pub rate: f64,
+    /// How the rate changes; none: it does not.
+    pub pulse: Option<Pulse>,
+}
+
+/// What a [`FlowPoint`] does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// Liquid comes in.
+    Source,
+    /// Liquid goes out, as long as there is some below it.
+    Drain,
+    /// As a drain, until it has taken so much (m3): gauze.
+    Absorber(f64),
+    /// A hole in the ground, through which liquid runs out by its own weight: Cd a (2 g H)^(1/2) a second (Torricelli's law), of the mean depth H in its circle. The
+    /// number is Cd a (m2): the hole's area times the share of it that the jet fills, 0.6 to 0.65 for a sharp edge.
+    Orifice(f64),
+}
+
+/// A rate that swings: rate (1 + share sin(2 pi frequency t)), never under 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pulse {
+    /// Swings a second, 0 and up.
+    pub frequency: f64,
+    /// By which share of the rate it swings, 0 to 1.
+    pub share: f64,
+}
+
+/// A flow point on its columns.
+#[derive(Debug, Clone, PartialEq)]
+struct Placed {
+    point: FlowPoint,
+    columns: Vec<u32>,
+    /// Units asked for that have not moved.
+    waiting: f64,
+    /// Units moved so far: those that came in or went out.
+    moved: i64,
+    /// Concentrations of what comes in.
+    levels: Levels,
+}
+
+/// Units a column that a source owes at most, beside what a step asks for: what is left of a division, in cells of half the length, too.
+const OWED: f64 = 4.0;
+
+/// All flow points.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Flows {
+    placed: Vec<Placed>,
+    /// Units that came in through all sources so far.
+    pub sourced: i64,
+    /// Units that went out through all drains so far.
+    pub drained: i64,
+    /// Units that went into all absorbers so far.
+    pub absorbed: i64,
+}
+
+impl FlowPoint {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// `Argument`, naming the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        let [x, y, z] = self.at;
+        if !(x.is_finite() && y.is_finite() && z.is_finite()) {
+            return Err(Error::argument(format!("at = ({x}, {y}, {z}) is not finite")));
+        }
+        let positive = |name: &str, value: f64| {
+            if value >= 0.0 && value.is_finite() {
+                Ok(())
+            } else {
+                Err(Error::argument(format!("{name} = {value} is not 0 or more")))
+            }
+        };
+        positive("radius", self.radius)?;
+        positive("rate", self.rate)?;
+        match self.kind {
+            Kind::Absorber(capacity) => positive("capacity", capacity)?,
+            Kind::Orifice(opening) => positive("opening", opening)?,
+            Kind::Source | Kind::Drain => {}
+        }
+        let Some(pulse) = self.pulse else { return Ok(()) };
+        positive("pulse.frequency", pulse.frequency)?;
+        if !(0.0..=1.0).contains(&pulse.share) {
+            return Err(Error::argument(format!("pulse.share = {} is not within 0 to 1", pulse.share)));
+        }
+        Ok(())
+    }
+
+    fn rate_at(&self, time: f64) -> f64 {
+        let swing =
+            |pulse: Pulse| pulse.share * libm::sin(std::f64::consts::TAU * (pulse.frequency * time).fract());
+        (self.rate * (1.0 + self.pulse.map_or(0.0, swing))).max(0.0)
+    }
+
+    /// Lists the columns in its circle: in each cell the one that the centre lies in, or is nearest to.
+    pub(super) fn find_columns(&self, columns: &Columns, found: &mut Vec<u32>) {
+        let grid = &columns.grid;
+        let [x, y, z] = self.at;
+        let reach = self.radius / grid.cell + 1.0;
+        let range = |axis: usize, at: f64| {
+            let centre = (at - grid.origin[axis]) / grid.cell;
+            let last = grid.size[axis] as f64 - 1.0;
+            let [low, high] = [centre - reach, centre + reach].map(|at| at.floor().clamp(0.0, last) as usize);
+            low..=high
+        };
+        let off = |i: usize| {
+            let [base, ceiling] =
+                [columns.bases()[i], columns.ceilings()[i]].map(|h| columns.heights.metres(h));
+            (base - y).max(y - ceiling).max(0.0)
+        };
+        let near = self.radius.max(2.0 * grid.cell);
+        let nearest = |cell: [usize; 2]| {
+            let column = columns.of_cell(cell).min_by(|&i, &j| off(i).total_cmp(&off(j)));
+            column.filter(|&i| off(i) <= near).map(|i| i as u32)
+        };
+        found.clear();
+        let mut has_cells = false;
+        for row in range(1, z) {
+            for across in range(0, x) {
+                let [cx, cz] = grid.centre([across, row]);
+                if (cx - x).powi(2) + (cz - z).powi(2) <= self.radius * self.radius {
+                    has_cells = true;
+                    found.extend(nearest([across, row]));
+                }
+            }
+        }
+        if !has_cells {
+            // A vertex on the border of a terrain may lie a little outside, in 32 bits.
+            let within = |axis: usize, at: f64| {
+                let (low, size) = (grid.origin[axis], grid.size[axis] as f64 * grid.cell);
+                let inside = at.clamp(low, low + size * (1.0 - 1e-12));
+                if (at - inside).abs() < 1e-3 * grid.cell { inside } else { at }
+            };
+            found.extend(grid.cell_at([within(0, x), within(1, z)]).and_then(nearest));
+        }
+    }
+}
+
+impl Flows {
+    /// Sets the flow points, in place of those before; what these have moved stays in the sums. `which` names one in an error.
+    ///
+    /// # Errors
+    /// `Argument`: a number out of range, or a point that has no column within its radius (or two cells): it lies inside solid, or outside of
+    /// the domain.
+    pub fn set(
+        &mut self,
+        columns: &Columns,
+        points: &[FlowPoint],
+        which: impl Fn(usize) -> String,
+    ) -> Result<()> {
+        let placed = placed(columns, points, &which)?;
+        if let Some(at) = placed.iter().position(|placed| placed.columns.is_empty()) {
+            let [x, y, z] = points[at].at;
+            return Err(Error::argument(format!(
+                "{}: at ({x}, {y}, {z}) there is only solid, or it lies outside of the domain",
+                which(at)
+            )));
+        }
+        self.placed = placed;
+        Ok(())
+    }
+
+    /// As [`Flows::set`], but a point that has no column rests until it does.
+    ///
+    /// # Errors
+    /// `Argument`: a number out of range.
+    pub(super) fn set_resting(
+        &mut self,
+        columns: &Columns,
+        points: &[FlowPoint],
+        which: impl Fn(usize) -> String,
+    ) -> Result<()> {
+        self.placed = placed(columns, points, &which)?;
+        Ok(())
+    }
+
+    /// Whether a point has no column now.
+    pub(super) fn is_resting(&self, point: usize) -> bool {
+        self.placed[point].columns.is_empty()
+    }
+
+    /// Moves a point, and finds its columns again.
+    pub(super) fn move_to(&mut self, columns: &Columns, point: usize, at: [f64; 3]) {
+        let placed = &mut self.placed[point];
+        placed.point.at = at;
+        placed.point.find_columns(columns, &mut placed.columns);
+    }
+
+    /// Lets a point rest; returns what it waits for and has moved (units), which it forgets.
+    pub(super) fn rest(&mut self, point: usize) -> (f64, i64) {
+        let placed = &mut self.placed[point];
+        placed.columns.clear();
+        (std::mem::take(&mut placed.waiting), std::mem::take(&mut placed.moved))
+    }
+
+    /// What a point waits for and has moved (units).
+    pub(super) fn waiting_and_moved(&self, point: usize) -> (f64, i64) {
+        (self.placed[point].waiting, self.placed[point].moved)
+    }
+
+    /// Gives a flow point another rate (m3/s); what it waits for and has moved stays.
+    ///
+    /// # Errors
+    /// `Argument`: there is no such point, or the rate is negative or not finite.
+    pub fn set_rate(&mut self, point: usize, rate: f64) -> Result<()> {
+        let count = self.placed.len();
+        let Some(placed) = self.placed.get_mut(point) else {
+            return Err(Error::argument(format!("there is no flow point {point} among {count}")));
+        };
+        let changed = FlowPoint { rate, ..placed.point.clone() };
+        changed.validate()?;
+        placed.point = changed;
+        Ok(())
+    }
+
+    /// Gives what comes through a source other concentrations.
+    ///
+    /// # Errors
+    /// `Argument`: there is no such point.
+    pub(super) fn set_levels(&mut self, point: usize, levels: Levels) -> Result<()> {
+        let count = self.placed.len();
+        let Some(placed) = self.placed.get_mut(point) else {
+            return Err(Error::argument(format!("there is no flow point {point} among {count}")));
+        };
+        placed.levels = levels;
+        Ok(())
+    }
+
+    /// What comes through sources carries nothing.
+    pub(super) fn forget_levels(&mut self) {
+        self.placed.iter_mut().for_each(|placed| placed.levels = [0; MOST]);
+    }
+
+    /// Finds the columns of all points again, after the terrain has moved. A point that has none rests until it does.
+    pub(super) fn find_again(&mut self, columns: &Columns) {
+        for placed in &mut self.placed {
+            placed.point.find_columns(columns, &mut placed.columns);
+        }
+    }
+
+    /// Units that a flow point has moved since it was set.
+    pub fn moved(&self, point: usize) -> i64 {
+        self.placed[point].moved
+    }
+
+    /// What each flow point does, waits for and has moved (units), in their order: its part of a saved state.
+    pub(super) fn progress(&self) -> impl ExactSizeIterator<Item = (Kind, f64, i64)> + '_ {
+        self.placed.iter().map(|placed| (placed.point.kind, placed.waiting, placed.moved))
+    }
+
+    /// Puts what a flow point waits for and has moved in place.
+    pub(super) fn set_progress(&mut self, point: usize, waiting: f64, moved: i64) {
+        let placed = &mut self.placed[point];
+        (placed.waiting, placed.moved) = (waiting, moved);
+    }
+
+    /// Moves what the points ask for in a step of `dt` that begins at `time` (s), where things fall by `gravity` (m/s2).
+    pub fn step(&mut self, columns: &Columns, flow: &mut Flow, gravity: f64, time: f64, dt: f64) {
+        let volume = columns.grid.cell * columns.grid.cell * columns.heights.unit;
+        for placed in &mut self.placed {
+            let sum = match placed.point.kind {
+                Kind::Source => &mut self.sourced,
+                Kind::Drain | Kind::Orifice(_) => &mut self.drained,
+                Kind::Absorber(_) => &mut self.absorbed,
+            };
+            let rate = placed.rate(columns, flow, gravity, time + 0.5 * dt);
+            *sum += placed.step(columns, flow, rate * dt / volume, volume);
+        }
+    }
+}
+
+/// Points on their columns, of which one may have none.
+fn placed(columns: &Columns, points: &[FlowPoint], which: &impl Fn(usize) -> String) -> Result<Vec<Placed>> {
+    let place = |(at, point): (usize, &FlowPoint)| {
+        point.validate().map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
+        let mut found = Vec::new();
+        point.find_columns(columns, &mut found);
+        Ok(Placed { point: point.clone(), columns: found, waiting: 0.0, moved: 0, levels: [0; MOST] })
+    };
+    points.iter().enumerate().map(place).collect()
+}
+
+impl Placed {
+    /// What the point asks for in a second (m3).
+    fn rate(&self, columns: &Columns, flow: &Flow, gravity: f64, time: f64) -> f64 {
+        let rate = self.point.rate_at(time);
+        let Kind::Orifice(opening) = self.point.kind else { return rate };
+        let depth: i64 = self.columns.iter().map(|&column| i64::from(flow.depths()[column as usize])).sum();
+        let depth = depth as f64 * columns.heights.unit / self.columns.len().max(1) as f64;
+        (opening * (2.0 * gravity * depth).sqrt()).min(rate)
+    }
+
+    /// Moves what the point asks for, in units of some `volume` (m3); returns those moved.
+    fn step(&mut self, columns: &Columns, flow: &mut Flow, asked: f64, volume: f64) -> i64 {
+        if self.columns.is_empty() {
+            return 0;
+        }
+        let count = self.columns.len() as f64;
+        // Nothing is owed for long; a drain over a dry place does not make up for it either.
+        self.waiting = self.waiting.min(asked.max(OWED * count)) + asked;
+        let mut share = (self.waiting / count).floor().min(1e18) as i64;
+        if let Kind::Absorber(capacity) = self.point.kind {
+            let left = ((capacity / volume - self.moved as f64) / count).floor();
+            share = share.min(left.clamp(0.0, 1e18) as i64);
+        }
+        let sign = if self.point.kind == Kind::Source { 1 } else { -1 };
+        let account = match self.point.kind {
+            Kind::Source => Account::Sourced,
+            Kind::Drain | Kind::Orifice(_) => Account::Drained,
+            Kind::Absorber(_) => Account::Absorbed,
+        };
+        let add = |&column: &u32| flow.add(columns, column as usize, sign * share, &self.levels, account);
+        let moved = sign * self.columns.iter().map(add).sum::<i64>();
+        self.moved += moved;
+        self.waiting -= moved as f64;
+        if sign < 0 {
+            // A drain over a dry place does not make up for it later.
+            self.waiting = self.waiting.min(count);
+        }
+        moved
+    }
+}

@@ -1,0 +1,61 @@
+//! Liquid that a host pours or takes at once, and what its flow points have moved.
+
+use super::{FlowPoint, Kind};
+use crate::error::{Error, Result};
+use crate::shallow::system::Shallow;
+
+impl Shallow {
+    /// Pours a volume (m3; negative: takes it) into the columns that a source at a place (m) would act on, an equal share into each, between dry and its
+    /// ceiling; returns what came in (m3).
+    ///
+    /// # Errors
+    /// `Argument`: as [`Shallow::set_flows`] of a source there.
+    pub fn pour_at(&mut self, at: [f64; 3], radius: f64, volume: f64) -> Result<f64> {
+        let point = FlowPoint { kind: Kind::Source, at, radius, rate: 0.0, pulse: None };
+        point.validate()?;
+        let mut found = Vec::new();
+        point.find_columns(&self.columns, &mut found);
+        if found.is_empty() {
+            let [x, y, z] = at;
+            return Err(Error::argument(format!(
+                "at ({x}, {y}, {z}) there is only solid, or it lies outside of the domain"
+            )));
+        }
+        let cell = self.columns.grid.cell;
+        let share = volume / (found.len() as f64 * cell * cell);
+        Ok(found.iter().map(|&column| self.pour(column as usize, share)).sum::<f64>() * (cell * cell))
+    }
+
+    /// What a flow point has moved since it was set (m3), in or out.
+    pub fn moved(&self, point: usize) -> f64 {
+        let cell = self.columns.grid.cell;
+        self.flows.moved(point) as f64 * (cell * cell * self.columns.heights.unit)
+    }
+
+    /// Moves a flow point with the terrain that it lies on, which has moved; what it has moved and waits for stays. Where it finds no column
+    /// it rests until it does.
+    pub fn move_flow(&mut self, point: usize, at: [f64; 3]) {
+        self.flows.move_to(&self.columns, point, at);
+    }
+
+    /// As [`Shallow::set_flows`], where the terrain has moved since the points were first set: one that finds no column rests until it does.
+    ///
+    /// # Errors
+    /// `Argument`: a number out of range.
+    pub fn set_flows_resting(&mut self, points: &[FlowPoint], which: impl Fn(usize) -> String) -> Result<()> {
+        self.flows.set_resting(&self.columns, points, which)
+    }
+
+    /// Whether a flow point rests, as it lies inside solid or outside of the domain.
+    pub fn is_resting(&self, point: usize) -> bool {
+        self.flows.is_resting(point)
+    }
+
+    /// Gives a flow point another rate (m3/s): a valve. What it has moved, and how much an absorber holds, stays.
+    ///
+    /// # Errors
+    /// As [`Flows::set_rate`](super::Flows::set_rate).
+    pub fn set_rate(&mut self, point: usize, rate: f64) -> Result<()> {
+        self.flows.set_rate(point, rate)
+    }
+}

@@ -1,0 +1,201 @@
+//! The largest mesh that liquid in given columns can have.
+
+use crate::shallow::columns::grid::BOTTOMLESS;
+use crate::shallow::surface::quartets::links::{RING, Scene};
+use crate::shallow::surface::quartets::strips::places;
+use crate::shallow::surface::{Columns, Counts, STRIP};
+
+/// The largest counts that the surface of any liquid in these columns can have, so that a host sizes its buffers once. Liquids that are
+/// full to just below uneven ceilings come near to it: their surface ends at every step of the ceiling.
+pub fn bound(columns: &Columns) -> Counts {
+    let walls = Walls::of(columns);
+    let [nx, nz] = columns.grid.size;
+    let mut triangles = 0;
+    // The columns of each cell of a row and of the one before.
+    let mut rows = [(); 2].map(|()| vec![Vec::new(); nx]);
+    let mut quartet = Quartet::default();
+    for row in 0..nz {
+        rows.swap(0, 1);
+        rows[1].iter_mut().for_each(Vec::clear);
+        for strip in columns.row(row) {
+            for place in places(columns.present(strip)) {
+                let index = strip * STRIP + place;
+                let [under, base, ceiling] =
+                    [columns.unders(), columns.bases(), columns.ceilings()].map(|of| of[index]);
+                rows[1][columns.cell(index)[0]].push(Room {
+                    under,
+                    base,
+                    ceiling,
+                    walls: walls.sides[index],
+                });
+            }
+        }
+        if row > 0 {
+            for x in 1..nx {
+                // The quartet's other cells are to the south-east of its first cell, and so on.
+                let cells = [(&rows[0][x - 1], 3), (&rows[0][x], 2), (&rows[1][x - 1], 0), (&rows[1][x], 1)];
+                triangles += quartet.most_triangles(cells);
+            }
+        }
+    }
+    Counts { vertices: columns.count() + walls.pairs, extras: walls.pairs, indices: 3 * triangles }
+}
+
+/// A column of a cell.
+#[derive(Debug, Clone, Copy, Default)]
+struct Room {
+    under: i32,
+    base: i32,
+    ceiling: i32,
+    /// Of the quartets to the north-east, north-west, south-west and south-east: a bit of each in which its surface may end at a wall.
+    walls: u8,
+}
+
+impl Room {
+    /// Whether there are depths with which the two are linked.
+    fn may_link(&self, other: &Self) -> bool {
+        let holds =
+            |own: &Self, other: &Self| own.under.max(other.base) <= other.ceiling.min(own.ceiling - 1);
+        holds(self, other) && holds(other, self)
+    }
+}
+
+/// The columns of a quartet.
+#[derive(Debug, Default)]
+struct Quartet {
+    /// Each with its corner and its group: those of which each may be linked with the next one.
+    rooms: Vec<(Room, usize, usize)>,
+    changes: Vec<i32>,
+}
+
+impl Quartet {
+    /// The most triangles, from the columns of each corner, and which of their quartets it is. Columns that may not be linked with each other,
+    /// nor both with others, share no triangle: the most of each such set are summed.
+    ///
+    /// A set with a column or less at each corner has two triangles at most, or one at three corners: where all links are there, they are a
+    /// group of four, else two of its groups of three lack one. Where its surface may end at walls, and each of its columns may be linked
+    /// with each other one, so that the higher of two surfaces is linked with the other or ends above it: its highest wet column A, which alone has
+    /// the corner, is in two triangles at most: each column has one entry at a corner where it is linked or ends. Without A they lie at the
+    /// three other corners, and have the next lower wet column B, which may be linked there with a column and with A's wall: at each corner
+    /// but not at both, or A is in a group with them; three triangles; or B is not linked with A, and the third one C may be: two
+    /// triangles then. There is one less where the set lacks a corner, as only walls are there.
+    ///
+    /// In other sets without walls, a wet column is in one group of four or two of three. A group has a wet column, and others only where
+    /// they are dry, which three groups at most can share: one triangle for each column. Groups that have no wet column in common are at
+    /// different heights, between which an underside lies: two triangles for each, and two more. A column with walls may be in two more, and
+    /// its neighbours' walls make four more in the sets of random scenes that need most (not proved: a test tries many).
+    fn most_triangles(&mut self, cells: [(&Vec<Room>, u8); 4]) -> usize {
+        let Self { rooms, changes } = self;
+        rooms.clear();
+        for (corner, (cell, side)) in cells.into_iter().enumerate() {
+            let here = |room: &Room| Room { walls: room.walls >> side & 1, ..*room };
+            rooms.extend(cell.iter().map(|room| (here(room), corner, 0)));
+        }
+        for own in 0..rooms.len() {
+            let (room, corner, _) = rooms[own];
+            rooms[own].2 = own;
+            for before in 0..own {
+                let (other, of, set) = rooms[before];
+                let own_set = rooms[own].2;
+                if of != corner && set != own_set && room.may_link(&other) {
+                    rooms[..=own].iter_mut().filter(|room| room.2 == own_set).for_each(|room| room.2 = set);
+                }
+            }
+        }
+        let mut most = 0;
+        for set in 0..rooms.len() {
+            let of_set = || rooms.iter().filter(|room| room.2 == set);
+            let count = of_set().count();
+            if count == 0 {
+                continue;
+            }
+            let walls = of_set().filter(|(room, ..)| room.walls == 1).count();
+            let corners = (0..4).filter(|&corner| of_set().any(|(_, of, _)| *of == corner)).count();
+            let all_link = || {
+                of_set().all(|(own, corner, _)| {
+                    of_set().all(|(other, of, _)| of == corner || own.may_link(other))
+                })
+            };
+            most += if count > corners || (walls > 0 && !all_link()) {
+                changes.clear();
+                changes.extend(of_set().map(|(room, ..)| room.under).filter(|under| *under != BOTTOMLESS));
+                changes.sort_unstable();
+                changes.dedup();
+                count.min(2 + 2 * changes.len()) + 6 * walls
+            } else if walls > 0 {
+                count + 1
+            } else {
+                count.saturating_sub(2)
+            };
+        }
+        most
+    }
+}
+
+/// Where surfaces may end at walls.
+#[derive(Debug, Default)]
+pub(in crate::shallow::surface) struct Walls {
+    /// Pairs of a column and one beside it whose solid reaches from below the ceiling of the first to it, or higher.
+    pub pairs: usize,
+    /// Of each index, the quartets to the north-east, north-west, south-west and south-east in which it has such a wall: a bit each.
+    sides: Vec<u8>,
+}
+
+impl Walls {
+    pub fn of(columns: &Columns) -> Self {
+        let scene = Scene { columns, depth: &[], above: &[] };
+        let mut out = Self { pairs: 0, sides: vec![0; columns.len()] };
+        for strip in 0..columns.strips().len() {
+            for place in places(columns.present(strip)) {
+                let index = strip * STRIP + place;
+                let ceiling = columns.ceilings()[index];
+                let is_wall = RING.map(|step| {
+                    scene
+                        .beside(index, step, ceiling - 1)
+                        .is_some_and(|other| ceiling <= columns.bases()[other])
+                });
+                out.pairs += is_wall.iter().filter(|is_wall| **is_wall).count();
+                // Each quartet has three cells of the ring, the middle one in a corner.
+                let has_wall = |corner: usize| {
+                    [corner - 1, corner, (corner + 1) % 8].into_iter().any(|cell| is_wall[cell])
+                };
+                for (side, corner) in [1, 3, 5, 7].into_iter().enumerate() {
+                    out.sides[index] |= u8::from(has_wall(corner)) << side;
+                }
+            }
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quartets_have_room_for_their_groups() {
+        // Rooms of 3 units above undersides.
+        let most = |cells: [&[i32]; 4]| {
+            let cells = cells.map(|cell| {
+                let bases = cell.iter().map(|under| if *under == BOTTOMLESS { 0 } else { under + 1 });
+                let bases: Vec<i32> = bases.collect();
+                let room = |(at, base): (usize, &i32)| Room {
+                    under: cell[at],
+                    base: *base,
+                    ceiling: cell.get(at + 1).copied().unwrap_or(20),
+                    walls: 0,
+                };
+                bases.iter().enumerate().map(room).collect::<Vec<_>>()
+            });
+            let [a, b, c, d] = &cells;
+            Quartet::default().most_triangles([(a, 0), (b, 0), (c, 0), (d, 0)])
+        };
+        let ground: &[i32] = &[BOTTOMLESS];
+        assert_eq!(most([ground, ground, ground, ground]), 2);
+        assert_eq!(most([ground, ground, &[], &[5]]), 1);
+        assert_eq!(most([ground, ground, &[], &[]]), 0);
+        // Two floors at one height everywhere, and at different heights.
+        assert_eq!(most([&[BOTTOMLESS, 7]; 4]), 4);
+        assert_eq!(most([&[BOTTOMLESS, 7], &[BOTTOMLESS, 7], &[BOTTOMLESS, 8], ground]), 6);
+    }
+}

@@ -1,0 +1,205 @@
+//! Writes triangles into the caller's buffers: in order, and without reading them.
+
+use std::ops::Range;
+
+use crate::numeric::cpu::dispatch;
+use crate::shallow::surface::quartets::links::Scene;
+use crate::shallow::surface::quartets::odd::{Search, each_odd_triangle};
+use crate::shallow::surface::quartets::strips::{Found, some};
+use crate::shallow::surface::rim::boundary::Wall;
+use crate::shallow::surface::{Indices, STRIP};
+
+/// Indices of a pair of triangles.
+const PAIR: usize = 6;
+
+/// Indices of a width.
+trait Index: Copy {
+    fn from_vertex(vertex: u32) -> Self;
+}
+
+impl Index for u16 {
+    #[inline(always)]
+    fn from_vertex(vertex: u32) -> Self {
+        vertex as u16
+    }
+}
+
+impl Index for u32 {
+    #[inline(always)]
+    fn from_vertex(vertex: u32) -> Self {
+        vertex
+    }
+}
+
+/// The triangles of 16 quartets side by side, whose vertices in the north are a + place and in the south c + place: each index is a + `add`,
+/// and c - a more where `south` has all bits set; the other way around where `turned` has the bit of a quartet that is turned.
+struct Pattern {
+    add: [u32; PAIR * STRIP],
+    south: [u32; PAIR * STRIP],
+    turned: [u32; PAIR * STRIP],
+}
+
+/// Counter-clockwise, and clockwise: the second and third corner of each triangle are exchanged.
+static PATTERNS: [Pattern; 2] = [
+    // North-west, south-west, south-east (turned: north-east); north-east, north-west (turned: south-west), south-east.
+    Pattern::new([0, 0, 1, 1, 0, 1], [0, 1, 1, 0, 0, 1], [0, 0, 1, 0, 1, 0]),
+    Pattern::new([0, 1, 0, 1, 1, 0], [0, 1, 1, 0, 1, 0], [0, 1, 0, 0, 0, 1]),
+];
+
+impl Pattern {
+    const fn new(add: [u32; PAIR], south: [u32; PAIR], turned: [u32; PAIR]) -> Self {
+        let zeros = [0; PAIR * STRIP];
+        let mut out = Self { add: zeros, south: zeros, turned: zeros };
+        let mut at = 0;
+        while at < PAIR * STRIP {
+            let (place, corner) = ((at / PAIR) as u32, at % PAIR);
+            out.add[at] = place + add[corner];
+            out.south[at] = 0u32.wrapping_sub(south[corner]);
+            out.turned[at] = turned[corner] << place;
+            at += 1;
+        }
+        out
+    }
+
+    /// Writes a part of the indices.
+    #[inline(always)]
+    fn put<I: Index>(&self, a: u32, c: u32, turned: u32, part: Range<usize>, out: &mut [I]) {
+        let down = c.wrapping_sub(a);
+        let (add, south, turn) = (&self.add[part.clone()], &self.south[part.clone()], &self.turned[part]);
+        for (((out, add), south), turn) in out.iter_mut().zip(add).zip(south).zip(turn) {
+            let is_turned = if turned & *turn != 0 { u32::MAX } else { 0 };
+            *out = I::from_vertex(a.wrapping_add(*add).wrapping_add(down & (south ^ is_turned)));
+        }
+    }
+}
+
+/// Writes all triangles but those of skirts; `flipped`: clockwise seen from above. Returns the count of their indices.
+pub(in crate::shallow::surface) fn write_triangles(
+    scene: Scene<'_>,
+    found: &Found,
+    walls: &[Wall],
+    search: &Search,
+    flipped: bool,
+    out: &mut Indices<'_>,
+) -> usize {
+    match out {
+        Indices::None => 0,
+        Indices::U16(out) => {
+            let done = write_full_u16(found, flipped, out);
+            done + write_odd(scene, found, walls, search, flipped, &mut out[done..])
+        }
+        Indices::U32(out) => {
+            let done = write_full_u32(found, flipped, out);
+            done + write_odd(scene, found, walls, search, flipped, &mut out[done..])
+        }
+    }
+}
+
+fn write_full_u16(found: &Found, flipped: bool, out: &mut [u16]) -> usize {
+    dispatch!(write_full(found: &Found, flipped: bool, out: &mut [u16]) -> usize)
+}
+
+fn write_full_u32(found: &Found, flipped: bool, out: &mut [u32]) -> usize {
+    dispatch!(write_full(found: &Found, flipped: bool, out: &mut [u32]) -> usize)
+}
+
+/// Writes the triangles of full quartets and returns the count of indices.
+#[inline(always)]
+fn write_full<I: Index>(found: &Found, flipped: bool, out: &mut [I]) -> usize {
+    let pattern = &PATTERNS[usize::from(flipped)];
+    let mut at = 0;
+    for span in &found.spans {
+        let Some(south) = some(span.south) else { continue };
+        for step in 0..span.len {
+            let (strip, south) = (span.first + step, south + step);
+            let (full, turned) = (found.states[strip].full, u32::from(found.states[strip].turned));
+            if full == u16::MAX {
+                let (a, c) = (found.states[strip].first, found.states[south].first);
+                if let Some(out) = out[at..].first_chunk_mut::<{ PAIR * STRIP }>() {
+                    pattern.put(a, c, turned, 0..PAIR * STRIP, out);
+                }
+                at += PAIR * STRIP;
+                continue;
+            }
+            for run in runs(full) {
+                // The vertices of either row follow each other.
+                let (a, c) = (found.vertex(strip, run.start), found.vertex(south, run.start));
+                let (a, c) = (a.wrapping_sub(run.start as u32), c.wrapping_sub(run.start as u32));
+                let out = &mut out[at..][..PAIR * run.len()];
+                at += out.len();
+                pattern.put(a, c, turned, PAIR * run.start..PAIR * run.end, out);
+            }
+        }
+    }
+    at
+}
+
+/// Runs of places that are set.
+#[inline(always)]
+fn runs(places: u16) -> impl Iterator<Item = Range<usize>> {
+    let mut left = u32::from(places);
+    std::iter::from_fn(move || {
+        let low = left.trailing_zeros();
+        let run = left.checked_shr(low)?.trailing_ones();
+        left &= left + (1 << low);
+        Some(low as usize..(low + run) as usize)
+    })
+}
+
+/// Writes the triangles of odd quartets and returns the count of indices.
+fn write_odd<I: Index>(
+    scene: Scene<'_>,
+    found: &Found,
+    walls: &[Wall],
+    search: &Search,
+    flipped: bool,
+    out: &mut [I],
+) -> usize {
+    let mut count = 0;
+    let mut out = out.as_chunks_mut::<3>().0.iter_mut();
+    let vertex = |id: u32| match (id as usize).checked_sub(scene.columns.len()) {
+        Some(extra) => walls[extra].vertex,
+        None => found.vertex(id as usize / STRIP, id as usize % STRIP),
+    };
+    each_odd_triangle(found, search, |corners| {
+        let [a, b, c] = corners.map(|id| I::from_vertex(vertex(id)));
+        if let Some(out) = out.next() {
+            *out = if flipped { [a, c, b] } else { [a, b, c] };
+            count += 3;
+        }
+    });
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patterns_are_two_triangles_that_face_up_or_down() {
+        let (a, c, turned) = (100u32, 1000u32, 0b1010_0000_0000_0110u32);
+        for flipped in [false, true] {
+            let mut out = [0u32; PAIR * STRIP];
+            PATTERNS[usize::from(flipped)].put(a, c, turned, 0..PAIR * STRIP, &mut out);
+            for (place, pair) in (0u32..).zip(out.as_chunks::<PAIR>().0) {
+                let [nw, sw] = [a + place, c + place];
+                let [ne, se] = [nw + 1, sw + 1];
+                let up = if turned >> place & 1 == 1 {
+                    [[nw, sw, ne], [ne, sw, se]]
+                } else {
+                    [[nw, sw, se], [ne, nw, se]]
+                };
+                let expected = if flipped { up.map(|[a, b, c]| [a, c, b]) } else { up };
+                assert_eq!(pair[..], expected.concat(), "{place}");
+            }
+        }
+    }
+
+    #[test]
+    fn runs_follow_each_other() {
+        let all = |positions| runs(positions).collect::<Vec<Range<usize>>>();
+        assert_eq!(all(0), []);
+        assert_eq!(all(0xffff).first(), Some(&(0..16)));
+        assert_eq!(all(0b1100_0000_0001_0110), [1..3, 4..5, 14..16]);
+    }
+}

@@ -1,0 +1,93 @@
+//! Normals of wet columns, from the heights of the wet columns that they are linked with on their four sides: central differences, one-sided
+//! where there is no such column.
+
+use crate::shallow::surface::quartets::links::Scene;
+use crate::shallow::surface::quartets::strips::Found;
+use crate::shallow::surface::{Columns, STRIP};
+
+/// The heights that are shown, and what makes slopes of their differences.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::shallow::surface) struct Shown<'a> {
+    pub scene: Scene<'a>,
+    /// Of each index (units).
+    pub heights: &'a [i32],
+    /// A unit over two cells.
+    pub slope: f32,
+}
+
+impl Shown<'_> {
+    /// Normal of a wet column: x to the east, y up, z to the south.
+    pub fn normal(&self, found: &Found, index: usize) -> [f32; 3] {
+        let (columns, scene) = (self.scene.columns, self.scene);
+        let (strip, place) = (index / STRIP, index % STRIP);
+        let state = &found.states[strip];
+        let [west, east, north, south] = if state.rough >> place & 1 == 1 {
+            let beside = |step| scene.wet_beside(index, step);
+            [beside([-1, 0]), beside([1, 0]), beside([0, -1]), beside([0, 1])]
+        } else {
+            // Full quartets link it with columns of its own layer.
+            let has = |side: usize| state.sides[side] >> place & 1 == 1;
+            let across = |side: u32| side as usize * STRIP + place;
+            [
+                has(0).then(|| index - 1),
+                has(1).then_some(index + 1),
+                has(2).then(|| across(columns.north(strip))),
+                has(3).then(|| across(columns.south(strip))),
+            ]
+        };
+        let own = self.heights[index];
+        let slope = |before: Option<usize>, behind: Option<usize>| {
+            let cells = if before.is_some() && behind.is_some() { 1.0 } else { 2.0 };
+            let height = |side: Option<usize>| side.map_or(own, |side| self.heights[side]);
+            height(before).wrapping_sub(height(behind)) as f32 * self.slope * cells
+        };
+        upright(slope(west, east), slope(north, south))
+    }
+}
+
+/// The unit vector along (x, 1, z).
+#[inline(always)]
+pub(in crate::shallow) fn upright(x: f32, z: f32) -> [f32; 3] {
+    let y = 1.0 / ((x * x + z * z) + 1.0).sqrt();
+    [x * y, y, z * y]
+}
+
+/// Normals that dry vertices need too, each computed once.
+#[derive(Debug, Default)]
+pub(in crate::shallow::surface) struct Normals {
+    /// By index.
+    normals: Vec<[f32; 3]>,
+    /// Of each strip, the places whose normal is known.
+    known: Vec<u16>,
+}
+
+impl Normals {
+    /// Makes room for columns.
+    pub fn reset(&mut self, columns: &Columns) {
+        if self.normals.len() != columns.len() {
+            self.normals.resize(columns.len(), [0.0; 3]);
+            self.known.clear();
+            self.known.resize(columns.len() / STRIP, 0);
+        }
+    }
+
+    /// Forgets the normals of a frame.
+    pub fn clear(&mut self, found: &Found) {
+        for span in &found.spans {
+            self.known[span.first..span.first + span.len].fill(0);
+        }
+    }
+
+    /// Normal of a wet column that is a vertex.
+    pub fn of(&mut self, shown: &Shown<'_>, found: &Found, index: usize) -> [f32; 3] {
+        if !found.has_means {
+            return shown.normal(found, index);
+        }
+        let (known, bit) = (&mut self.known[index / STRIP], 1 << (index % STRIP));
+        if *known & bit == 0 {
+            *known |= bit;
+            self.normals[index] = shown.normal(found, index);
+        }
+        self.normals[index]
+    }
+}

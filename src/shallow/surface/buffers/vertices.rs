@@ -1,0 +1,423 @@
+//! Writes vertices into the caller's buffers: in order, and without reading them.
+
+use std::ops::Range;
+
+use super::normals::{Normals, Shown, upright};
+use crate::numeric::cpu::dispatch;
+use crate::shallow::columns::strip_of;
+use crate::shallow::surface::quartets::links::Scene;
+use crate::shallow::surface::quartets::strips::{Found, Span};
+use crate::shallow::surface::rim::boundary::{Around, Wall, walls_of};
+use crate::shallow::surface::rim::ledges::Hem;
+use crate::shallow::surface::{Depths, Layout, MOST, NONE, STRIP, Target, Up};
+
+/// Velocity at the surface over the mean (Eq. 4.4).
+pub(in crate::shallow) const SURFACE_SPEED: f32 = 1.5;
+
+/// A run begins within a strip with at least so many columns at its end; at most so many columns beside each other are written one by one.
+const LONG: u32 = 8;
+const SHORT: u32 = 2;
+
+/// What vertices are made of.
+pub(in crate::shallow::surface) struct Vertices<'a> {
+    shown: Shown<'a>,
+    found: &'a Found,
+    walls: &'a [Wall],
+    velocity: &'a [[f32; 2]],
+    carried: [&'a [f32]; MOST],
+    wants_normals: bool,
+    z_up: bool,
+    /// Sign of z.
+    sign: f32,
+    /// Height of 0, and of a unit; centre of cell (0, 0), and edge of a cell (m x scale).
+    low: f32,
+    unit: f32,
+    /// The caller's units in a metre, and how far hems are below the ground (units).
+    scale: f32,
+    least: i32,
+    origin: [f32; 2],
+    cell: f32,
+    /// Speed at the surface (m/s x scale) over the mean speed (m/s); opacity of a unit.
+    speed: f32,
+    opacity: f32,
+}
+
+/// A vertex, y up.
+struct Vertex {
+    position: [f32; 3],
+    normal: [f32; 3],
+    velocity: [f32; 2],
+    carried: [f32; MOST],
+    depth: i32,
+    layer: u32,
+    column: u32,
+}
+
+/// Wet columns in a row of a span, with wet ones linked by full quartets on all sides.
+#[derive(Clone, Copy)]
+struct Run {
+    /// First index.
+    first: usize,
+    /// Count of indices.
+    len: usize,
+}
+
+impl<'a> Vertices<'a> {
+    pub fn new(
+        scene: Scene<'a>,
+        found: &'a Found,
+        walls: &'a [Wall],
+        shown: &'a [i32],
+        depths: &Depths<'a>,
+        layout: &Layout,
+        wants_normals: bool,
+    ) -> Self {
+        let (grid, heights) = (&scene.columns.grid, &scene.columns.heights);
+        let scale = layout.scale;
+        let slope = (0.5 * heights.unit / grid.cell) as f32;
+        Self {
+            shown: Shown { scene, heights: shown, slope },
+            found,
+            walls,
+            velocity: depths.velocity,
+            carried: depths.carried,
+            wants_normals,
+            z_up: layout.up == Up::Z,
+            sign: if layout.left_handed == (layout.up == Up::Y) { -1.0 } else { 1.0 },
+            low: (heights.low * scale) as f32,
+            unit: (heights.unit * scale) as f32,
+            scale: scale as f32,
+            least: (layout.least_depth / heights.unit).min(f64::from(i32::MAX / 2)) as i32,
+            origin: grid.centre([0, 0]).map(|centre| (centre * scale) as f32),
+            cell: (grid.cell * scale) as f32,
+            speed: SURFACE_SPEED * scale as f32,
+            opacity: (heights.unit / layout.opaque_depth) as f32,
+        }
+    }
+
+    /// Writes all vertices.
+    pub fn write(&self, normals: &mut Normals, around: &mut Around, target: &mut Target<'_>) {
+        let vertices = self;
+        dispatch!(write_spans(
+            vertices: &Vertices<'_>,
+            normals: &mut Normals,
+            around: &mut Around,
+            target: &mut Target<'_>
+        ))
+    }
+
+    /// A height (m x scale) of units.
+    #[inline(always)]
+    fn height(&self, units: f32) -> f32 {
+        self.low + units * self.unit
+    }
+
+    /// Centre of a column or row of cells (m x scale).
+    #[inline(always)]
+    fn centre(&self, axis: usize, cell: i32) -> f32 {
+        self.origin[axis] + cell as f32 * self.cell
+    }
+
+    /// What a column carries.
+    #[inline(always)]
+    fn carried(&self, index: usize) -> [f32; MOST] {
+        self.carried.map(|numbers| numbers.get(index).copied().unwrap_or_default())
+    }
+
+    /// A vertex that takes the mean of wet columns around cell (x, z), at a height of at most `most` (units).
+    fn mean(&self, [x, z]: [usize; 2], most: i32, normals: &mut Normals, around: &Around) -> Vertex {
+        let mean = around.mean_height(|index| self.shown.heights[index]);
+        let height = self.height(mean.min(f64::from(most)) as f32);
+        let mut normal = [0.0, 1.0, 0.0];
+        if self.wants_normals {
+            let [x, y, z] = around.sum(|index| normals.of(&self.shown, self.found, index));
+            let length = ((x * x + z * z) + y * y).sqrt();
+            if length > 0.0 {
+                normal = [x / length, y / length, z / length];
+            }
+        }
+        let mut velocity = [0.0; 2];
+        if !self.velocity.is_empty() {
+            velocity = around.sum(|index| self.velocity[index]).map(|sum| sum / around.len().max(1) as f32);
+        }
+        let mut carried = [0.0; MOST];
+        if self.carried.iter().any(|numbers| !numbers.is_empty()) {
+            carried = around.sum(|index| self.carried(index)).map(|sum| sum / around.len().max(1) as f32);
+        }
+        let position = [self.centre(0, x as i32), height, self.centre(1, z as i32)];
+        Vertex { position, normal, velocity, carried, depth: 0, layer: 0, column: NONE }
+    }
+
+    /// The vertex of a column.
+    fn vertex(&self, index: usize, normals: &mut Normals, around: &mut Around) -> Vertex {
+        let scene = self.shown.scene;
+        let ([x, z], layer) = (scene.columns.cell(index), scene.columns.layer(index) as u32);
+        if !scene.is_wet(index) {
+            let mut walls = walls_of(self.walls, index as u32);
+            match walls.find(|&wall| self.walls[wall].is_own) {
+                Some(own) => around.take_wall(scene, &self.walls[own]),
+                None => around.take_linked(scene, index),
+            }
+            // Over ground that is lower than the liquid the rim would hover.
+            let mean = self.mean([x, z], self.shown.heights[index], normals, around);
+            return Vertex { layer, column: index as u32, ..mean };
+        }
+        let height = self.height(self.shown.heights[index] as f32);
+        Vertex {
+            position: [self.centre(0, x as i32), height, self.centre(1, z as i32)],
+            normal: if self.wants_normals {
+                normals.of(&self.shown, self.found, index)
+            } else {
+                [0.0, 1.0, 0.0]
+            },
+            velocity: self.velocity.get(index).copied().unwrap_or_default(),
+            carried: self.carried(index),
+            depth: scene.depth[index],
+            layer,
+            column: index as u32,
+        }
+    }
+
+    /// Writes one vertex.
+    fn put(&self, at: usize, vertex: &Vertex, target: &mut Target<'_>) {
+        let put = |out: &mut Option<&mut [f32]>, [x, up, z]: [f32; 3]| {
+            if let Some(out) = out {
+                out[3 * at..][..3].copy_from_slice(&self.order(x, up, z * self.sign));
+            }
+        };
+        let [u, w] = vertex.velocity.map(|speed| speed * self.speed);
+        put(&mut target.positions, vertex.position);
+        put(&mut target.normals, vertex.normal);
+        put(&mut target.velocities, [u, 0.0, w]);
+        if let Some(out) = &mut target.depths {
+            out[at] = vertex.depth as f32 * self.unit;
+        }
+        if let Some(out) = &mut target.opacities {
+            out[at] = (vertex.depth as f32 * self.opacity).min(1.0);
+        }
+        for (out, carried) in target.carried.iter_mut().zip(vertex.carried) {
+            if let Some(out) = out {
+                out[at] = carried;
+            }
+        }
+        if let Some(out) = &mut target.layers {
+            out[at] = vertex.layer;
+        }
+        if let Some(out) = &mut target.columns {
+            out[at] = vertex.column;
+        }
+    }
+
+    /// Writes a vertex where the surface of a column comes down to the ground's edge.
+    pub fn put_hem(&self, at: usize, hem: &Hem, target: &mut Target<'_>) {
+        let columns = self.shown.scene.columns;
+        let index = hem.column as usize;
+        let [x, z] = columns.cell(index);
+        let [along, across] = hem.offset();
+        let rise = hem.rise * self.scale / self.unit;
+        let ground = columns.bases()[index].wrapping_sub(self.least) as f32 + rise;
+        let height = self.height(ground.max(columns.unders()[index] as f32));
+        let fall = self.height(self.shown.heights[index] as f32) - height;
+        let width = (along * along + across * across).sqrt();
+        let mut normal = [0.0, 1.0, 0.0];
+        if width > 0.0 {
+            let (out, up) = (fall / width, self.cell * width);
+            let length = ((along * along + across * across) * (out * out) + up * up).sqrt();
+            normal = [along * out / length, up / length, across * out / length];
+        }
+        let vertex = Vertex {
+            position: [
+                self.centre(0, x as i32) + along * self.cell,
+                height,
+                self.centre(1, z as i32) + across * self.cell,
+            ],
+            normal,
+            velocity: self.velocity.get(index).copied().unwrap_or_default(),
+            carried: self.carried(index),
+            depth: 0,
+            layer: columns.layer(index) as u32,
+            column: NONE,
+        };
+        self.put(at, &vertex, target);
+    }
+
+    /// Axes in the caller's order.
+    #[inline(always)]
+    fn order(&self, x: f32, up: f32, z: f32) -> [f32; 3] {
+        if self.z_up { [x, z, up] } else { [x, up, z] }
+    }
+
+    /// Writes the vertices of a run of a span with wet columns on all sides, from `at` on.
+    #[inline(always)]
+    fn put_inner(&self, span: &Span, run: Run, at: usize, target: &mut Target<'_>) {
+        let (heights, Run { first, len }) = (self.shown.heights, run);
+        let step = first - span.first * STRIP;
+        if let Some(out) = &mut target.normals {
+            let (north, south) = (span.north as usize * STRIP + step, span.south as usize * STRIP + step);
+            let row = |first: usize| heights[first..][..len].iter();
+            let across = row(first - 1).zip(row(first + 1));
+            let along = row(north).zip(row(south));
+            for ((out, (west, east)), (north, south)) in
+                vectors(out, at, len).iter_mut().zip(across).zip(along)
+            {
+                let slope =
+                    |before: &i32, behind: &i32| before.wrapping_sub(*behind) as f32 * self.shown.slope;
+                let [x, y, z] = upright(slope(west, east), slope(north, south));
+                *out = self.order(x, y, z * self.sign);
+            }
+        }
+        self.put_run(span, run, at, target);
+    }
+
+    /// Writes the vertices of some places of a strip, with or without wet columns on their sides, from `at` on.
+    #[inline(always)]
+    fn put_outer(&self, span: &Span, strip: usize, places: Range<usize>, at: usize, target: &mut Target<'_>) {
+        let run = Run { first: strip * STRIP + places.start, len: places.len() };
+        if let Some(out) = &mut target.normals {
+            let normals = self.outer_normals(span, strip);
+            vectors(out, at, run.len).copy_from_slice(&normals[places]);
+        }
+        self.put_run(span, run, at, target);
+    }
+
+    /// The normals of a strip's columns, which full quartets link with those on their sides, if any.
+    #[inline(always)]
+    fn outer_normals(&self, span: &Span, strip: usize) -> [[f32; 3]; STRIP] {
+        let (heights, slope, sides) = (self.shown.heights, self.shown.slope, self.found.states[strip].sides);
+        let (own, first) = (strip_of(heights, strip), strip * STRIP);
+        let mut line = [0; STRIP + 2];
+        line[1..=STRIP].copy_from_slice(own);
+        line[0] = first.checked_sub(1).map_or(0, |before| heights[before]);
+        line[STRIP + 1] = heights.get(first + STRIP).copied().unwrap_or(0);
+        let beside =
+            |row: u32| if row == NONE { own } else { strip_of(heights, row as usize + strip - span.first) };
+        let (north, south) = (beside(span.north), beside(span.south));
+        let mut normals = [[0.0; 3]; STRIP];
+        for x in 0..STRIP {
+            let has = |side: usize| sides[side] >> x & 1 == 1;
+            let slope = |[before, behind]: [i32; 2], has: [bool; 2]| {
+                let [before, behind] =
+                    [if has[0] { before } else { own[x] }, if has[1] { behind } else { own[x] }];
+                let cells = if has[0] & has[1] { 1.0 } else { 2.0 };
+                before.wrapping_sub(behind) as f32 * slope * cells
+            };
+            let along = slope([line[x], line[x + 2]], [has(0), has(1)]);
+            let [x_up, y, z] = upright(along, slope([north[x], south[x]], [has(2), has(3)]));
+            normals[x] = self.order(x_up, y, z * self.sign);
+        }
+        normals
+    }
+
+    /// Writes all of the vertices of a run but their normals, from `at` on.
+    #[inline(always)]
+    fn put_run(&self, span: &Span, run: Run, at: usize, target: &mut Target<'_>) {
+        let (heights, depths) = (self.shown.heights, self.shown.scene.depth);
+        let strip = self.shown.scene.columns.strips()[span.first];
+        let Run { first, len } = run;
+        let step = first - span.first * STRIP;
+        let depth = &depths[first..][..len];
+        if let Some(out) = &mut target.positions {
+            let z = self.centre(1, strip.row as i32) * self.sign;
+            let cells = (strip.at as usize * STRIP + step) as i32..;
+            let out = vectors(out, at, len);
+            for ((out, height), cell) in out.iter_mut().zip(&heights[first..][..len]).zip(cells) {
+                *out = self.order(self.centre(0, cell), self.height(*height as f32), z);
+            }
+        }
+        if let Some(out) = &mut target.velocities {
+            for (out, [u, w]) in vectors(out, at, len).iter_mut().zip(&self.velocity[first..][..len]) {
+                *out = self.order(u * self.speed, 0.0, w * self.speed * self.sign);
+            }
+        }
+        if let Some(out) = &mut target.depths {
+            for (out, depth) in out[at..][..len].iter_mut().zip(depth) {
+                *out = *depth as f32 * self.unit;
+            }
+        }
+        if let Some(out) = &mut target.opacities {
+            for (out, depth) in out[at..][..len].iter_mut().zip(depth) {
+                *out = (*depth as f32 * self.opacity).min(1.0);
+            }
+        }
+        for (out, carried) in target.carried.iter_mut().zip(&self.carried) {
+            if let Some(out) = out {
+                out[at..][..len].copy_from_slice(&carried[first..][..len]);
+            }
+        }
+        if let Some(out) = &mut target.layers {
+            out[at..][..len].fill(strip.layer);
+        }
+        if let Some(out) = &mut target.columns {
+            for (out, index) in out[at..][..len].iter_mut().zip(first as u32..) {
+                *out = index;
+            }
+        }
+    }
+}
+
+/// The vectors of a count of vertices from one on.
+#[inline(always)]
+fn vectors(out: &mut [f32], at: usize, count: usize) -> &mut [[f32; 3]] {
+    out[3 * at..][..3 * count].as_chunks_mut().0
+}
+
+#[inline(always)]
+fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Around, target: &mut Target<'_>) {
+    let found = vertices.found;
+    let mut next = 0;
+    for span in &found.spans {
+        let mut run = Run { first: 0, len: 0 };
+        for strip in span.first..span.first + span.len {
+            let state = &found.states[strip];
+            let [west, east, north, south] = state.sides;
+            let plain = state.wet & west & east & north & south & !state.rough;
+            let first = strip * STRIP;
+            if plain == u16::MAX {
+                run = Run { first: if run.len == 0 { first } else { run.first }, len: run.len + STRIP };
+                continue;
+            }
+            // Those that go on with the run before, and those that begin one for the strip behind.
+            let before = if run.len > 0 { plain.trailing_ones() } else { 0 };
+            let behind = plain.leading_ones();
+            let behind = if behind < LONG { 0 } else { behind };
+            run.len += before as usize;
+            if run.len > 0 {
+                vertices.put_inner(span, run, next, target);
+                next += run.len;
+            }
+            let between = u16::MAX << before & (u32::from(u16::MAX) >> behind) as u16;
+            // What lies between columns that are looked at one by one.
+            let smooth = state.used & state.wet & !state.rough & between;
+            let mut left = state.used & between;
+            while left != 0 {
+                let place = left.trailing_zeros();
+                let len = (smooth >> place).trailing_ones();
+                if len <= SHORT {
+                    let vertex = vertices.vertex(first + place as usize, normals, around);
+                    vertices.put(next, &vertex, target);
+                    next += 1;
+                    left &= left - 1;
+                    continue;
+                }
+                let end = place + len;
+                vertices.put_outer(span, strip, place as usize..end as usize, next, target);
+                next += len as usize;
+                left &= u16::MAX.checked_shl(end).unwrap_or(0);
+            }
+            run = Run { first: first + STRIP - behind as usize, len: behind as usize };
+        }
+        if run.len > 0 {
+            vertices.put_inner(span, run, next, target);
+            next += run.len;
+        }
+    }
+    let columns = vertices.shown.scene.columns;
+    for wall in vertices.walls.iter().filter(|wall| wall.vertex != NONE) {
+        around.take_wall(vertices.shown.scene, wall);
+        let members = wall.members.iter().filter(|member| **member != NONE);
+        let layer = members.map(|&member| columns.layer(member as usize) as u32).min().unwrap_or(0);
+        let mean = vertices.mean(columns.cell(wall.column as usize), i32::MAX, normals, around);
+        vertices.put(next, &Vertex { layer, ..mean }, target);
+        next += 1;
+    }
+}

@@ -1,0 +1,157 @@
+//! The columns of a run of cells in two rows, for quartets that are searched column by column.
+
+use super::links::Scene;
+use super::strips::Found;
+use crate::shallow::surface::rim::boundary::{Wall, walls_of};
+use crate::shallow::surface::{Columns, NONE, STRIP};
+
+/// A column, or an extra.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::shallow) struct Entry {
+    /// Index of the column; of an extra, count of indices + its place among the walls.
+    pub id: u32,
+    /// Layer of the column.
+    pub layer: u32,
+    /// Height, room (units); an extra has no room.
+    pub height: i32,
+    pub under: i32,
+    pub ceiling: i32,
+    pub base: i32,
+    pub wet: bool,
+    /// The wall that links it with others than its height does, or [`NONE`].
+    pub wall: u32,
+}
+
+impl Entry {
+    #[inline(always)]
+    pub fn holds(&self, height: i32) -> bool {
+        (self.under <= height) & (height < self.ceiling)
+    }
+
+    /// Whether two columns of neighbouring cells are linked, one of them wet.
+    #[inline(always)]
+    pub fn is_linked(&self, other: &Self) -> bool {
+        self.holds(other.height) & other.holds(self.height)
+    }
+
+    /// Whether the surface of a wet column, whose height `wall` holds, ends at its solid.
+    pub fn ends_at(&self, wall: &Self) -> bool {
+        self.height < self.ceiling && self.ceiling <= wall.base
+    }
+}
+
+/// Cells in a row of a block and the one behind.
+const CELLS: usize = STRIP + 1;
+
+#[derive(Debug, Default)]
+struct Row {
+    /// Strips by layer: of the block, and of the one to the east.
+    strips: [Vec<usize>; 2],
+    /// Cell by cell, from the lowest.
+    entries: Vec<Entry>,
+    ends: [usize; CELLS + 1],
+}
+
+/// The cells of a block's quartets.
+#[derive(Debug, Default)]
+pub(in crate::shallow::surface) struct Cells {
+    rows: [Row; 2],
+    /// Full quartets of each layer.
+    full: Vec<u16>,
+}
+
+impl Cells {
+    /// Makes room for so many layers.
+    pub fn reserve(&mut self, layers: usize) {
+        for row in &mut self.rows {
+            row.strips.iter_mut().for_each(|strips| strips.reserve(layers));
+            // Each column may be a wall, with at most an extra for each column around it.
+            row.entries.reserve(CELLS * layers * (1 + 8 * layers));
+        }
+        self.full.reserve(layers);
+    }
+
+    /// Takes the cells of quartets of a block.
+    pub fn enter(&mut self, scene: Scene<'_>, found: &Found, walls: &[Wall], block: usize, quartets: u16) {
+        let (row, at) = (block / found.across, block % found.across);
+        let reaches_east = quartets >> 15 == 1;
+        for (cells, row) in self.rows.iter_mut().zip(row..) {
+            let [own, east] = &mut cells.strips;
+            find_layers(scene, [row, at], own);
+            east.clear();
+            if reaches_east {
+                find_layers(scene, [row, at + 1], east);
+            }
+        }
+        self.full.clear();
+        self.full.extend(self.rows[0].strips[0].iter().map(|&strip| found.states[strip].full));
+        let cells = u32::from(quartets) | u32::from(quartets) << 1;
+        self.rows.iter_mut().for_each(|row| row.take(scene, found, walls, cells));
+    }
+
+    /// Columns and extras at a corner of a quartet: 0 north-west, 1 north-east, 2 south-west, 3 south-east.
+    #[inline(always)]
+    pub fn corner(&self, quartet: usize, corner: usize) -> &[Entry] {
+        let (row, cell) = (&self.rows[corner >> 1], quartet + (corner & 1));
+        &row.entries[row.ends[cell]..row.ends[cell + 1]]
+    }
+
+    /// Whether a column of a quartet is in a full group: then it is in no other.
+    #[inline(always)]
+    pub fn is_done(&self, quartet: usize, entry: &Entry) -> bool {
+        self.full.get(entry.layer as usize).is_some_and(|full| full >> quartet & 1 == 1)
+    }
+}
+
+/// Finds the strips of a block by layer.
+fn find_layers(scene: Scene<'_>, at: [usize; 2], out: &mut Vec<usize>) {
+    out.clear();
+    out.extend(std::iter::successors(scene.lowest(at), |&strip| scene.above(strip)));
+}
+
+impl Row {
+    fn take(&mut self, scene: Scene<'_>, found: &Found, walls: &[Wall], cells: u32) {
+        let columns = scene.columns;
+        let Self { strips, entries, ends } = self;
+        entries.clear();
+        for cell in 0..CELLS {
+            let place = cell % STRIP;
+            if cells >> cell & 1 == 1 {
+                for (layer, &strip) in strips[cell / STRIP].iter().enumerate() {
+                    if columns.present(strip) >> place & 1 == 0 {
+                        break;
+                    }
+                    let index = strip * STRIP + place;
+                    entries.push(Entry {
+                        id: index as u32,
+                        layer: layer as u32,
+                        height: scene.height(index),
+                        under: columns.unders()[index],
+                        ceiling: columns.ceilings()[index],
+                        base: columns.bases()[index],
+                        wet: scene.is_wet(index),
+                        wall: NONE,
+                    });
+                    if found.states[strip].walls >> place & 1 == 1 {
+                        add_walls(columns, walls, entries);
+                    }
+                }
+            }
+            ends[cell + 1] = entries.len();
+        }
+    }
+}
+
+/// Adds the extras of the last column, which is a wall.
+fn add_walls(columns: &Columns, walls: &[Wall], entries: &mut Vec<Entry>) {
+    let Some(column) = entries.len().checked_sub(1) else { return };
+    for place in walls_of(walls, entries[column].id) {
+        let wall = place as u32;
+        if walls[place].is_own {
+            entries[column].wall = wall;
+        } else {
+            let (id, height) = (columns.len() as u32 + wall, walls[place].height);
+            entries.push(Entry { id, height, under: 0, ceiling: 0, wet: false, wall, ..entries[column] });
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! Finds which columns are wet, which quartets full and which odd. Most quartets are full, and known from comparisons of whole strips.
+
+use super::links::Scene;
+use super::strips::{Found, Span, State, count, some};
+use crate::numeric::cpu::dispatch;
+use crate::shallow::surface::{Columns, STRIP};
+
+/// Finds the wet columns, and the strips whose quartets may have one.
+pub(in crate::shallow::surface) fn find_wet(scene: Scene<'_>, active: Option<&[bool]>, found: &mut Found) {
+    dispatch!(find_wet_strips(scene: Scene<'_>, active: Option<&[bool]>, found: &mut Found))
+}
+
+#[inline(always)]
+fn find_wet_strips(scene: Scene<'_>, active: Option<&[bool]>, found: &mut Found) {
+    let columns = scene.columns;
+    for (strip, depth) in scene.depth.as_chunks::<STRIP>().0.iter().enumerate() {
+        if active.is_some_and(|active| !active[strip]) {
+            continue;
+        }
+        let mut wet = 0;
+        for (place, depth) in depth.iter().enumerate() {
+            wet |= if *depth > 0 { 1 << place } else { 0u32 };
+        }
+        if wet != 0 {
+            found.states[strip].wet = wet as u16;
+            found.near.set(strip);
+            for side in [columns.north(strip), columns.south(strip)].into_iter().filter_map(some) {
+                found.near.set(side);
+            }
+        }
+    }
+    found.find_spans(columns);
+}
+
+/// 16 places, and those to the east of them: depth, base, ceiling, underside.
+type Windows<'a> = [[&'a [i32; STRIP]; 2]; 4];
+
+/// Places whose quartet is linked as a whole: the highest of its heights is under the lowest ceiling, the lowest not under the highest
+/// underside; and those where the sum of the heights in the north-east and south-west is the greater.
+#[inline(always)]
+fn compare([depth, base, ceiling, under]: Windows<'_>, south: Windows<'_>) -> [u16; 2] {
+    let [depth_s, base_s, ceiling_s, under_s] = south;
+    let (mut linked, mut greater) = (0u32, 0u32);
+    for place in 0..STRIP {
+        let north = |at: usize| base[at][place].wrapping_add(depth[at][place].max(0));
+        let south = |at: usize| base_s[at][place].wrapping_add(depth_s[at][place].max(0));
+        let [a, b, c, d] = [north(0), north(1), south(0), south(1)];
+        let least = |[n, n_east]: [&[i32; STRIP]; 2], [s, s_east]: [&[i32; STRIP]; 2]| {
+            n[place].min(n_east[place]).min(s[place].min(s_east[place]))
+        };
+        let most = |[n, n_east]: [&[i32; STRIP]; 2], [s, s_east]: [&[i32; STRIP]; 2]| {
+            n[place].max(n_east[place]).max(s[place].max(s_east[place]))
+        };
+        let highest = a.max(b).max(c.max(d));
+        let lowest = a.min(b).min(c.min(d));
+        let is_linked = (lowest >= most(under, under_s)) & (highest < least(ceiling, ceiling_s));
+        linked |= if is_linked { 1 << place } else { 0 };
+        // a + d < b + c, without overflow.
+        greater |= if a.wrapping_sub(b) < c.wrapping_sub(d) { 1 << place } else { 0 };
+    }
+    [linked as u16, greater as u16]
+}
+
+/// Finds the full quartets and their vertices, and the odd quartets.
+pub(in crate::shallow::surface) fn find_full(scene: Scene<'_>, found: &mut Found) {
+    dispatch!(find_full_spans(scene: Scene<'_>, found: &mut Found))
+}
+
+#[inline(always)]
+fn find_full_spans(scene: Scene<'_>, found: &mut Found) {
+    let columns = scene.columns;
+    let arrays = [scene.depth, columns.bases(), columns.ceilings(), columns.unders()];
+    // The last strip has no place behind it.
+    let last = columns.strips().len().saturating_sub(1);
+    let mut ends = [[0; STRIP + 1]; 4];
+    for (end, numbers) in ends.iter_mut().zip(arrays) {
+        end[..STRIP].copy_from_slice(numbers.last_chunk::<STRIP>().unwrap_or(&[0; STRIP]));
+    }
+    for at in 0..found.spans.len() {
+        let span = found.spans[at];
+        let (first, end) = (span.first, span.len - 1);
+        let none = found.states.len() - 1;
+        let corners = Corners::of(columns, found, &span);
+        let [mut west, mut north_west] = [corners.west, corners.north_west].map(|slot| found.states[slot]);
+        let mut wet = found.states[first].wet;
+        let mut wet_south = found.states[found.slot(some(span.south))].wet;
+        for step in 0..span.len {
+            let strip = first + step;
+            let wet_east = found.states[if step == end { corners.east } else { strip + 1 }].wet;
+            let mut wet_south_east = 0;
+            let (mut full, mut turned) = (0, 0);
+            if let Some(south) = some(span.south).map(|south| south + step) {
+                wet_south_east = found.states[if step == end { corners.south_east } else { south + 1 }].wet;
+                let wets = [wet, from_east(wet, wet_east), wet_south, from_east(wet_south, wet_south_east)];
+                let any = wets[0] | wets[1] | wets[2] | wets[3];
+                if any != 0 {
+                    let windows_south = if south == last {
+                        windows(ends.each_ref().map(|end| end.as_slice()), 0)
+                    } else {
+                        windows(arrays, south)
+                    };
+                    let [linked, greater] = compare(windows(arrays, strip), windows_south);
+                    full = linked & any;
+                    if step == end && (corners.east == none || corners.south_east == none) {
+                        full &= 0x7fff;
+                    }
+                    turned = full & choose(wets, greater);
+                    found.full_triangles += 2 * count(full) as usize;
+                }
+            }
+            let north = found.states[some(span.north).map_or(none, |north| north + step)];
+            let covered =
+                [full, from_west(full, west.full), north.full, from_west(north.full, north_west.full)];
+            let state = &mut found.states[strip];
+            (state.full, state.turned) = (full, turned);
+            state.used = covered[0] | covered[1] | covered[2] | covered[3];
+            state.sides = [
+                (covered[1] | covered[3]) & from_west(wet, west.wet),
+                (covered[0] | covered[2]) & from_east(wet, wet_east),
+                (covered[2] | covered[3]) & north.wet,
+                (covered[0] | covered[1]) & wet_south,
+            ];
+            west = State { wet, full, ..west };
+            north_west = north;
+            if wet & !(covered[0] & covered[1] & covered[2] & covered[3]) != 0 {
+                add_odd(columns, found, strip, covered);
+            }
+            (wet, wet_south) = (wet_east, wet_south_east);
+        }
+    }
+}
+
+/// The strips before and behind a span, in its own row and those to the north and south: places in `states`.
+struct Corners {
+    west: usize,
+    east: usize,
+    north_west: usize,
+    south_east: usize,
+}
+
+impl Corners {
+    fn of(columns: &Columns, found: &Found, span: &Span) -> Self {
+        let end = span.len - 1;
+        Self {
+            west: found.slot(columns.west(span.first)),
+            east: found.slot(columns.east(span.first + end)),
+            north_west: found.slot(some(span.north).and_then(|north| columns.west(north))),
+            south_east: found.slot(some(span.south).and_then(|south| columns.east(south + end))),
+        }
+    }
+}
+
+/// Each place of a strip with the value of the place to the east; of the last, that of the strip to the east.
+#[inline(always)]
+fn from_east(own: u16, east: u16) -> u16 {
+    own >> 1 | east << 15
+}
+
+/// Each place of a strip with the value of the place to the west.
+#[inline(always)]
+fn from_west(own: u16, west: u16) -> u16 {
+    own << 1 | west >> 15
+}
+
+/// 16 places of a strip and the one behind.
+#[inline(always)]
+fn windows(arrays: [&[i32]; 4], strip: usize) -> Windows<'_> {
+    let [a, b, c, d] = arrays;
+    [window(a, strip), window(b, strip), window(c, strip), window(d, strip)]
+}
+
+#[inline(always)]
+fn window(numbers: &[i32], strip: usize) -> [&[i32; STRIP]; 2] {
+    let window: &[i32; STRIP + 1] = numbers[strip * STRIP..].first_chunk().expect("a strip follows");
+    [window.first_chunk().expect("16 of 17"), window.last_chunk().expect("16 of 17")]
+}
+
+/// Chooses diagonals: the quartets to divide from north-east to south-west, from what is wet in their corners and where the sum of the heights
+/// there is the greater.
+#[inline(always)]
+fn choose([a, b, c, d]: [u16; 4], greater: u16) -> u16 {
+    if a & b & c & d == u16::MAX {
+        return greater;
+    }
+    // Whether the ends of the diagonals from north-west and from north-east are both wet or both dry.
+    let (from_west_end, from_east_end) = (!(a ^ d), !(b ^ c));
+    let all_alike = !(a ^ b);
+    let both = from_west_end & from_east_end & (all_alike & greater | !all_alike & b);
+    let neither = !from_west_end & !from_east_end & greater;
+    from_east_end & !from_west_end | both | neither
+}
+
+/// Marks the odd quartets of a strip's wet columns, of which the quartets to the south-east, south-west, north-east and north-west are full
+/// where `covered` says so.
+fn add_odd(columns: &Columns, found: &mut Found, strip: usize, covered: [u16; 4]) {
+    let place = columns.strips()[strip];
+    let (row, at) = (place.row as usize, place.at as usize);
+    let [nx, nz] = columns.grid.size;
+    let wet = found.states[strip].wet;
+    // Columns with a cell to the east and to the west.
+    let has_east =
+        if (at + 1) * STRIP >= nx { ((1u32 << (nx - 1 - at * STRIP)) - 1) as u16 } else { u16::MAX };
+    let has_west = if at == 0 { u16::MAX << 1 } else { u16::MAX };
+    let (mut here, mut before) = ([0; 2], [0; 2]);
+    if row + 1 < nz {
+        here = [wet & has_east & !covered[0], wet & has_west & !covered[1]];
+    }
+    if row > 0 {
+        before = [wet & has_east & !covered[2], wet & has_west & !covered[3]];
+    }
+    found.states[strip].rough = here[0] | here[1] | before[0] | before[1];
+    let mut add = |block: usize, odd: u16| {
+        if odd != 0 {
+            found.blocks[block].odd |= odd;
+            found.odd.set(block);
+        }
+    };
+    let block = row * found.across + at;
+    add(block, here[0] | here[1] >> 1);
+    if here[1] & 1 != 0 {
+        add(block - 1, 1 << 15);
+    }
+    if row > 0 {
+        add(block - found.across, before[0] | before[1] >> 1);
+        if before[1] & 1 != 0 {
+            add(block - found.across - 1, 1 << 15);
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! Which columns of neighbouring cells are linked (thesis 4.2.1), one pair at a time.
+
+use std::ops::Range;
+
+use crate::shallow::columns::{Columns, NONE, STRIP, Strip};
+
+/// The eight cells around one, in a circle from the east by the north: steps along x and z.
+pub(in crate::shallow::surface) const RING: [[i32; 2]; 8] =
+    [[1, 0], [1, -1], [0, -1], [-1, -1], [-1, 0], [-1, 1], [0, 1], [1, 1]];
+
+/// Whether two cells of the ring are neighbours of each other.
+pub(in crate::shallow::surface) fn are_near(a: usize, b: usize) -> bool {
+    a != b && RING[a][0].abs_diff(RING[b][0]) <= 1 && RING[a][1].abs_diff(RING[b][1]) <= 1
+}
+
+/// Columns and the liquid in them.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::shallow::surface) struct Scene<'a> {
+    pub columns: &'a Columns,
+    /// Depth of each index (units).
+    pub depth: &'a [i32],
+    /// Of each strip where the one of the layer above is, or would be, probably; may be empty.
+    pub above: &'a [u32],
+}
+
+impl<'a> Scene<'a> {
+    pub fn is_wet(self, index: usize) -> bool {
+        self.depth[index] > 0
+    }
+
+    /// Height (units). Depths beyond the ceiling may wrap around; they are the caller's fault, and never a panic.
+    pub fn height(self, index: usize) -> i32 {
+        self.columns.bases()[index].wrapping_add(self.depth[index].max(0))
+    }
+
+    /// Whether a column's room holds a height; that of an index without a column holds none.
+    pub fn holds(self, index: usize, height: i32) -> bool {
+        self.columns.unders()[index] <= height && height < self.columns.ceilings()[index]
+    }
+
+    /// Whether two columns of neighbouring cells are linked, if one of them is wet.
+    pub fn are_linked(self, a: usize, b: usize) -> bool {
+        self.holds(a, self.height(b)) && self.holds(b, self.height(a))
+    }
+
+    /// The column whose room holds a height in the cell at a step of -1, 0 or 1 along x and z from a column's.
+    pub fn beside(self, index: usize, [dx, dz]: [i32; 2], height: i32) -> Option<usize> {
+        let columns = self.columns;
+        let (strip, place) = (index / STRIP, index % STRIP);
+        let row = match dz {
+            -1 => columns.north(strip),
+            1 => columns.south(strip),
+            _ => strip as u32,
+        };
+        // Mostly it is the one of the same layer.
+        if row != NONE {
+            let (row, place) = (row as usize, place as i32 + dx);
+            let strip = match place {
+                -1 => columns.west(row),
+                16 => columns.east(row),
+                _ => Some(row),
+            };
+            let same = strip.map(|strip| strip * STRIP + (place & 15) as usize);
+            if let Some(same) = same.filter(|&same| self.holds(same, height)) {
+                return Some(same);
+            }
+        }
+        self.of_cell(cell_at(columns.cell(index), [dx, dz])).find(|&other| self.holds(other, height))
+    }
+
+    /// The columns of a cell, from the lowest; none outside of the grid.
+    pub fn of_cell(self, [x, z]: [usize; 2]) -> impl Iterator<Item = usize> + 'a {
+        let columns = self.columns;
+        let [nx, nz] = columns.grid.size;
+        let lowest = if x < nx && z < nz { self.lowest([z, x / STRIP]) } else { None };
+        let stack = std::iter::successors(lowest, move |&strip| self.above(strip));
+        stack.map(move |strip| strip * STRIP + x % STRIP).take_while(move |&index| columns.is_column(index))
+    }
+
+    /// The wet column that a column is linked with in the cell at such a step.
+    pub fn wet_beside(self, index: usize, step: [i32; 2]) -> Option<usize> {
+        let height = self.height(index);
+        let other = self.beside(index, step, height)?;
+        (self.is_wet(other) && self.holds(index, self.height(other))).then_some(other)
+    }
+
+    /// The strip of the lowest layer at a row and a place along x / 16.
+    pub fn lowest(self, [row, at]: [usize; 2]) -> Option<usize> {
+        let range = self.columns.row(row);
+        let wanted = Strip { row: row as u32, layer: 0, at: at as u32 };
+        self.find(wanted, range.start + at, range.start..range.end.min(range.start + at + 1))
+    }
+
+    /// The strip of the layer above at the same place.
+    pub fn above(self, strip: usize) -> Option<usize> {
+        let own = self.columns.strips()[strip];
+        let across = self.columns.grid.size[0].div_ceil(STRIP);
+        let end = self.columns.row(own.row as usize).end;
+        let guess = self.above.get(strip).map_or(strip + across, |above| *above as usize);
+        self.find(Strip { layer: own.layer + 1, ..own }, guess, strip + 1..end.min(strip + across + 1))
+    }
+
+    /// A strip within a range; `guess`, where it is or would be, is mostly right.
+    #[inline]
+    fn find(self, wanted: Strip, guess: usize, range: Range<usize>) -> Option<usize> {
+        let strips = self.columns.strips();
+        let found = strips.get(guess);
+        if found == Some(&wanted) {
+            return Some(guess);
+        }
+        if found.is_none_or(|behind| *behind > wanted)
+            && guess
+                .checked_sub(1)
+                .and_then(|before| strips.get(before))
+                .is_some_and(|before| *before < wanted)
+        {
+            return None;
+        }
+        strips[range.clone()].binary_search(&wanted).ok().map(|found| range.start + found)
+    }
+
+    /// Whether the surface of a wet column ends at the solid of a column beside it, which holds its height.
+    pub fn ends_at(self, wet: usize, wall: usize) -> bool {
+        let ceiling = self.columns.ceilings()[wet];
+        self.height(wet) < ceiling && ceiling <= self.columns.bases()[wall]
+    }
+}
+
+/// The cell at a step from one; before the first it wraps around to none of the grid.
+pub(in crate::shallow::surface) fn cell_at([x, z]: [usize; 2], [dx, dz]: [i32; 2]) -> [usize; 2] {
+    [x.wrapping_add_signed(dx as isize), z.wrapping_add_signed(dz as isize)]
+}
+
+/// Finds where the strips above each other are, or would be.
+pub(in crate::shallow::surface) fn find_above(columns: &Columns, out: &mut Vec<u32>) {
+    let strips = columns.strips();
+    let across = columns.grid.size[0].div_ceil(STRIP);
+    out.clear();
+    out.extend(strips.iter().enumerate().map(|(strip, own)| {
+        let wanted = Strip { layer: own.layer + 1, ..*own };
+        let behind = &strips[strip + 1..strips.len().min(strip + across + 2)];
+        (strip + 1 + behind.partition_point(|other| *other < wanted)) as u32
+    }));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
+    use crate::shallow::terrain::Solids;
+
+    #[test]
+    fn cells_of_the_ring_are_near_their_neighbours() {
+        let near = |ring: usize| (0..8).filter(|other| are_near(ring, *other)).collect::<Vec<_>>();
+        assert_eq!(near(0), [1, 2, 6, 7], "the east: corners beside it, north and south");
+        assert_eq!(near(3), [2, 4], "a corner");
+    }
+
+    #[test]
+    fn columns_of_a_cell_are_found_whatever_the_guess() {
+        // Layers only in some strips: 1 to 3 of them.
+        let grid = Grid { cell: 1.0, origin: [0.0; 2], size: [80, 2] };
+        let solids =
+            |cell: usize| (0..=[0, 2, 1, 2, 0][cell % 80 / 16]).map(|n| [n * 10, n * 10 + 5]).collect();
+        let columns =
+            Columns::new(&Solids::new(grid, Heights::between(0.0, 1.0).unwrap(), (0..160).map(solids)));
+        let mut above = Vec::new();
+        find_above(&columns, &mut above);
+        let wrong: Vec<u32> = above.iter().rev().copied().collect();
+        for above in [&above[..], &wrong, &[]] {
+            let scene = Scene { columns: &columns, depth: &[], above };
+            for cell in (0..80).flat_map(|x| [[x, 0], [x, 1]]) {
+                assert!(scene.of_cell(cell).eq(columns.of_cell(cell)), "{cell:?}");
+            }
+            assert_eq!(scene.of_cell([80, 0]).chain(scene.of_cell([0, 2])).count(), 0);
+            assert_eq!(scene.of_cell(cell_at([0, 0], [-1, 0])).count(), 0);
+        }
+    }
+
+    #[test]
+    fn rooms_are_half_open() {
+        let grid = Grid { cell: 1.0, origin: [0.0; 2], size: [2, 1] };
+        let solids = [vec![[BOTTOMLESS, 10], [20, 30]], vec![[BOTTOMLESS, 15]]];
+        let columns = Columns::new(&Solids::new(grid, Heights::between(0.0, 1.0).unwrap(), solids));
+        let [low, high, beside] =
+            [columns.column([0, 0], 0), columns.column([0, 0], 1), columns.column([1, 0], 0)];
+        let [low, high, beside] = [low, high, beside].map(Option::unwrap);
+        let mut depth = vec![0; columns.len()];
+        for (level, linked) in [(19, low), (20, high), (31, high)] {
+            depth[beside] = level - 15;
+            depth[high] = 1;
+            let scene = Scene { columns: &columns, depth: &depth, above: &[] };
+            assert_eq!(scene.beside(beside, [-1, 0], level), Some(linked), "{level}");
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! Odd quartets: groups of four and of three linked columns, whatever their layers (thesis 4.2.2).
+
+use super::cells::{Cells, Entry};
+use super::links::Scene;
+use super::strips::{Found, places};
+use super::wall::Walled;
+use crate::shallow::surface::rim::boundary::Walls;
+
+/// Corners of a quartet besides one.
+pub(in crate::shallow) const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
+
+/// The triangle without a corner, facing up.
+const TRIANGLES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [1, 0, 3], [0, 2, 1]];
+
+/// What a search for groups works with.
+#[derive(Debug, Default)]
+pub(in crate::shallow::surface) struct Search {
+    cells: Cells,
+    /// The columns of a quartet's triangles.
+    triangles: Vec<[u32; 3]>,
+    walled: Walled,
+    /// The triangles of odd quartets that have some, without walls and with, and how many each quartet has.
+    found: [Vec<[u32; 3]>; 2],
+    counts: [Vec<u32>; 2],
+}
+
+impl Search {
+    /// Makes room for so many layers, odd quartets and triangles.
+    pub fn reserve(&mut self, layers: usize, quartets: usize, triangles: usize) {
+        self.cells.reserve(layers);
+        // A column of the eight cells around ends at one extra of a cell at most.
+        self.walled.reserve(4 * layers * (1 + 8));
+        self.triangles.reserve(32 * layers);
+        self.forget();
+        self.found.iter_mut().for_each(|found| found.reserve(triangles));
+        self.counts.iter_mut().for_each(|counts| counts.reserve(quartets));
+    }
+
+    /// Forgets the frame before.
+    fn forget(&mut self) {
+        self.found.iter_mut().for_each(Vec::clear);
+        self.counts.iter_mut().for_each(Vec::clear);
+    }
+
+    /// Keeps the triangles of a quartet without walls (0), or with (1).
+    fn keep(&mut self, kind: usize) {
+        self.counts[kind].push(self.triangles.len() as u32);
+        self.found[kind].extend_from_slice(&self.triangles);
+    }
+
+    /// Finds the triangles of a quartet without walls; returns false if there is one, and calls `add_wall` with each.
+    fn find(&mut self, quartet: usize, mut add_wall: impl FnMut(u32)) -> bool {
+        self.triangles.clear();
+        let mut has_wall = false;
+        for (corner, others) in OTHERS.into_iter().enumerate() {
+            for wet in self.cells.corner(quartet, corner) {
+                if !wet.wet || self.cells.is_done(quartet, wet) {
+                    continue;
+                }
+                // A column is linked with at most one of each cell: the one whose room holds its height.
+                let mut near = [None; 4];
+                for other in others {
+                    if let Some(holder) =
+                        self.cells.corner(quartet, other).iter().find(|entry| entry.holds(wet.height))
+                    {
+                        if wet.holds(holder.height) {
+                            near[other] = Some(holder);
+                        } else if wet.ends_at(holder) {
+                            has_wall = true;
+                            add_wall(holder.id);
+                        }
+                    }
+                }
+                add_triangles(corner, wet, near, &mut self.triangles);
+            }
+        }
+        !has_wall
+    }
+}
+
+/// Adds the triangles of groups of which `wet`, at `corner`, is the first that is wet, from what it is linked with.
+#[inline(always)]
+pub(in crate::shallow) fn add_triangles(
+    corner: usize,
+    wet: &Entry,
+    near: [Option<&Entry>; 4],
+    triangles: &mut Vec<[u32; 3]>,
+) {
+    let fit = |a: &Entry, b: &Entry| !a.wet && !b.wet || a.is_linked(b);
+    let is_first = |at: usize, entry: &Entry| at > corner || !entry.wet;
+    let [p, q, r] = OTHERS[corner];
+    if let (Some(x), Some(y), Some(z)) = (near[p], near[q], near[r])
+        && fit(x, y)
+        && fit(x, z)
+        && fit(y, z)
+    {
+        if is_first(p, x) && is_first(q, y) && is_first(r, z) {
+            let mut four = [wet; 4];
+            [four[p], four[q], four[r]] = [x, y, z];
+            triangles.extend(divide(four));
+        }
+        return;
+    }
+    for [first, second, omitted] in [[p, q, r], [p, r, q], [q, r, p]] {
+        if let (Some(x), Some(y)) = (near[first], near[second])
+            && is_first(first, x)
+            && is_first(second, y)
+            && fit(x, y)
+        {
+            triangles.push(three(wet.id, [(first, x.id), (second, y.id)], omitted));
+        }
+    }
+}
+
+/// The triangle of three columns, of which two are at given corners.
+pub(in crate::shallow::surface) fn three(first: u32, others: [(usize, u32); 2], omitted: usize) -> [u32; 3] {
+    let mut ids = [first; 4];
+    others.into_iter().for_each(|(corner, id)| ids[corner] = id);
+    TRIANGLES[omitted].map(|corner| ids[corner])
+}
+
+/// Divides a group of four.
+pub(in crate::shallow::surface) fn divide(four: [&Entry; 4]) -> [[u32; 3]; 2] {
+    let [a, b, c, d] = four;
+    let turned = match (a.wet == d.wet, b.wet == c.wet) {
+        (true, true) if a.wet != b.wet => b.wet,
+        (true, false) => false,
+        (false, true) => true,
+        _ => a.height.wrapping_sub(b.height) < c.height.wrapping_sub(d.height),
+    };
+    let omitted = if turned { [3, 0] } else { [1, 2] };
+    omitted.map(|corner| TRIANGLES[corner].map(|corner| four[corner].id))
+}
+
+/// Finds the groups of odd quartets, marks their vertices and returns how many triangles they become.
+pub(in crate::shallow::surface) fn find_groups(
+    scene: Scene<'_>,
+    found: &mut Found,
+    walls: &mut Walls,
+    search: &mut Search,
+) -> usize {
+    let mut count = 0;
+    search.forget();
+    let mut has_walls = false;
+    each_odd(found, |found, block| {
+        let odd = found.blocks[block].odd;
+        found.blocks[block].searched = odd;
+        search.cells.enter(scene, found, &[], block, odd);
+        for quartet in places(odd) {
+            let is_plain = search.find(quartet, |wall| found.add_wall(wall as usize));
+            if is_plain {
+                count += search.triangles.len();
+                search.triangles.iter().flatten().for_each(|&column| found.add_vertex(column as usize));
+                if !search.triangles.is_empty() {
+                    search.keep(0);
+                }
+            }
+            // Those without triangles are looked at no more.
+            let out = &mut found.blocks[block];
+            out.walled |= u16::from(!is_plain) << quartet;
+            out.odd &= !(u16::from(is_plain && search.triangles.is_empty()) << quartet);
+            has_walls |= !is_plain;
+        }
+    });
+    if !has_walls {
+        return count;
+    }
+    walls.find(scene, found);
+    let len = scene.columns.len();
+    each_odd(found, |found, block| {
+        let walled = found.blocks[block].walled;
+        if walled == 0 {
+            return;
+        }
+        search.cells.enter(scene, found, &walls.list, block, walled);
+        for quartet in places(walled) {
+            search.walled.find(&search.cells, &walls.list, quartet, &mut search.triangles);
+            search.keep(1);
+            count += search.triangles.len();
+            for &id in search.triangles.iter().flatten() {
+                match (id as usize).checked_sub(len) {
+                    Some(extra) => walls.used[extra] = true,
+                    None => found.add_vertex(id as usize),
+                }
+            }
+        }
+    });
+    count
+}
+
+/// Calls `visit` with each block that has odd quartets.
+fn each_odd(found: &mut Found, mut visit: impl FnMut(&mut Found, usize)) {
+    let odd = std::mem::take(&mut found.odd);
+    odd.iter().for_each(|block| visit(found, block));
+    found.odd = odd;
+}
+
+impl Search {
+    /// The columns or extras of all triangles of odd quartets, those without walls first.
+    pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        self.found.iter().flatten().copied()
+    }
+}
+
+/// Calls `add` with the columns or extras of each triangle of odd quartets, in order.
+pub(in crate::shallow::surface) fn each_odd_triangle(
+    found: &Found,
+    search: &Search,
+    mut add: impl FnMut([u32; 3]),
+) {
+    let mut rest = search.found.each_ref().map(|found| &found[..]);
+    let mut counts = search.counts.each_ref().map(|counts| counts.iter());
+    for block in found.odd.iter() {
+        let quartets = found.blocks[block];
+        for quartet in places(quartets.odd) {
+            let kind = usize::from(quartets.walled >> quartet & 1);
+            let count = counts[kind].next().map_or(0, |count| *count as usize);
+            let (own, behind) = rest[kind].split_at(count);
+            rest[kind] = behind;
+            own.iter().for_each(|triangle| add(*triangle));
+        }
+    }
+}

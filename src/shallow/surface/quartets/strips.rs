@@ -1,0 +1,282 @@
+//! What is known of strips in a frame, a bit for each place.
+
+use crate::shallow::surface::{Columns, NONE, STRIP};
+
+/// A strip, with a bit for each place.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::shallow::surface) struct State {
+    /// Wet columns.
+    pub wet: u16,
+    /// Full quartets of this layer, at their north-west column.
+    pub full: u16,
+    /// Those of them that are divided from north-east to south-west.
+    pub turned: u16,
+    /// Wet columns in an odd quartet.
+    pub rough: u16,
+    /// Columns that full quartets link with a wet one of the same layer to the west, east, north and south.
+    pub sides: [u16; 4],
+    /// Columns that are walls.
+    pub walls: u16,
+    /// Columns that are vertices.
+    pub used: u16,
+    /// The vertex of the first of these.
+    pub first: u32,
+}
+
+/// A run of 16 cells along x, with a bit for each quartet.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::shallow::surface) struct Block {
+    /// Odd quartets.
+    pub odd: u16,
+    /// Those in which a surface ends at a wall.
+    pub walled: u16,
+    /// Those that were odd, also without triangles.
+    pub searched: u16,
+}
+
+/// Strips that follow each other along x, as do those to the north and to the south of them.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::shallow::surface) struct Span {
+    /// First strip.
+    pub first: usize,
+    /// Count of strips.
+    pub len: usize,
+    /// First strip to the north, or [`NONE`].
+    pub north: u32,
+    /// First strip to the south, or [`NONE`].
+    pub south: u32,
+}
+
+/// A set of indices.
+#[derive(Debug, Default)]
+pub(in crate::shallow::surface) struct Bits(Vec<u64>);
+
+impl Bits {
+    /// None of so many.
+    pub fn reset(&mut self, count: usize) {
+        self.0.clear();
+        self.0.resize(count.div_ceil(64), 0);
+    }
+
+    #[inline(always)]
+    pub fn set(&mut self, index: usize) {
+        self.0[index / 64] |= 1 << (index % 64);
+    }
+
+    pub fn has(&self, index: usize) -> bool {
+        self.0[index / 64] >> (index % 64) & 1 == 1
+    }
+
+    /// Adds the indices before and behind each; the last is below `count`.
+    pub fn widen(&mut self, count: usize) {
+        let mut before = 0;
+        for word in 0..self.0.len() {
+            let own = self.0[word];
+            let next = self.0.get(word + 1).map_or(0, |next| next << 63);
+            self.0[word] |= own >> 1 | own << 1 | next | before >> 63;
+            before = own;
+        }
+        if let Some(last) = self.0.last_mut().filter(|_| !count.is_multiple_of(64)) {
+            *last &= (1 << (count % 64)) - 1;
+        }
+    }
+
+    /// Its indices, from the least.
+    #[inline(always)]
+    pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
+        self.0.iter().enumerate().flat_map(|(word, &bits)| places(bits).map(move |bit| word * 64 + bit))
+    }
+
+    /// Finds the spans of a set of strips.
+    pub fn find_spans(&self, columns: &Columns, out: &mut Vec<Span>) {
+        let follows = |first: u32, count: usize, other: u32| match first {
+            NONE => other == NONE,
+            first => other == first + count as u32,
+        };
+        out.clear();
+        for strip in self.iter() {
+            let (north, south) = (columns.north(strip), columns.south(strip));
+            if let Some(span) = out.last_mut()
+                && span.first + span.len == strip
+                && follows(span.north, span.len, north)
+                && follows(span.south, span.len, south)
+                && columns.east(strip - 1).is_some()
+            {
+                span.len += 1;
+                continue;
+            }
+            out.push(Span { first: strip, len: 1, north, south });
+        }
+    }
+}
+
+/// Places of the bits that are set, from the lowest.
+#[inline(always)]
+pub(in crate::shallow::surface) fn places(bits: impl Into<u64>) -> impl Iterator<Item = usize> {
+    let mut bits: u64 = bits.into();
+    std::iter::from_fn(move || {
+        let place = bits.trailing_zeros() as usize;
+        bits &= bits.wrapping_sub(1);
+        (place < 64).then_some(place)
+    })
+}
+
+/// What is known of all strips.
+#[derive(Debug, Default)]
+pub(in crate::shallow::surface) struct Found {
+    /// Of each strip, and behind the last one of no strip: nothing.
+    pub states: Vec<State>,
+    /// Of each run of 16 cells, row by row.
+    pub blocks: Vec<Block>,
+    /// Runs of 16 cells in a row.
+    pub across: usize,
+    /// Strips that may have something: those with a wet column, those around them, and others with vertices or walls.
+    pub near: Bits,
+    /// The same, as spans.
+    pub spans: Vec<Span>,
+    /// Strips joined `near` since the spans were found.
+    is_stale: bool,
+    /// Blocks with odd quartets.
+    pub odd: Bits,
+    /// Count of triangles of full quartets.
+    pub full_triangles: usize,
+    /// Whether a vertex takes the mean of others.
+    pub has_means: bool,
+}
+
+impl Found {
+    /// Forgets the frame before.
+    pub fn reset(&mut self, columns: &Columns) {
+        let [nx, nz] = columns.grid.size;
+        let (strips, across) = (columns.strips().len(), nx.div_ceil(STRIP));
+        let Self { states, blocks, spans, odd, .. } = self;
+        if states.len() == strips + 1 && blocks.len() == across * nz {
+            spans.iter().for_each(|span| states[span.first..span.first + span.len].fill(State::default()));
+            odd.iter().for_each(|block| blocks[block] = Block::default());
+        } else {
+            states.clear();
+            states.resize(strips + 1, State::default());
+            blocks.clear();
+            blocks.resize(across * nz, Block::default());
+        }
+        spans.clear();
+        spans.reserve(strips);
+        self.near.reset(strips);
+        self.odd.reset(across * nz);
+        self.across = across;
+        self.full_triangles = 0;
+        self.is_stale = false;
+    }
+
+    /// Finds the strips around those with wet columns, which are in `near`, and the spans.
+    pub fn find_spans(&mut self, columns: &Columns) {
+        // A strip and the one behind it may not lie side by side; then one too many is looked at.
+        self.near.widen(columns.strips().len());
+        self.near.find_spans(columns, &mut self.spans);
+    }
+
+    /// Index of a neighbouring strip in `states`.
+    #[inline(always)]
+    pub fn slot(&self, strip: Option<usize>) -> usize {
+        strip.unwrap_or(self.states.len() - 1)
+    }
+
+    /// Makes a column a vertex.
+    pub fn add_vertex(&mut self, index: usize) {
+        self.state_of(index / STRIP).used |= 1 << (index % STRIP);
+    }
+
+    /// Makes a column a wall.
+    pub fn add_wall(&mut self, index: usize) {
+        self.state_of(index / STRIP).walls |= 1 << (index % STRIP);
+    }
+
+    fn state_of(&mut self, strip: usize) -> &mut State {
+        if !self.near.has(strip) {
+            self.near.set(strip);
+            self.is_stale = true;
+        }
+        &mut self.states[strip]
+    }
+
+    /// Numbers the vertices in order of their columns and returns their count.
+    pub fn number(&mut self, columns: &Columns) -> u32 {
+        if self.is_stale {
+            self.near.find_spans(columns, &mut self.spans);
+        }
+        let (mut next, mut dry) = (0, 0);
+        for span in &self.spans {
+            for state in &mut self.states[span.first..span.first + span.len] {
+                state.first = next;
+                next += count(state.used);
+                dry |= state.used & !state.wet;
+            }
+        }
+        self.has_means = dry != 0;
+        next
+    }
+
+    /// The vertex of a column that has one.
+    #[inline(always)]
+    pub fn vertex(&self, strip: usize, place: usize) -> u32 {
+        let state = &self.states[strip];
+        state.first + count(state.used & ((1 << place) - 1))
+    }
+}
+
+/// Count of bits; mostly they are the lowest ones, which is faster without an instruction for it.
+#[inline(always)]
+pub(in crate::shallow::surface) fn count(bits: u16) -> u32 {
+    let ones = bits.trailing_ones();
+    if u32::from(bits) == (1 << ones) - 1 { ones } else { bits.count_ones() }
+}
+
+/// The strip that a link leads to, if any.
+#[inline(always)]
+pub(in crate::shallow::surface) fn some(strip: u32) -> Option<usize> {
+    (strip != NONE).then_some(strip as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
+    use crate::shallow::terrain::Solids;
+
+    #[test]
+    fn sets_widen_across_words_and_not_beyond_their_end() {
+        let mut bits = Bits::default();
+        bits.reset(130);
+        [0, 63, 129].into_iter().for_each(|index| bits.set(index));
+        bits.widen(130);
+        assert_eq!(bits.iter().collect::<Vec<_>>(), [0, 1, 62, 63, 64, 128, 129]);
+        assert!(bits.has(128) && !bits.has(127));
+    }
+
+    #[test]
+    fn spans_end_where_a_neighbour_is_missing() {
+        // Three strips in a row; in the last of three rows the middle one is missing.
+        let grid = Grid { cell: 1.0, origin: [0.0; 2], size: [48, 3] };
+        let solid = |cell: usize| {
+            if cell >= 96 && (16..32).contains(&(cell % 48)) { vec![] } else { vec![[BOTTOMLESS, 9]] }
+        };
+        let columns =
+            Columns::new(&Solids::new(grid, Heights::between(0.0, 1.0).unwrap(), (0..144).map(solid)));
+        let mut bits = Bits::default();
+        bits.reset(8);
+        (0..8).for_each(|strip| bits.set(strip));
+        let mut spans = Vec::new();
+        bits.find_spans(&columns, &mut spans);
+        let found: Vec<_> = spans.iter().map(|span| (span.first, span.len, span.north, span.south)).collect();
+        let expected =
+            [(0, 3, NONE, 3), (3, 1, 0, 6), (4, 1, 1, NONE), (5, 1, 2, 7), (6, 1, 3, NONE), (7, 1, 5, NONE)];
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn bits_are_counted() {
+        for bits in [0, 1, 3, 0x7fff, 0xffff, 0xfffe, 0x8001, 0x0ff0] {
+            assert_eq!(count(bits), bits.count_ones(), "{bits:#x}");
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! Where the ground of a mesh ends, between the middles of the cells: on each side of a column at which films end, how far its triangles reach along the
+//! line to the middle of the next cell, and how high they are there.
+
+use std::ops::Range;
+
+use super::ledges::{Hem, Ledges};
+use crate::error::Result;
+use crate::geometry::Vec3;
+use crate::shallow::columns::grid::Grid;
+use crate::shallow::surface::quartets::links::RING;
+use crate::shallow::surface::{Columns, Depths, Surface};
+
+/// Finds the silhouette of the ground; keeps its memory.
+#[derive(Debug, Default)]
+pub(in crate::shallow::surface) struct Silhouette {
+    /// Films on all of the ground (units): where their surface ends, there may be a hem.
+    film: Vec<i32>,
+    films: Surface,
+    /// Hems in order of cells, row by row, and how far the ground reaches on their sides as far as triangles were looked at.
+    hems: Vec<Hem>,
+    ends: Vec<[Option<End>; 4]>,
+    crowd: Crowd,
+    /// Of each vertex along x and z the last cell whose middle is not behind it, within a cell around the domain.
+    cells: Vec<[i32; 2]>,
+}
+
+impl Silhouette {
+    /// Hems of all columns at which films end within the domain, in their order. A vertex has three finite numbers, and faces have vertices that are
+    /// there.
+    pub fn find(&mut self, columns: &Columns, positions: &[Vec3], faces: &[[u32; 3]]) -> Result<&[Hem]> {
+        self.find_ends_of_films(columns)?;
+        if self.hems.is_empty() {
+            return Ok(&[]);
+        }
+        self.place(columns);
+        self.find_cells(columns.grid, positions);
+        for face in faces {
+            let corners = face.map(|vertex| vertex as usize);
+            if let Some(cells) = self.crowd.near(corners.map(|corner| self.cells[corner])) {
+                let corners = corners.map(|corner| <[f32; 3]>::from(positions[corner]).map(f64::from));
+                self.cut(columns, corners, cells);
+            }
+        }
+        for (hem, ends) in self.hems.iter_mut().zip(&self.ends) {
+            let mut rise: Option<f64> = None;
+            for (reach, end) in hem.sides.iter_mut().zip(ends) {
+                if let (Some(reach), Some(End { at, height })) = (reach, *end) {
+                    *reach = at as f32;
+                    rise = Some(rise.map_or(height, |other| other.min(height)));
+                }
+            }
+            hem.rise = rise.unwrap_or(0.0) as f32;
+        }
+        self.hems.sort_unstable_by_key(|hem| hem.column);
+        Ok(&self.hems)
+    }
+
+    fn find_ends_of_films(&mut self, columns: &Columns) -> Result<()> {
+        let Self { film, films, hems, .. } = self;
+        let (bases, ceilings) = (columns.bases(), columns.ceilings());
+        film.clear();
+        film.extend(
+            (0..columns.len())
+                .map(|index| i32::from(columns.is_column(index) && ceilings[index] > bases[index])),
+        );
+        let mut ledges = Ledges::default();
+        ledges.find(columns);
+        films.count(columns, &Depths { depth: film, ledges: Some(&ledges), ..Depths::default() })?;
+        hems.clear();
+        hems.extend_from_slice(films.skirts.hems());
+        Ok(())
+    }
+
+    /// Puts the hems in order, and counts those of each cell.
+    fn place(&mut self, columns: &Columns) {
+        let Self { hems, ends, crowd, .. } = self;
+        let cell = |hem: &Hem| columns.cell(hem.column as usize);
+        hems.sort_unstable_by_key(|hem| {
+            let [x, z] = cell(hem);
+            (z, x, hem.column)
+        });
+        ends.clear();
+        ends.resize(hems.len(), [None; 4]);
+        crowd.count(columns.grid.size, hems.iter().map(cell));
+    }
+
+    fn find_cells(&mut self, grid: Grid, positions: &[Vec3]) {
+        let place = |axis: usize, at: f32| {
+            let along = (f64::from(at) - grid.origin[axis]) / grid.cell - 0.5;
+            along.floor().clamp(-2.0, grid.size[axis] as f64) as i32
+        };
+        self.cells.clear();
+        self.cells.extend(positions.iter().map(|at| [place(0, at.x), place(1, at.z)]));
+    }
+
+    /// Looks how far a triangle reaches from the hems of a box of cells.
+    fn cut(&mut self, columns: &Columns, corners: [[f64; 3]; 3], [xs, zs]: [[usize; 2]; 2]) {
+        let (grid, heights) = (columns.grid, columns.heights);
+        let [across_x, _, across_z] = [0, 1, 2].map(|axis| {
+            let of = corners.map(|corner| corner[axis]);
+            of[0].min(of[1]).min(of[2])..=of[0].max(of[1]).max(of[2])
+        });
+        for z in zs[0]..zs[1] {
+            for number in self.crowd.numbers(xs, z) {
+                let hem = &self.hems[number];
+                let [x, _] = columns.cell(hem.column as usize);
+                let [cx, cz] = grid.centre([x, z]);
+                // Which of the lines through the middle it may cross: those along x, and along z.
+                let crosses = [across_z.contains(&cz), across_x.contains(&cx)];
+                if crosses == [false; 2] {
+                    continue;
+                }
+                let base = heights.low + f64::from(columns.bases()[hem.column as usize]) * heights.unit;
+                let local = corners.map(|[x, y, z]| [(x - cx) / grid.cell, y - base, (z - cz) / grid.cell]);
+                let ends = self.ends[number].iter_mut().enumerate();
+                for (side, end) in ends.filter(|(side, _)| crosses[side % 2] && hem.sides[*side].is_some()) {
+                    let [dx, dz] = RING[2 * side].map(f64::from);
+                    // Along the side, and across it.
+                    let line = local.map(|[x, y, z]| [x * dx + z * dz, y, z * dx - x * dz]);
+                    let reached = crossing(line).filter(|end| end.height.abs() <= grid.cell);
+                    if let Some(reached) = reached
+                        && end.is_none_or(|end| end.is_before(&reached))
+                    {
+                        *end = Some(reached);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// How many hems there are in boxes of cells: a summed-area table.
+#[derive(Debug, Default)]
+struct Crowd {
+    /// Hems in the cells that are both west and north of a corner of the grid, row by row: one more along each axis than there are cells.
+    before: Vec<u32>,
+    /// Count of cells along x and z.
+    size: [usize; 2],
+}
+
+impl Crowd {
+    fn count(&mut self, [nx, nz]: [usize; 2], hems: impl Iterator<Item = [usize; 2]>) {
+        let across = nx + 1;
+        self.size = [nx, nz];
+        self.before.clear();
+        self.before.resize(across * (nz + 1), 0);
+        for [x, z] in hems {
+            self.before[(z + 1) * across + x + 1] += 1;
+        }
+        for row in 1..=nz {
+            let (above, own) = self.before[(row - 1) * across..].split_at_mut(across);
+            let mut along = 0;
+            for (above, own) in above.iter().zip(&mut own[..across]) {
+                along += *own;
+                *own = along + above;
+            }
+        }
+    }
+
+    /// Hems of some cells of a row: their numbers row by row.
+    fn numbers(&self, xs: [usize; 2], row: usize) -> Range<usize> {
+        let across = self.size[0] + 1;
+        let [above, below] = [row, row + 1].map(|row| &self.before[row * across..][..across]);
+        // All of the rows above, and those of this row before it.
+        let [start, end] = xs.map(|x| (above[across - 1] + below[x] - above[x]) as usize);
+        start..end
+    }
+
+    /// The box of cells, ends behind the last ones, within a cell of a triangle whose corners are in these, if there are hems in it.
+    #[inline]
+    fn near(&self, corners: [[i32; 2]; 3]) -> Option<[[usize; 2]; 2]> {
+        let [[west, east], [north, south]] = [0, 1].map(|axis| {
+            let of = corners.map(|corner| corner[axis]);
+            let (low, high) = (of[0].min(of[1]).min(of[2]), of[0].max(of[1]).max(of[2]));
+            [low - 1, high + 2].map(|end| end.clamp(0, self.size[axis] as i32) as usize)
+        });
+        let across = self.size[0] + 1;
+        let corner = |row: usize, at: usize| self.before[row * across + at];
+        let inside = corner(south, east) + corner(north, west) - corner(north, east) - corner(south, west);
+        (inside > 0).then_some([[west, east], [north, south]])
+    }
+}
+
+/// How far ground reaches from the middle of a cell (cells), and how much higher than there it then is (m).
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct End {
+    at: f64,
+    height: f64,
+}
+
+impl End {
+    /// Whether another one is farther, or as far and higher.
+    fn is_before(&self, other: &Self) -> bool {
+        (self.at, self.height) < (other.at, other.height)
+    }
+}
+
+/// Where a triangle, of corners along a line, up and across it, ends on the line from 0 to 1. None where it does not cross it, or is upright.
+fn crossing(corners: [[f64; 3]; 3]) -> Option<End> {
+    let mut points = [[0.0; 2]; 2];
+    let mut count = 0;
+    for [from, to] in [[0, 1], [1, 2], [2, 0]].map(|ends| ends.map(|end: usize| corners[end])) {
+        if (from[2] >= 0.0) != (to[2] >= 0.0) && count < 2 {
+            let part = from[2] / (from[2] - to[2]);
+            points[count] = [0, 1].map(|axis| from[axis] + part * (to[axis] - from[axis]));
+            count += 1;
+        }
+    }
+    let [mut near, mut far] = points;
+    if near[0] > far[0] {
+        std::mem::swap(&mut near, &mut far);
+    }
+    let length = far[0] - near[0];
+    if count < 2 || length <= 0.0 || far[0] <= 0.0 || near[0] > 1.0 {
+        return None;
+    }
+    let at = far[0].min(1.0);
+    Some(End { at, height: near[1] + (at - near[0]) / length * (far[1] - near[1]) })
+}

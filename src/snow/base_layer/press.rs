@@ -1,0 +1,141 @@
+//! Pressing a sweep into the snow, block by block: snow = max(snow, -sweep), removed = max(snow, sweep).
+//!
+//! The intersection is taken before the subtraction: base(t) minus base(t + dt) would leave a ghost
+//! surface of no thickness wherever nothing moved.
+
+use super::columns::{CELLS, add_by_cell, filled};
+use super::removed_volume;
+use crate::numeric::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
+use crate::sweep::Piece;
+use crate::vdb::Probe;
+
+/// The change of one block of the snow.
+pub struct Edit {
+    /// The snow afterwards.
+    pub surface: BlockEdit,
+    /// What was removed from it.
+    pub removed: Option<BlockEdit>,
+    /// Voxels whose value changed.
+    pub changed: Mask,
+    /// Removed height (cells) in each column of the block.
+    pub heights: [f32; CELLS],
+}
+
+impl Edit {
+    /// Snow removed from the block (cells^3), summed in a fixed order.
+    pub fn volume(&self) -> f64 {
+        self.heights.iter().map(|&height| f64::from(height)).sum()
+    }
+}
+
+/// Cell and band of the snow.
+#[derive(Debug, Clone, Copy)]
+pub struct Scale {
+    /// Cell (m).
+    pub cell: f32,
+    /// Background of the level set (m): half width x cell.
+    pub background: f32,
+}
+
+/// Whether a block has snow that a sweep could remove.
+pub fn has_snow(probe: &Probe<'_>) -> bool {
+    match probe {
+        Probe::Leaf(_) => true,
+        Probe::Tile { value, .. } => *value < 0.0,
+    }
+}
+
+/// Subtracts a piece of the sweep from the snow there; none when nothing changes.
+pub fn subtract(piece: &Piece, snow: &Probe<'_>, scale: Scale) -> Option<Edit> {
+    let tile;
+    let (before, mask) = match snow {
+        Probe::Leaf(leaf) => (leaf.values, *leaf.mask),
+        Probe::Tile { value, .. } => {
+            tile = [*value; VOXELS];
+            (&tile, [0; 8])
+        }
+    };
+    match piece {
+        Piece::Inside(origin) => Some(remove_all(*origin, before, mask, snow, scale)),
+        Piece::Near(origin, cells) => remove_part(*origin, before, cells, scale),
+    }
+}
+
+fn remove_all(origin: Origin, before: &Values, mask: Mask, snow: &Probe<'_>, scale: Scale) -> Edit {
+    let removed = match snow {
+        Probe::Leaf(_) => BlockEdit::Dense(Block { origin, values: Box::new(*before), mask }),
+        Probe::Tile { .. } => BlockEdit::Constant(origin, -scale.background),
+    };
+    let mut heights = [0.0; CELLS];
+    let were = removed_volume::parts(before, scale.cell);
+    add_by_cell(&mut heights, |index| were[index]);
+    Edit {
+        surface: BlockEdit::Constant(origin, scale.background),
+        removed: Some(removed),
+        changed: [u64::MAX; 8],
+        heights,
+    }
+}
+
+fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) -> Option<Edit> {
+    let mut after = Box::new([0.0; VOXELS]);
+    let mut removed = Box::new([0.0; VOXELS]);
+    let mut changed: Mask = [0; 8];
+    let mut heights = [0.0; CELLS];
+    for index in 0..VOXELS {
+        let (snow, sweep) = (before[index], cells[index] * scale.cell);
+        let mut left = if -sweep > snow { (-sweep).min(scale.background) } else { snow };
+        // Faces that coincide, as a sole's and the ground's under it, leave a shell of no thickness that the distances beside it
+        // show as snow: at least as far outside as what is really left.
+        let is_thin = (0.0..0.5 * scale.cell).contains(&left) && sweep < 0.5 * scale.cell;
+        if is_thin && is_along(before, cells, index) {
+            let rest = (filled(snow, scale.cell) - filled(sweep, scale.cell)).max(0.0);
+            left = left.max((0.5 - rest) * scale.cell);
+        }
+        let taken = if sweep > snow { sweep } else { snow };
+        after[index] = left;
+        removed[index] = taken.clamp(-scale.background, scale.background);
+        changed[index >> 6] |= u64::from(left != snow) << (index & 63);
+    }
+    if changed == [0; 8] {
+        return None;
+    }
+    let (were, are) = (removed_volume::parts(before, scale.cell), removed_volume::parts(&after, scale.cell));
+    add_by_cell(&mut heights, |index| were[index] - are[index]);
+    let removed = pack(origin, removed, scale);
+    let outside = matches!(removed, BlockEdit::Constant(_, value) if value > 0.0);
+    Some(Edit {
+        surface: pack(origin, after, scale),
+        removed: (!outside).then_some(removed),
+        changed,
+        heights,
+    })
+}
+
+/// Least cosine of the angle between surfaces that face the same way.
+const ALONG: f32 = 0.9;
+
+/// Whether the snow and a sweep face the same way at a voxel.
+fn is_along(snow: &Values, sweep: &Values, index: usize) -> bool {
+    let (one, other) = (removed_volume::direction(snow, index), removed_volume::direction(sweep, index));
+    one.zip(other).is_some_and(|([a, b, c], [d, e, f])| a * d + b * e + c * f > ALONG)
+}
+
+/// A block of a level set from distances in cells.
+pub fn from_cells(origin: Origin, cells: Box<Values>, scale: Scale) -> BlockEdit {
+    packed(Block::of_cells(origin, cells, scale.cell, scale.background), scale)
+}
+
+/// A leaf, or a constant where no value lies within the band.
+pub fn pack(origin: Origin, values: Box<Values>, scale: Scale) -> BlockEdit {
+    packed(Block::of_band(origin, values, scale.background), scale)
+}
+
+fn packed(block: Block, scale: Scale) -> BlockEdit {
+    let is_outside = block.values[0] > 0.0;
+    if block.mask == [0; 8] && block.values.iter().all(|value| (*value > 0.0) == is_outside) {
+        let value = if is_outside { scale.background } else { -scale.background };
+        return BlockEdit::Constant(block.origin, value);
+    }
+    BlockEdit::Dense(block)
+}

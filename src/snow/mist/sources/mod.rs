@@ -1,0 +1,290 @@
+//! Where grains raise mist (thesis section 3.4.2): along the way of each fast grain within the frame, a tube of twice its radius.
+
+pub(in crate::snow::mist) mod new_mist;
+
+use rayon::prelude::*;
+
+use super::{LEAST, Params};
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::flow::{Coord, Tile};
+use crate::geometry::DVec3;
+
+/// Farthest place of a grain from the origin on an axis (cells).
+const FARTHEST_CELL: f64 = 1e7;
+/// Acceleration (m/s2) up to which a grain is taken to fly freely, under gravity and the drag of air; at twice as much it is hit.
+const FREE: f64 = 20.0;
+/// Largest radius of a grain (cells).
+const LARGEST: f64 = 64.0;
+
+/// A grain that raises mist.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Source {
+    /// Position (m) at the end of the step.
+    pub place: DVec3,
+    /// Velocity (m/s).
+    pub velocity: [f32; 3],
+    /// Radius (m) of the grain.
+    pub radius: f64,
+    /// Where it was at the beginning of the step; none: it moved at its velocity all the time.
+    pub start: Option<Start>,
+}
+
+/// A grain at the beginning of a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    /// Position (m): that of its birth where it was born in the step.
+    pub place: DVec3,
+    /// Velocity (m/s), 0 where it was born in the step.
+    pub velocity: [f32; 3],
+}
+
+impl Source {
+    /// Checks that it can raise mist in cells of an edge (m).
+    ///
+    /// # Errors
+    /// A number that is not finite; a place that is too far from the origin; a radius that is negative or too large.
+    pub(super) fn check(&self, cell: f64) -> Result<()> {
+        let [x, y, z] = self.place.into();
+        let at = format!("grain at ({x:.3}, {y:.3}, {z:.3}) m");
+        if !self.place.iter().all(|x| x.abs() <= FARTHEST_CELL * cell) {
+            return Err(Error::argument(format!(
+                "the {at} is farther than {FARTHEST_CELL:.0} cells from the origin"
+            )));
+        }
+        if !self.velocity.iter().all(|speed| speed.is_finite()) {
+            return Err(Error::argument(format!("the velocity of the {at} is not finite")));
+        }
+        if let Some(start) = self.start {
+            let is_near = start.place.iter().all(|x| x.abs() <= FARTHEST_CELL * cell);
+            if !(is_near && start.velocity.iter().all(|speed| speed.is_finite())) {
+                return Err(Error::argument(format!(
+                    "the {at} began the step with a velocity that is not finite, or farther than {FARTHEST_CELL:.0} cells from the origin"
+                )));
+            }
+        }
+        let most = LARGEST * cell;
+        if !(0.0..=most).contains(&self.radius) {
+            let radius = self.radius;
+            return Err(Error::argument(format!(
+                "the {at} has a radius of {radius} m, not within 0 to {most}"
+            )));
+        }
+        Ok(())
+    }
+
+    /// Whether a grain is fast enough to raise mist at either end of a step, and does not fall there where falling grains do not.
+    pub fn raises(&self, params: &Params) -> bool {
+        raises(self.velocity, params) || self.start.is_some_and(|start| raises(start.velocity, params))
+    }
+
+    /// Its greatest speed (m/s) on any axis.
+    pub(super) fn fastest(&self) -> f32 {
+        let start = self.start.map_or([0.0; 3], |start| start.velocity);
+        self.velocity.iter().chain(&start).fold(0.0, |most, speed| most.max(speed.abs()))
+    }
+
+    /// Its motion in a step of `dt` (s) from a start.
+    fn motion(&self, start: &Start, dt: f64) -> Motion {
+        let now = DVec3::from(self.velocity.map(f64::from)) * dt;
+        let before = DVec3::from(start.velocity.map(f64::from)) * dt;
+        let (gain, off) = (now - before, start.place + now - self.place);
+        let middle = (off.dot(&gain) / gain.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        // What the velocities do not lead to is spread over the step.
+        let rest = gain * middle - off;
+        let free = 2.0 - gain.norm() / (FREE * dt * dt);
+        let width = 2.0 * middle.min(1.0 - middle) * free.clamp(0.0, 1.0);
+        Motion { from: start.place, before: before + rest, gain, middle, width }
+    }
+}
+
+/// The motion of a grain in a step: one change of velocity, evenly in a time around the moment by which both velocities lead as
+/// near to its end as they can. Of a grain that flies that is all of the step, of one that is hit a moment.
+struct Motion {
+    /// Position (m) at the beginning.
+    from: DVec3,
+    /// Displacement (m) in a step at the first velocity, and what it is more at the last one.
+    before: DVec3,
+    gain: DVec3,
+    /// Middle of the change, and its length: shares 0..=1 of the step.
+    middle: f64,
+    width: f64,
+}
+
+impl Motion {
+    /// Position (m) at a share 0..=1 of the step.
+    fn place(&self, share: f64) -> DVec3 {
+        let into = share - (self.middle - 0.5 * self.width);
+        let gained = if into <= 0.0 {
+            0.0
+        } else if into < self.width {
+            0.5 * into * into / self.width
+        } else {
+            share - self.middle
+        };
+        self.from + self.before * share + self.gain * gained
+    }
+}
+
+/// Whether a grain at a velocity (m/s) raises mist.
+fn raises(velocity: [f32; 3], params: &Params) -> bool {
+    let speed = velocity.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
+    speed > params.from_speed && (params.falling || velocity[1] >= 0.0)
+}
+
+/// Mist that is new in a tile.
+pub struct Seed {
+    /// Its tile.
+    pub coord: Coord,
+    /// Density 0..=1 at the cells' centres.
+    pub density: Box<Tile>,
+    /// Velocity (m/s) there: the mean of the grains', by how much of the cell each one's tube covers.
+    pub velocity: Box<[Tile; 3]>,
+}
+
+/// The ways (m) of grains that raise mist in the part of a step of `dt` (s) between two shares 0..=1 of it, at their mean velocity
+/// in it.
+pub fn ways(sources: &[Source], params: &Params, dt: f64, [first, last]: [f64; 2]) -> Vec<Way> {
+    let time = (last - first) * dt;
+    let way = |source: &Source| {
+        let (velocity, ends) = match &source.start {
+            None => {
+                let now = DVec3::from(source.velocity.map(f64::from)) * dt;
+                (source.velocity, [first, last].map(|share| source.place - now * (1.0 - share)))
+            }
+            Some(start) => {
+                let motion = source.motion(start, dt);
+                let ends = [first, last].map(|share| motion.place(share));
+                let mean = (ends[1] - ends[0]) / time;
+                ([mean.x as f32, mean.y as f32, mean.z as f32], ends)
+            }
+        };
+        raises(velocity, params).then_some(Way { ends, velocity, radius: source.radius })
+    };
+    sources.iter().filter_map(way).collect()
+}
+
+/// The way of a grain.
+pub struct Way {
+    /// Its ends (m).
+    ends: [DVec3; 2],
+    /// Velocity (m/s) and radius (m) of the grain.
+    velocity: [f32; 3],
+    radius: f64,
+}
+
+/// The new mist along ways, by tile, sorted.
+///
+/// # Errors
+/// More memory than the context allows.
+pub fn seeds(ctx: &Context, ways: &[Way], params: &Params) -> Result<Vec<Seed>> {
+    const WHAT: &str = "new mist";
+    let boxed = |way: &Way| {
+        let [low, high] = box_of(way, params.cell);
+        (0..3).map(|axis| u64::from(high[axis].abs_diff(low[axis])) + 1).product::<u64>()
+    };
+    ctx.allow(WHAT, ways.iter().map(boxed).sum::<u64>().saturating_mul(size_of::<(Coord, u32)>() as u64))?;
+    let mut touched: Vec<(Coord, u32)> = ways
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(index, way)| {
+            tiles_of(way, params.cell).into_iter().map(move |coord| (coord, index as u32))
+        })
+        .collect();
+    touched.par_sort_unstable();
+    let groups: Vec<&[(Coord, u32)]> = touched.chunk_by(|a, b| a.0 == b.0).collect();
+    ctx.allow(WHAT, groups.len() as u64 * SEED_BYTES)?;
+    let seeds = groups.into_par_iter().map(|group| seed(group, ways, params));
+    // Tubes pass by many tiles that they may touch, and of some they cover next to nothing.
+    Ok(seeds.filter(|seed| seed.density.iter().any(|density| *density > LEAST)).collect())
+}
+
+/// Bytes of a seed.
+const SEED_BYTES: u64 = 4 * size_of::<Tile>() as u64;
+
+/// Least and greatest tile of the box around a way's tube.
+fn box_of(way: &Way, cell: f64) -> [Coord; 2] {
+    let [from, to] = way.ends;
+    let reach = DVec3::repeat(2.0 * way.radius + cell);
+    let tile = |place: DVec3| [0, 1, 2].map(|axis| (place[axis] / (8.0 * cell)).floor() as i32);
+    [tile(from.inf(&to) - reach), tile(from.sup(&to) + reach)]
+}
+
+/// Coordinates of the tiles that a way's tube may touch.
+fn tiles_of(way: &Way, cell: f64) -> Vec<Coord> {
+    let ([from, to], [low, high]) = (way.ends, box_of(way, cell));
+    let mut out = Vec::new();
+    for x in low[0]..=high[0] {
+        for y in low[1]..=high[1] {
+            for z in low[2]..=high[2] {
+                let middle = DVec3::new(f64::from(x) + 0.5, f64::from(y) + 0.5, f64::from(z) + 0.5);
+                let apart = distance(middle * (8.0 * cell), from, to);
+                if apart < 2.0 * way.radius + cell * (1.0 + 4.0 * 3f64.sqrt()) {
+                    out.push([x, y, z]);
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Distance (m) of a place from a segment.
+fn distance(place: DVec3, from: DVec3, to: DVec3) -> f64 {
+    let (way, off) = (to - from, place - from);
+    let share = (off.dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    (off - way * share).norm()
+}
+
+fn seed(group: &[(Coord, u32)], ways: &[Way], params: &Params) -> Seed {
+    let coord = group[0].0;
+    let (mut density, mut velocity) = (Box::new([0.0f32; 512]), Box::new([[0.0f32; 512]; 3]));
+    let mut weights = [0.0f32; 512];
+    for (_, index) in group {
+        let Way { ends: [from, to], velocity: speed, radius } = ways[*index as usize];
+        let reach = DVec3::repeat(2.0 * radius + params.cell);
+        let least = (from.inf(&to) - reach) / params.cell;
+        let most = (from.sup(&to) + reach) / params.cell;
+        // The cells of the tile that the tube may cover.
+        let [x, y, z] = [0, 1, 2].map(|axis| {
+            let first = f64::from(coord[axis] * 8);
+            (least[axis] - first).clamp(0.0, 8.0) as usize
+                ..(most[axis] - first).ceil().clamp(0.0, 8.0) as usize
+        });
+        let rows = x.flat_map(|x| y.clone().map(move |y| x << 6 | y << 3));
+        for cell in rows.flat_map(|row| z.clone().map(move |z| row | z)) {
+            let at = [cell >> 6, cell >> 3 & 7, cell & 7];
+            let place =
+                [0, 1, 2].map(|axis| (f64::from(coord[axis] * 8 + at[axis] as i32) + 0.5) * params.cell);
+            let apart = distance(DVec3::from(place), from, to);
+            let cover = (0.5 + (2.0 * radius - apart) / params.cell).clamp(0.0, 1.0) as f32;
+            if cover > 0.0 {
+                density[cell] = density[cell].max(cover);
+                weights[cell] += cover;
+                for axis in 0..3 {
+                    velocity[axis][cell] += cover * speed[axis];
+                }
+            }
+        }
+    }
+    let noise = noise(params);
+    for cell in (0..512usize).filter(|cell| weights[*cell] > 0.0) {
+        for speeds in velocity.iter_mut() {
+            speeds[cell] /= weights[cell];
+        }
+        if params.noise > 0.0 {
+            let at = [cell >> 6, cell >> 3 & 7, cell & 7];
+            let [x, y, z] = [0, 1, 2].map(|axis| f64::from(coord[axis] * 8 + at[axis] as i32) + 0.5);
+            let share = 0.5 + 0.5 * noise.get_noise_3d(x, y, z).clamp(-1.0, 1.0);
+            density[cell] *= 1.0 - params.noise as f32 * share;
+        }
+    }
+    Seed { coord, density, velocity }
+}
+
+/// The noise, over cells.
+fn noise(params: &Params) -> fastnoise_lite::FastNoiseLite {
+    let mut noise = fastnoise_lite::FastNoiseLite::with_seed(params.seed);
+    noise.set_noise_type(Some(fastnoise_lite::NoiseType::OpenSimplex2));
+    noise.set_frequency(Some((params.cell / params.noise_size) as f32));
+    noise
+}

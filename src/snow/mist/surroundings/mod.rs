@@ -1,0 +1,472 @@
+//! What mist flows around: the base layer, the ground and objects.
+//!
+//! Objects that bound a solid count by their winding number ([`crate::sweep`]), so that self-intersecting characters have one
+//! inside; meshes with large holes, and the ground's, count as sheets two cells thick.
+
+#[cfg(feature = "vdb")]
+mod corners;
+#[cfg(feature = "vdb")]
+mod open_faces;
+
+use std::collections::HashMap;
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
+
+use super::{Mist, Source};
+use crate::context::Context;
+use crate::error::Result;
+use crate::flow::{Coord, Faces, Solids, Tiles};
+use crate::geometry::DVec3;
+use crate::snow::grains::colliders::shell::Shell;
+use crate::snow::grains::{FASTEST_OBJECT, HOLES};
+use crate::sweep::{self, Body, Settings};
+use crate::vdb::FloatGrid;
+use corners::{Grid, Lattice};
+
+/// What mist flows around in a step.
+pub struct Surroundings<'a> {
+    /// The base layer at the beginning of the step. That at its end has room for objects on their whole path: air would be
+    /// pressed out of it through gaps that are not there. It opens as those of [`Self::removing`] move into it.
+    pub base: Option<&'a FloatGrid>,
+    /// Objects, moving or not.
+    pub bodies: &'a [&'a Body],
+    /// Which of them take away the snow that they move through; those behind the last one do not.
+    pub removing: &'a [bool],
+    /// Height of a level ground plane (m).
+    pub floor: Option<f64>,
+}
+
+/// The boundaries of a step: see [`Surroundings::during`].
+pub struct Walls<'a> {
+    around: &'a Surroundings<'a>,
+    bodies: Vec<Moving<'a>>,
+    /// Start of the step, and its length (s).
+    from: f64,
+    dt: f64,
+    /// Edge of the finest cells (m).
+    cell: f64,
+    held: Mutex<Held>,
+}
+
+/// What was computed in a step and is asked for again.
+#[derive(Default)]
+struct Held {
+    /// Objects that stand still.
+    fixed: Option<Moment>,
+    /// Moving ones at the last moment that was asked for: finer and wider cells ask for the same one.
+    moving: Option<Moment>,
+    /// What moving ones have taken out of the base layer since the step began.
+    opened: Option<Opened>,
+    /// Faces of tiles that no moving object comes near in the step, by the cells' edge (m, its bits) and the tile; none: all
+    /// are open.
+    faces: HashMap<(u64, Coord), Option<Faces>>,
+}
+
+/// Objects at a moment.
+struct Moment {
+    /// Share 0..=1 of the step.
+    share: f64,
+    /// Indices of the objects that are in it.
+    near: Vec<usize>,
+    /// Level set of those that have an inside.
+    solid: Option<FloatGrid>,
+    /// The others, and moving ones.
+    surfaces: Vec<Surface>,
+}
+
+/// The volume that objects have swept since the step began.
+struct Opened {
+    /// Share 0..=1 of the step at which that was.
+    share: f64,
+    /// Indices of the objects.
+    near: Vec<usize>,
+    swept: FloatGrid,
+}
+
+/// An object during a step.
+struct Moving<'a> {
+    body: &'a Body,
+    /// Whether it has no inside.
+    is_sheet: bool,
+    /// Whether it moves too fast to carry the air along: it then stands where it ends.
+    jumps: bool,
+    /// Whether it opens the base layer as it moves.
+    opens: bool,
+    /// Its triangles, counter-clockwise seen from outside.
+    triangles: Vec<[u32; 3]>,
+    /// Least and greatest corner over the step (m).
+    bounds: [DVec3; 2],
+    /// Greatest speed (m/s) of its points over the step.
+    speed: f64,
+}
+
+/// Half thickness of a sheet (cells): it then closes all faces next to it, wherever it lies between them.
+const SHEET: f64 = 1.0;
+/// Share of the step over which the speed of a surface is measured.
+const INSTANT: f64 = 0.125;
+/// Distance from a surface (cells) within which covered faces move as it does: no air touches those farther inside.
+const NEAR: f64 = 2.0;
+/// Most spacing of the corners (cells of the base) at which a narrow band of three cells on each side shows where the surface
+/// is.
+const BAND: f64 = 2.9;
+/// Most parts of a cell's edge. In cells of more than 11 voxels of the base its surface lies where the sign changes.
+const PARTS: usize = 4;
+
+impl<'a> Surroundings<'a> {
+    /// What is around in a step from `from` to `to` (s), for cells of an edge (m) and wider ones.
+    ///
+    /// # Errors
+    /// A pose that cannot be computed.
+    pub fn during(&'a self, [from, to]: [f64; 2], cell: f64) -> Result<Walls<'a>> {
+        let removes = self.removing.iter().chain(std::iter::repeat(&false));
+        let removes = removes.map(|removes| *removes && self.base.is_some());
+        let bodies = self.bodies.iter().zip(removes);
+        let bodies =
+            bodies.map(|(body, removes)| Moving::new(body, removes, [from, to])).collect::<Result<_>>()?;
+        Ok(Walls { around: self, bodies, from, dt: to - from, cell, held: Mutex::default() })
+    }
+}
+
+impl<'a> Moving<'a> {
+    fn new(body: &'a Body, removes: bool, [from, to]: [f64; 2]) -> Result<Self> {
+        let (mut first, mut last) = (Vec::new(), Vec::new());
+        body.closed_pose(from, &mut first)?;
+        body.closed_pose(to, &mut last)?;
+        let is_sheet = body.share_of_caps(&first) >= HOLES || body.contradictions() > 0;
+        let farthest = first.iter().zip(&last).map(|(a, b)| (b - a).norm()).fold(0.0, f64::max);
+        let jumps = farthest > FASTEST_OBJECT * (to - from);
+        // A turn may lead outside the box of both poses.
+        let room = DVec3::repeat(if jumps { 0.0 } else { farthest });
+        let places = last.iter().chain(first.iter().filter(|_| !jumps));
+        let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
+        let [low, high] = places.fold(none, |[low, high], place| [low.inf(place), high.sup(place)]);
+        Ok(Self {
+            body,
+            is_sheet,
+            jumps,
+            opens: removes && farthest > 0.0 && !jumps && !is_sheet,
+            triangles: body.closed_triangles().collect(),
+            bounds: [low - room, high + room],
+            speed: if jumps { 0.0 } else { farthest / (to - from) },
+        })
+    }
+
+    /// Whether it comes within a distance (m) of a box.
+    fn is_near(&self, [low, high]: &[DVec3; 2], distance: f64) -> bool {
+        let room = DVec3::repeat(distance);
+        self.bounds[0] - room <= *high && *low <= self.bounds[1] + room
+    }
+}
+
+impl Walls<'_> {
+    /// Open shares and speeds of faces at a share 0..=1 of the step, for tiles with cells of an edge (m).
+    ///
+    /// # Errors
+    /// A pose that cannot be computed; cancel; errors of a grid.
+    pub fn faces(&self, ctx: &Context, tiles: &Tiles, cell: f32, share: f64) -> Result<Solids> {
+        let cell = f64::from(cell);
+        if tiles.count() == 0 {
+            return Ok(Solids::none(tiles));
+        }
+        let lattice = Lattice { cell, parts: self.parts() };
+        let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
+        let Held { fixed, moving, opened, faces: known } = &mut *held;
+        let key = |tile: &Coord| (cell.to_bits(), *tile);
+        let slots = (0..tiles.count()).filter(|slot| !known.contains_key(&key(&tiles.coords()[*slot])));
+        let slots: Vec<usize> = slots.collect();
+        let unknown: Vec<Coord> = slots.iter().map(|slot| tiles.coords()[*slot]).collect();
+        let bounds = lattice.bounds(tiles.coords());
+        let is_near = |body: &Moving<'_>| body.is_near(&bounds, NEAR * cell);
+        let fixed = self.at(ctx, fixed, 1.0, |body| body.speed == 0.0 && is_near(body))?;
+        let moving = self.at(ctx, moving, share, |body| body.speed > 0.0 && is_near(body))?;
+        let opened = self.opened(ctx, opened, share, |body| body.opens && is_near(body))?;
+        let grid = |grid| Grid::new(ctx, grid, &unknown, &lattice);
+        // A level set whose band is narrower does not show what lies that deep.
+        let band = moving.solid.as_ref().map_or(0.0, |grid| f64::from(grid.background()));
+        let around = Around {
+            lattice,
+            floor: self.around.floor,
+            still: [grid(self.around.base)?, grid(fixed.solid.as_ref())?],
+            opened: grid(opened)?,
+            moving: grid(moving.solid.as_ref())?,
+            bodies: &self.bodies,
+            surfaces: [&fixed.surfaces, &moving.surfaces],
+            deepest: if NEAR * cell < 0.999 * band { -NEAR * cell } else { f64::NEG_INFINITY },
+        };
+        let made = unknown.par_iter().enumerate().with_min_len(4).map(|(index, tile)| {
+            ctx.check()?;
+            Ok(around.faces(index, *tile))
+        });
+        let made: Vec<Option<Faces>> = made.collect::<Result<_>>()?;
+        let mut out = Vec::new();
+        for ((slot, tile), faces) in slots.into_iter().zip(&unknown).zip(made) {
+            let bounds = lattice.bounds(&[*tile]);
+            let moves = |body: &Moving<'_>| body.speed > 0.0 && body.is_near(&bounds, NEAR * cell);
+            match self.bodies.iter().any(moves) {
+                true => out.extend(faces.map(|faces| (slot as u32, faces))),
+                false => drop(known.insert(key(tile), faces)),
+            }
+        }
+        let stay = |(slot, tile): (usize, &Coord)| Some((slot as u32, known.get(&key(tile))?.clone()?));
+        out.extend(tiles.coords().iter().enumerate().filter_map(stay));
+        Ok(Solids::new(tiles, out))
+    }
+
+    /// Greatest speed (m/s) of objects that come near the air, or near grains that raise mist, during the step.
+    pub fn fastest_near(&self, mist: &Mist, sources: &[Source]) -> f64 {
+        let cell = mist.params().cell;
+        let lattice = Lattice { cell, parts: 1 };
+        let raising = sources.iter().filter(|source| source.raises(mist.params()));
+        let places = raising.map(|source| source.place).chain(lattice.bounds(mist.flow().tiles().coords()));
+        let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
+        let bounds = places.fold(none, |[low, high], at| [low.inf(&at), high.sup(&at)]);
+        let near = self.bodies.iter().filter(|body| body.is_near(&bounds, NEAR * cell));
+        near.map(|body| body.speed).fold(0.0, f64::max)
+    }
+
+    /// Into how many parts the edge of a cell is divided: so many that the base's band shows where its surface is in the finest
+    /// cells, up to [`PARTS`]. Wider ones are for the air far away.
+    fn parts(&self) -> usize {
+        let most = self.around.base.map_or(f64::INFINITY, |base| BAND * base.voxel_size());
+        (1..PARTS).find(|parts| self.cell / *parts as f64 <= most).unwrap_or(PARTS)
+    }
+
+    /// The objects that are wanted, at a share 0..=1 of the step: those that are held if they are these.
+    fn at<'h>(
+        &self,
+        ctx: &Context,
+        held: &'h mut Option<Moment>,
+        share: f64,
+        is_wanted: impl Fn(&Moving<'_>) -> bool,
+    ) -> Result<&'h Moment> {
+        let near: Vec<usize> = (0..self.bodies.len()).filter(|body| is_wanted(&self.bodies[*body])).collect();
+        let has_all = |moment: &Moment| near.iter().all(|body| moment.near.contains(body));
+        let moment = match held.take().filter(|moment| moment.share == share && has_all(moment)) {
+            Some(moment) => moment,
+            None => {
+                let solid = self.solid(ctx, &near, share)?;
+                let has_surface =
+                    |body: &&usize| self.bodies[**body].is_sheet || self.bodies[**body].speed > 0.0;
+                let surfaces = near.iter().filter(has_surface).map(|body| self.surface(*body, share));
+                let surfaces = surfaces.collect::<Result<_>>()?;
+                Moment { share, near, solid, surfaces }
+            }
+        };
+        Ok(held.insert(moment))
+    }
+
+    /// The level set of what objects have swept since the step began; it goes on from the last one that was asked for.
+    fn opened<'h>(
+        &self,
+        ctx: &Context,
+        held: &'h mut Option<Opened>,
+        share: f64,
+        is_wanted: impl Fn(&Moving<'_>) -> bool,
+    ) -> Result<Option<&'h FloatGrid>> {
+        let near: Vec<usize> = (0..self.bodies.len()).filter(|body| is_wanted(&self.bodies[*body])).collect();
+        let has_all = |opened: &Opened| near.iter().all(|body| opened.near.contains(body));
+        let (near, from, mut swept) = match held.take().filter(|held| held.share <= share && has_all(held)) {
+            Some(held) => (held.near, held.share, Some(held.swept)),
+            None => (near, 0.0, None),
+        };
+        if swept.is_none() || from < share {
+            let lattice = Lattice { cell: self.cell, parts: self.parts() };
+            let settings = Settings::new(lattice.spacing());
+            for body in near.iter().map(|body| &self.bodies[*body]) {
+                let [from, to] = [from, share].map(|share| self.time(body, share));
+                let more = sweep::chain(ctx, std::slice::from_ref(body.body), from, to, &settings)?;
+                match &mut swept {
+                    None => swept = Some(more),
+                    Some(swept) => crate::vdb::level_set::union(ctx, swept, more)?,
+                }
+            }
+        }
+        *held = swept.map(|swept| Opened { share, near, swept });
+        Ok(held.as_ref().map(|held| &held.swept))
+    }
+
+    fn time(&self, body: &Moving<'_>, share: f64) -> f64 {
+        self.from + self.dt * if body.jumps { 1.0 } else { share }
+    }
+
+    /// The level set of the objects that have an inside.
+    fn solid(&self, ctx: &Context, near: &[usize], share: f64) -> Result<Option<FloatGrid>> {
+        let lattice = Lattice { cell: self.cell, parts: self.parts() };
+        let settings = Settings::new(lattice.spacing());
+        let mut out: Option<FloatGrid> = None;
+        for body in near.iter().map(|body| &self.bodies[*body]).filter(|body| !body.is_sheet) {
+            let time = self.time(body, share);
+            let grid = sweep::chain(ctx, std::slice::from_ref(body.body), time, time, &settings)?;
+            match &mut out {
+                None => out = Some(grid),
+                Some(out) => crate::vdb::level_set::union(ctx, out, grid)?,
+            }
+        }
+        Ok(out)
+    }
+
+    /// The triangles of an object, with the way that they have made lately.
+    fn surface(&self, index: usize, share: f64) -> Result<Surface> {
+        let body = &self.bodies[index];
+        let (mut now, mut before) = (Vec::new(), Vec::new());
+        body.body.closed_pose(self.time(body, share), &mut now)?;
+        let earlier = (share - INSTANT).max(0.0);
+        body.body.closed_pose(self.time(body, earlier), &mut before)?;
+        let mut shell = Shell::new(0.0, body.triangles.clone(), false, now);
+        shell.follow(&before);
+        let passed = self.dt * (share - earlier);
+        let rate = if passed > 0.0 { -1.0 / passed } else { 0.0 };
+        Ok(Surface { body: index, shell, rate })
+    }
+}
+
+/// An object's triangles at a moment.
+struct Surface {
+    /// Index of the object.
+    body: usize,
+    shell: Shell,
+    /// Inverse of the time (1/s) in which its points made their way.
+    rate: f64,
+}
+
+/// All that is around at a moment.
+struct Around<'a> {
+    lattice: Lattice,
+    floor: Option<f64>,
+    /// The base layer, and objects that stand still.
+    still: [Option<Grid<'a>>; 2],
+    /// What moving objects have taken out of the base layer.
+    opened: Option<Grid<'a>>,
+    /// Moving objects.
+    moving: Option<Grid<'a>>,
+    bodies: &'a [Moving<'a>],
+    /// Of objects that stand still, and of moving ones.
+    surfaces: [&'a [Surface]; 2],
+    /// Signed distance (m) below which the velocity of what covers a face does not matter.
+    deepest: f64,
+}
+
+/// Signed distances (m) at the corners of a tile.
+struct Corners {
+    /// Along an edge.
+    count: usize,
+    /// To what stands still, and to what moves.
+    distances: [Vec<f32>; 2],
+    /// To the nearest of both.
+    nearest: Vec<f32>,
+}
+
+impl Corners {
+    fn at(&self, [x, y, z]: [usize; 3]) -> f32 {
+        self.nearest[(x * self.count + y) * self.count + z]
+    }
+
+    /// Whether what moves is nearer than what stands still.
+    fn moves(&self, [x, y, z]: [usize; 3]) -> bool {
+        let index = (x * self.count + y) * self.count + z;
+        self.distances[1][index] < self.distances[0][index]
+    }
+}
+
+impl Around<'_> {
+    /// The faces of a tile, `index` among those of the grids; none: all are open.
+    fn faces(&self, index: usize, tile: Coord) -> Option<Faces> {
+        let bounds = self.lattice.bounds(&[tile]);
+        let is_sheet = |surface: &&Surface| {
+            let body = &self.bodies[surface.body];
+            body.is_sheet && body.is_near(&bounds, SHEET * self.lattice.cell)
+        };
+        let sheets: [Vec<&Surface>; 2] =
+            self.surfaces.map(|surfaces| surfaces.iter().filter(is_sheet).collect());
+        let mut grids = self.still.iter().chain([&self.moving]).flatten();
+        let is_low = self.floor.is_some_and(|floor| bounds[0].y < floor);
+        if !(is_low
+            || grids.any(|grid| grid.is_near(index))
+            || sheets.iter().any(|sheets| !sheets.is_empty()))
+        {
+            return None;
+        }
+        let corners = self.corners(index, tile, &sheets);
+        if corners.nearest.iter().all(|distance| *distance >= 0.0) {
+            return None;
+        }
+        let mut faces = Faces::open();
+        for axis in 0..3 {
+            for cell in 0..512usize {
+                let at = [cell >> 6, cell >> 3 & 7, cell & 7];
+                let open = self.open(&corners, axis, at);
+                faces.open[axis][cell] = open;
+                if open < 1.0 {
+                    faces.speed[axis][cell] = self.speed(&corners, tile, axis, at);
+                }
+            }
+        }
+        Some(faces)
+    }
+
+    fn corners(&self, index: usize, tile: Coord, sheets: &[Vec<&Surface>; 2]) -> Corners {
+        let count = self.lattice.corners();
+        let far = (NEAR * self.lattice.cell) as f32;
+        let half = SHEET * self.lattice.cell;
+        let mut distances = [Vec::with_capacity(count.pow(3)), Vec::with_capacity(count.pow(3))];
+        for corner in 0..count.pow(3) {
+            let at = [corner / (count * count), corner / count % count, corner % count];
+            let place = self.lattice.place(tile, at);
+            // Level sets are sampled in their own cells: the corner's number keeps what is exact so.
+            let number = DVec3::from(
+                [0, 1, 2].map(|axis| f64::from(tile[axis] * 8 * self.lattice.parts as i32 + at[axis] as i32)),
+            );
+            let of = |grid: &Grid<'_>| grid.at(index, corner, number);
+            let floor = self.floor.map(|floor| (place.y - floor) as f32);
+            let [base, fixed] = self.still.each_ref().map(|grid| grid.as_ref().and_then(of));
+            let open = self.opened.as_ref().and_then(of).map_or(f32::NEG_INFINITY, |swept| -swept);
+            let base = base.map(|base| base.max(open));
+            let still = [base, fixed, floor].into_iter().flatten();
+            let moving = self.moving.iter().filter_map(of);
+            let solids = [still.fold(far, f32::min), moving.fold(far, f32::min)];
+            for side in 0..2 {
+                let near = sheets[side].iter().filter_map(|sheet| sheet.shell.nearest(place, half));
+                let nearest = near.map(|near| (near.square.sqrt() - half) as f32);
+                distances[side].push(nearest.fold(solids[side], f32::min));
+            }
+        }
+        let nearest = distances[0].iter().zip(&distances[1]).map(|(a, b)| a.min(*b)).collect();
+        Corners { count, distances, nearest }
+    }
+
+    /// Open share of the lower face of a cell on an axis: the mean of its parts.
+    fn open(&self, corners: &Corners, axis: usize, cell: [usize; 3]) -> f32 {
+        let (parts, count) = (self.lattice.parts, corners.count);
+        let steps = [count * count, count, 1];
+        let first = (cell[0] * steps[0] + cell[1] * steps[1] + cell[2]) * parts;
+        let (one, other) = (steps[(axis + 1) % 3], steps[(axis + 2) % 3]);
+        let mut sum = 0.0;
+        for part in 0..parts * parts {
+            let at = first + part / parts * one + part % parts * other;
+            let near = &corners.nearest;
+            sum += open_faces::open([near[at], near[at + other], near[at + one], near[at + one + other]]);
+        }
+        sum / (parts * parts) as f32
+    }
+
+    /// Speed (m/s) on its axis of what covers the lower face of a cell.
+    fn speed(&self, corners: &Corners, tile: Coord, axis: usize, cell: [usize; 3]) -> f32 {
+        let parts = self.lattice.parts;
+        // The corner next to the middle of the face.
+        let mut middle = cell.map(|x| x * parts + parts / 2);
+        middle[axis] = cell[axis] * parts;
+        if !corners.moves(middle) || f64::from(corners.at(middle)) < self.deepest {
+            return 0.0;
+        }
+        let half = 0.5 * self.lattice.cell;
+        let mut place = self.lattice.place(tile, cell.map(|x| x * parts)).add_scalar(half);
+        place[axis] -= half;
+        let near = self.surfaces[1].iter().filter_map(|shell| {
+            let found = shell.shell.nearest(place, NEAR * self.lattice.cell)?;
+            Some((found.square, found.motion[axis] * shell.rate))
+        });
+        let nearest = near.reduce(|a, b| if b.0 < a.0 { b } else { a });
+        nearest.map_or(0.0, |(_, speed)| speed as f32)
+    }
+}

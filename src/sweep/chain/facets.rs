@@ -1,0 +1,413 @@
+//! The parts of a chain's faces that bound its volume. The chain's boundary also has sheets inside the
+//! volume, where layers overlap: distances must not be measured from those.
+//!
+//! A point of a face is open when the chain is absent a hair in front of it, and present behind it. Faces are small
+//! compared with the volume, so one sample decides for a face unless its neighbourhood disagrees; then its corners
+//! are sampled too, and the face is clipped where it enters the volume.
+
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use rayon::prelude::*;
+
+use super::patch::patches;
+use super::prism::Prisms;
+use crate::context::Context;
+use crate::distance::lattice::{Fixed, UNITS};
+use crate::distance::region::extent;
+use crate::distance::vectors::{cross, difference, dot, sub};
+use crate::error::Result;
+use crate::sweep::signed_distance::bins::{Bins, Point, each_voxel, voxel_of};
+use crate::sweep::signed_distance::exposure::{BURIED, Exposure, OPEN, THIN};
+
+/// A triangle that bounds the volume.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Facet {
+    /// Corners, counter-clockwise seen from outside.
+    pub v: Corners,
+    /// The face of the chain that it is a part of.
+    pub face: u32,
+    /// Whether it is open throughout; otherwise it is open where it was sampled, and buried sheets pass nearby.
+    pub sure: bool,
+}
+
+/// A part of a face, and whether it is sure.
+type Part = (Corners, bool);
+
+/// Corners of a triangle.
+pub type Corners = [Fixed; 3];
+
+/// Depth (fixed-point units) up to which a sheet counts as surface: the sides of a sweep are folds of many
+/// sheets, closer together than the sweep's own tolerance.
+const HAIR: f64 = 0.005 * UNITS as f64;
+/// [`THIN`], in hairs.
+const THIN_HAIRS: f64 = THIN * UNITS as f64 / HAIR;
+/// Faces longer than this (cells) are sampled at more than one point.
+const SMALL: f32 = 1.5;
+/// Lines that are a cell apart cross most faces longer than this (cells).
+const LONG: f32 = 3.0;
+/// Distance between the samples of a long face (fixed-point units).
+const SPACING: f64 = 1.2 * UNITS as f64;
+/// Their distance where a face is sampled again because it is buried among open ones.
+const CLOSER: f64 = 0.6 * UNITS as f64;
+/// Corners are sampled this fraction of the way to the centre, away from the edges shared with neighbours.
+const INSET: f64 = 0.05;
+/// Bisections that find where an edge enters the volume: to 1/16 of its length.
+const HALVINGS: usize = 3;
+/// Flag of a bin that is a stack, whose surface is made of patches.
+const STACK: u8 = 4;
+/// Flag of any other bin.
+const LOOSE: u8 = 8;
+/// Flag of a long face that no line crosses.
+const SLIVER: u8 = 16;
+/// Flag of a small open face in a stack: patches may not reach it.
+const SPECK: u8 = 32;
+/// The small faces of a stack are sampled in bins with at most this many faces.
+const MANY: usize = 2000;
+/// Gaps in front of an open face are wider than this (hairs). Sheets of successive poses leave narrower slits, within the
+/// motion's tolerance.
+const SLIT: f64 = 3.0;
+const OPEN_AND_LOOSE: u8 = OPEN | LOOSE;
+/// Faces per task: fixed, so that nothing depends on the number of threads.
+const GRAIN: usize = 128;
+
+/// Finds the open parts of faces, on one thread.
+struct Clipper<'a> {
+    bins: &'a Bins,
+    exposure: &'a Exposure,
+    prisms: Prisms,
+}
+
+/// The facets that bound a chain's volume near the blocks of its bins.
+///
+/// # Errors
+/// Cancel.
+pub fn facets(ctx: &Context, bins: &Bins, exposure: &Exposure) -> Result<Vec<Facet>> {
+    let clipper = || Clipper { bins, exposure, prisms: Prisms::default() };
+    let order = order(bins);
+    let verdict = |clipper: &mut Clipper<'_>, &id: &u32| {
+        if ctx.check().is_err() { BURIED } else { clipper.verdict(id as usize) }
+    };
+    let sorted: Vec<u8> = order.par_iter().with_min_len(GRAIN).map_init(clipper, verdict).collect();
+    ctx.check()?;
+    let mut verdicts = vec![0; sorted.len()];
+    order.iter().zip(sorted).for_each(|(&id, verdict)| verdicts[id as usize] = verdict);
+    let (around, seen) = neighbourhoods(bins, exposure, &verdicts);
+    let open_parts = |clipper: &mut Clipper<'_>, ids: &[u32]| {
+        let (mut out, mut parts) = (Vec::with_capacity(ids.len()), Vec::new());
+        for &face in ids.iter().take_while(|_| ctx.check().is_ok()) {
+            let id = face as usize;
+            clipper.open_parts(id, verdicts[id], seen[id], &around, &mut parts);
+            out.extend(parts.drain(..).map(|(v, sure)| Facet { v, face, sure }));
+        }
+        out
+    };
+    let parts: Vec<Vec<Facet>> = order.par_chunks(GRAIN).map_init(clipper, open_parts).collect();
+    ctx.check()?;
+    let mut facets = parts.concat();
+    facets.extend(patches(ctx, bins, exposure)?);
+    Ok(facets)
+}
+
+/// The faces sorted by bin, so that a bin's prisms stay cached.
+fn order(bins: &Bins) -> Vec<u32> {
+    let place = |id: usize| (bins.of_voxel(voxel_of(middle(&bins.faces[id].v))), id as u32);
+    let mut places: Vec<(Option<usize>, u32)> = (0..bins.faces.len()).into_par_iter().map(place).collect();
+    places.par_sort_unstable();
+    places.into_iter().map(|(_, id)| id).collect()
+}
+
+/// The flags of each bin: whether it is a stack, and its faces' verdicts; and for each face the flags of all its bins.
+fn neighbourhoods(bins: &Bins, exposure: &Exposure, verdicts: &[u8]) -> (Vec<u8>, Vec<u8>) {
+    let seen: Vec<AtomicU8> = verdicts.iter().map(|_| AtomicU8::new(0)).collect();
+    let around: Vec<AtomicU8> = (0..bins.count()).map(|_| AtomicU8::new(0)).collect();
+    bins.for_each(|bin, ids| {
+        let kind = if exposure.stacks[bin] { STACK } else { LOOSE };
+        let flags = ids.iter().fold(kind, |flags, &id| flags | verdicts[id as usize] & (OPEN | BURIED));
+        around[bin].store(flags, Ordering::Relaxed);
+        for &id in ids {
+            seen[id as usize].fetch_or(flags, Ordering::Relaxed);
+        }
+    });
+    let plain = |flags: Vec<AtomicU8>| flags.into_iter().map(AtomicU8::into_inner).collect();
+    (plain(around), plain(seen))
+}
+
+/// Whether a point (fixed-point units) of a face is open.
+pub fn is_open(bins: &Bins, exposure: &Exposure, face: u32, at: Point, prisms: &mut Prisms) -> bool {
+    ahead(bins, face as usize).is_some_and(|ahead| classify(bins, exposure, at, ahead, prisms) == OPEN)
+}
+
+/// The open parts of a small part of a face.
+pub fn open_parts(
+    bins: &Bins,
+    exposure: &Exposure,
+    face: u32,
+    v: &Corners,
+    prisms: &mut Prisms,
+) -> Vec<Corners> {
+    let Some(ahead) = ahead(bins, face as usize) else { return Vec::new() };
+    let mut clipper = Clipper { bins, exposure, prisms: std::mem::take(prisms) };
+    let mut out = Vec::new();
+    clipper.clip(*v, ahead, &mut out);
+    *prisms = clipper.prisms;
+    out.into_iter().map(|(v, _)| v).collect()
+}
+
+/// [`OPEN`] or [`BURIED`], for a point of a face. It is open when the chain is present a hair behind it, and absent a hair
+/// and [`SLIT`] in front of it, or in a stack [`THIN`] in front of it.
+fn classify(bins: &Bins, exposure: &Exposure, at: Point, ahead: Point, prisms: &mut Prisms) -> u8 {
+    let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * ahead[axis]);
+    let [front, back] = bins.windings(moved(1.0), moved(-1.0), prisms);
+    if back < 1 {
+        return BURIED;
+    }
+    let mut is_absent = |hairs: f64| bins.windings(moved(hairs), at, prisms)[0] < 1;
+    let is_open =
+        front < 1 && is_absent(SLIT) || exposure.is_stack(bins, voxel_of(at)) && is_absent(THIN_HAIRS);
+    if is_open { OPEN } else { BURIED }
+}
+
+/// A vector of one hair along a face's normal; none for a face without area.
+fn ahead(bins: &Bins, id: usize) -> Option<Point> {
+    let normal = bins.normals[id];
+    let length = dot(normal, normal).sqrt();
+    (length > 0.0).then(|| normal.map(|value| value * HAIR / length))
+}
+
+impl Clipper<'_> {
+    /// The flags of a face: [`OPEN`] and [`BURIED`] from the lines that cross it and from samples. In a stack only slivers
+    /// and specks are sampled.
+    fn verdict(&mut self, id: usize) -> u8 {
+        let (v, seen) = (self.bins.faces[id].v, self.exposure.faces[id]);
+        let Some(ahead) = ahead(self.bins, id) else { return seen | BURIED };
+        if self.is_sliver(id) {
+            return SLIVER | self.classify(middle(&v), ahead);
+        }
+        let stack = self.exposure.is_stack(self.bins, voxel_of(middle(&v)));
+        match stack {
+            true if is_small(&v) && self.is_speck(middle(&v), ahead) => seen | SPECK,
+            true => seen,
+            false => seen | self.sampled(&v, ahead),
+        }
+    }
+
+    /// Whether a small face of a stack is open at its centre, and not in a slit.
+    fn is_speck(&mut self, at: Point, ahead: Point) -> bool {
+        if self.bins.crowd(voxel_of(at)) > MANY {
+            return false;
+        }
+        let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * ahead[axis]);
+        let [front, back] = self.bins.windings(moved(1.0), moved(-1.0), &mut self.prisms);
+        front < 1 && back >= 1 && self.bins.windings(moved(SLIT), at, &mut self.prisms)[0] < 1
+    }
+
+    /// Whether a long face passes between the lines: no patch covers it.
+    fn is_sliver(&self, id: usize) -> bool {
+        let (low, high) = extent(&self.bins.faces[id].v);
+        self.exposure.faces[id] == 0 && (0..3).any(|axis| high[axis] - low[axis] > LONG)
+    }
+
+    /// [`OPEN`] and [`BURIED`], from the samples of a part of a face.
+    fn sampled(&mut self, v: &Corners, ahead: Point) -> u8 {
+        let mut flags = 0;
+        each_sample(v, SPACING, |at| flags |= if self.is_sampled(at) { self.classify(at, ahead) } else { 0 });
+        flags
+    }
+
+    /// Adds the open parts of a face with these flags (`own`), in bins with the flags `seen`.
+    fn open_parts(&mut self, id: usize, own: u8, seen: u8, around: &[u8], out: &mut Vec<Part>) {
+        let (v, Some(ahead)) = (self.bins.faces[id].v, ahead(self.bins, id)) else { return };
+        match seen {
+            OPEN_AND_LOOSE => out.push((v, true)),
+            _ if own & SPECK != 0 => out.push((v, false)),
+            _ if own == SLIVER | OPEN && seen & STACK != 0 => out.push((v, false)),
+            _ if seen & LOOSE == 0 || seen & !(STACK | LOOSE) == BURIED => {}
+            _ => {
+                self.split(id, v, own & (OPEN | BURIED), ahead, around, out);
+            }
+        }
+    }
+
+    /// The flags of the bins that a part of a face passes through.
+    fn seen_around(&self, id: usize, v: Corners, around: &[u8]) -> u8 {
+        let mut seen = 0;
+        each_voxel(&v, &self.bins.normals[id], &self.bins.region, |voxel| {
+            if let Some(bin) = self.bins.of_voxel(voxel) {
+                seen |= around[bin];
+            }
+        });
+        seen
+    }
+
+    /// Adds the open parts of a part of a face; returns whether it is open at all its samples.
+    fn dice(&mut self, id: usize, v: Corners, ahead: Point, around: &[u8], out: &mut Vec<Part>) -> bool {
+        match self.seen_around(id, v, around) {
+            // No flags: no distance is wanted there.
+            0 | LOOSE | OPEN_AND_LOOSE => {
+                out.push((v, true));
+                true
+            }
+            seen if seen & LOOSE == 0 || seen & !(STACK | LOOSE) == BURIED => false,
+            _ => {
+                let exposed = self.exposure.within(id as u32, extent(&v));
+                let own = self.sampled(&v, ahead) | if exposed { OPEN } else { 0 };
+                self.split(id, v, own, ahead, around, out)
+            }
+        }
+    }
+
+    /// As [`Clipper::dice`], for a part with the flags `own` that has open and buried faces, or stacks, around it.
+    fn split(
+        &mut self,
+        id: usize,
+        v: Corners,
+        own: u8,
+        ahead: Point,
+        around: &[u8],
+        out: &mut Vec<Part>,
+    ) -> bool {
+        let begin = out.len();
+        if !is_small(&v) {
+            let open = match own {
+                OPEN => true,
+                BURIED if !self.is_missed(&v, ahead, around) => false,
+                _ => halves(v).map(|half| self.dice(id, half, ahead, around, out)) == [true; 2],
+            };
+            if open {
+                out.truncate(begin);
+                out.push((v, false));
+            }
+            return open;
+        }
+        if self.exposure.is_stack(self.bins, voxel_of(middle(&v))) {
+            return false;
+        }
+        self.clip(v, ahead, out);
+        if out.len() == begin && self.exposure.within(id as u32, extent(&v)) {
+            out.push((v, false));
+        }
+        out[begin..] == [(v, true)]
+    }
+
+    /// Whether a part of a face that is buried at its samples is open between them, in bins with open faces.
+    fn is_missed(&mut self, v: &Corners, ahead: Point, around: &[u8]) -> bool {
+        let mut missed = false;
+        each_sample(v, CLOSER, |at| {
+            let bin = self.bins.of_voxel(voxel_of(at)).filter(|_| !missed);
+            let is_mixed = bin.is_some_and(|bin| around[bin] & (OPEN | STACK) == OPEN);
+            missed |= is_mixed && self.classify(at, ahead) == OPEN;
+        });
+        missed
+    }
+
+    fn classify_corners(&mut self, v: Corners, ahead: Point) -> [u8; 3] {
+        let centre = middle(&v);
+        v.map(|p| self.classify(between(p.map(f64::from), centre, INSET), ahead))
+    }
+
+    /// Adds the open parts of a small triangle.
+    fn clip(&mut self, v: Corners, ahead: Point, out: &mut Vec<Part>) {
+        let open = self.classify_corners(v, ahead).map(|corner| corner == OPEN);
+        let centre = middle(&v);
+        let count = open.iter().filter(|open| **open).count();
+        let mut middle_open = || self.classify(centre, ahead) == OPEN;
+        if count % 3 == 0 && middle_open() == open[0] {
+            if open[0] {
+                out.push((v, true));
+            }
+            return;
+        }
+        if count % 3 == 0 {
+            let centre = centre.map(|value| value.round() as i32);
+            let fan = [[v[0], v[1], centre], [v[1], v[2], centre], [v[2], v[0], centre]];
+            let corners = [open[0], open[0], !open[0]];
+            return fan.into_iter().for_each(|part| self.clip_by(part, corners, ahead, out));
+        }
+        self.clip_by(v, open, ahead, out);
+    }
+
+    /// Adds the open part of a triangle with open and buried corners, cut off along a straight line.
+    fn clip_by(&mut self, v: Corners, open: [bool; 3], ahead: Point, out: &mut Vec<Part>) {
+        let alone = (0..3).find(|&i| open[i] != open[(i + 1) % 3] && open[i] != open[(i + 2) % 3]);
+        let turn = alone.unwrap_or(0);
+        let [a, b, c] = [0, 1, 2].map(|i| v[(turn + i) % 3]);
+        let [ab, ac] = [b, c].map(|other| self.rim(a, other, open[turn], ahead));
+        if open[turn] {
+            out.push(([a, ab, ac], true));
+        } else {
+            out.extend([([ab, b, c], true), ([ab, c, ac], true)]);
+        }
+    }
+
+    /// Where an edge changes between open and buried; `open` is whether `a` is open, and `b` is the opposite.
+    fn rim(&mut self, a: Fixed, b: Fixed, open: bool, ahead: Point) -> Fixed {
+        let (a, b) = (a.map(f64::from), b.map(f64::from));
+        let (mut first, mut last) = (0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let half = (first + last) / 2.0;
+            let same = (self.classify(between(a, b, half), ahead) == OPEN) == open;
+            (first, last) = if same { (half, last) } else { (first, half) };
+        }
+        between(a, b, (first + last) / 2.0).map(|value| value.round() as i32)
+    }
+
+    fn classify(&mut self, at: Point, ahead: Point) -> u8 {
+        classify(self.bins, self.exposure, at, ahead, &mut self.prisms)
+    }
+
+    /// Whether distances may be wanted near a point, and do not come from a stack's patches.
+    fn is_sampled(&self, at: Point) -> bool {
+        self.bins.of_voxel(voxel_of(at)).is_some_and(|bin| !self.exposure.stacks[bin])
+    }
+}
+
+/// Whether one sample decides for a part of a face.
+pub fn is_small(v: &Corners) -> bool {
+    let (low, high) = extent(v);
+    (0..3).all(|axis| high[axis] - low[axis] <= SMALL)
+}
+
+/// Calls `see` with the centroid of a small triangle, else with points about `spacing` apart in rows along the longest
+/// edge.
+fn each_sample(v: &Corners, spacing: f64, mut see: impl FnMut(Point)) {
+    if is_small(v) {
+        return see(middle(v));
+    }
+    let [a, b, c] = from_longest(v).map(|p| p.map(f64::from));
+    let (along, up) = (sub(b, a), sub(c, a));
+    let length = dot(along, along).sqrt();
+    let area = cross(along, up);
+    let height = dot(area, area).sqrt() / length;
+    let rows = (height / spacing).ceil().max(1.0);
+    for row in 0..rows as usize {
+        let t = (row as f64 + 0.5) / rows;
+        let (begin, end) = (between(a, c, t), between(b, c, t));
+        let count = (length * (1.0 - t) / spacing).ceil().max(1.0);
+        (0..count as usize).for_each(|index| see(between(begin, end, (index as f64 + 0.5) / count)));
+    }
+}
+
+/// A triangle with its corners rotated so that the first edge is the longest.
+fn from_longest(v: &Corners) -> Corners {
+    let length = |i: usize| {
+        let d = difference(v[(i + 1) % 3], v[i]);
+        dot(d, d)
+    };
+    let longest = (1..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
+    [0, 1, 2].map(|i| v[(longest + i) % 3])
+}
+
+fn middle(v: &Corners) -> Point {
+    [0, 1, 2].map(|axis| v.iter().map(|p| f64::from(p[axis])).sum::<f64>() / 3.0)
+}
+
+fn between(a: Point, b: Point, t: f64) -> Point {
+    [0, 1, 2].map(|axis| a[axis] + t * (b[axis] - a[axis]))
+}
+
+/// A triangle split at the midpoint of its longest edge.
+pub fn halves(v: Corners) -> [Corners; 2] {
+    let [a, b, c] = from_longest(&v);
+    let m = between(a.map(f64::from), b.map(f64::from), 0.5).map(|value| value.round() as i32);
+    [[a, m, c], [m, b, c]]
+}

@@ -1,0 +1,481 @@
+//! A moving body as the chain needs it: closed triangles, and poses at well-chosen times.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use xxhash_rust::xxh3::Xxh3;
+
+use super::refine::{edge_error, refine};
+use super::topology::{Simplex, Topology};
+use crate::context::Context;
+use crate::distance::Face;
+use crate::distance::lattice::{Fixed, Lattice, UNITS};
+use crate::error::{Error, Result};
+use crate::geometry::DVec3;
+use crate::geometry::check::orientation::{Closing, Orientation};
+use crate::geometry::mesh::weld::{Boundary, STEPS, Weld};
+use crate::geometry::mesh::{coincident, spacing};
+use crate::motion::Motion;
+use crate::sweep::chain::{Weights, Window, boundary};
+
+/// Length of a step's path relative to the pieces that edges are split into; this value gave the fewest faces and the
+/// least time.
+const SHORTER: f64 = 1.5;
+/// Steps need be no shorter than this (cells), and no more than [`MOST_OF_ARCS`] times those that arcs need; measured
+/// too.
+const LEAST_WAY: f64 = 4.0;
+const MOST_OF_ARCS: f64 = 1.5;
+/// Most steps in an interval between two breaks of a motion.
+const MOST_STEPS: f64 = 1024.0;
+/// Greatest rotation (radians) in an interval whose arcs are judged from five poses: a quarter turn.
+const TURNING: f64 = std::f64::consts::FRAC_PI_2;
+/// Greatest rotation in a frame (radians): 64 turns.
+const MOST_TURNING: f64 = 64.0 * std::f64::consts::TAU;
+/// Bytes per vertex of a pose: in cells, in fixed point, and its part of the faces.
+const BYTES_PER_POSITION: usize = 100;
+/// Vertices or edges per task.
+const GRAIN: usize = 2048;
+
+/// A motion with its topology, prepared once and used for many intervals.
+pub struct Body {
+    motion: Box<dyn Motion>,
+    shape: Arc<Shape>,
+    longest_edge: f64,
+    noise: bool,
+    name: Option<String>,
+}
+
+/// What stays the same while a body's vertices move: its topology and orientation.
+pub struct Shape {
+    /// Hash of the triangles.
+    triangles: u128,
+    /// For each vertex the first one at the same position; itself when there is none before it.
+    exact: Vec<u32>,
+    /// What these leave open.
+    boundary: Boundary,
+    /// Which vertices are one corner, those within rounding of one another included.
+    weld: Weld,
+    /// How far welded vertices that are not at one position were apart (m), at most.
+    slack: f64,
+    /// The triangles as they have to be turned, where they are not the motion's own.
+    oriented: Option<Vec<[u32; 3]>>,
+    topology: Topology,
+    contradictions: usize,
+    /// What of its orientation is not decided, in a sentence.
+    doubts: Option<String>,
+}
+
+impl Body {
+    /// Prepares a motion by its pose at `time` (s): welds vertices that coincide, or on open edges lie within rounding of each other
+    /// ([`Weld`]), leaves out doubled triangles, turns closed parts outward (see [`crate::geometry::check::orientation`]) and closes open loops;
+    /// open parts are turned round where the whole solid would have a negative volume.
+    ///
+    /// # Errors
+    /// When the motion has no triangles, or its pose cannot be computed.
+    pub fn new(motion: Box<dyn Motion>, time: f64) -> Result<Self> {
+        Self::shaped(motion, time, None)
+    }
+
+    /// As [`Body::new`]; `known` is the shape of an earlier body, which is shared if this body has the same one, and its
+    /// volume is not negative with it.
+    ///
+    /// # Errors
+    /// As [`Body::new`].
+    pub fn shaped(motion: Box<dyn Motion>, time: f64, known: Option<Arc<Shape>>) -> Result<Self> {
+        if motion.triangles().is_empty() {
+            return Err(Error::argument("an object has no triangles"));
+        }
+        let mut pose = Vec::new();
+        motion.pose(time, &mut pose)?;
+        let triangles = hash_of(motion.triangles());
+        let exact = if motion.keeps_its_welds() {
+            (0..pose.len() as u32).collect()
+        } else {
+            coincident(pose.iter().copied())
+        };
+        let known = match known.filter(|known| known.triangles == triangles && known.exact == exact) {
+            Some(known) if known.is_welded_alike(&*motion, time)? => {
+                known.topology.complete(&mut pose);
+                (volume(&known.topology, &pose) >= 0.0).then_some(known)
+            }
+            _ => None,
+        };
+        let shape = match known {
+            Some(known) => known,
+            None => {
+                pose.truncate(exact.len());
+                let shape = Shape::new(&*motion, time, &pose, triangles, exact)?;
+                shape.topology.complete(&mut pose);
+                Arc::new(shape)
+            }
+        };
+        let length = |&[i, j]: &[u32; 2]| (pose[i as usize] - pose[j as usize]).norm();
+        let edges = shape.topology.edges.par_iter().with_min_len(GRAIN);
+        let longest_edge = edges.map(length).reduce(|| 0.0, f64::max);
+        Ok(Self { motion, shape, longest_edge, noise: true, name: None })
+    }
+
+    /// Its topology and orientation, to share with later bodies.
+    pub fn shape(&self) -> &Arc<Shape> {
+        &self.shape
+    }
+
+    /// Sets whether its imprints have ragged edges (by default they do).
+    pub fn with_noise(self, noise: bool) -> Self {
+        Self { noise, ..self }
+    }
+
+    /// Sets its name, for messages.
+    pub fn with_name(self, name: String) -> Self {
+        Self { name: Some(name), ..self }
+    }
+
+    /// Its name, if set.
+    pub fn name(&self) -> Option<&str> {
+        self.name.as_deref()
+    }
+
+    /// Number of open loops that were closed; loops that share a vertex count once.
+    pub fn closed_loops(&self) -> usize {
+        self.shape.topology.derived.len()
+    }
+
+    /// Number of edges whose triangles disagree about inside and outside: two or more run along the edge one way without a
+    /// counterpart.
+    pub fn contradictions(&self) -> usize {
+        self.shape.contradictions
+    }
+
+    /// For each vertex of its motion the first one that is the same corner; itself where there is none before it.
+    pub fn corners(&self) -> &[u32] {
+        &self.shape.weld.firsts
+    }
+
+    /// What to say about corners that rounding does not decide; none where there are none.
+    pub fn weld_warning(&self) -> Option<String> {
+        self.shape.weld.warning()
+    }
+
+    /// Its triangles with the caps of its open loops, counter-clockwise seen from outside; [`Body::closed_pose`] has their vertices.
+    pub fn closed_triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        self.shape.topology.simplices.iter().map(Simplex::triangle)
+    }
+
+    /// The pose (m) at a time (s), and the vertices in the middle of its caps.
+    ///
+    /// # Errors
+    /// When the pose cannot be computed.
+    pub fn closed_pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
+        self.motion.pose(time, out)?;
+        self.shape.topology.complete(out);
+        Ok(())
+    }
+
+    /// Share of its surface at a pose of [`Body::closed_pose`] that is caps, 0..=1.
+    pub fn share_of_caps(&self, pose: &[DVec3]) -> f64 {
+        let topology = &self.shape.topology;
+        let area = |simplex: &Simplex| simplex.doubled_area(pose);
+        let all: f64 = topology.simplices.iter().map(area).sum();
+        if all > 0.0 { topology.caps().map(area).sum::<f64>() / all } else { 0.0 }
+    }
+
+    /// Its motion's triangles, turned so that they face outward, without doubled ones.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        self.shape.oriented.as_deref().unwrap_or(self.motion.triangles())
+    }
+
+    /// What of its orientation is not decided, in a sentence without its name.
+    pub fn doubts(&self) -> Option<&str> {
+        self.shape.doubts.as_deref()
+    }
+
+    /// What to say of triangles that do not agree about inside and outside, in a sentence without its name.
+    pub fn warning(&self) -> Option<String> {
+        let edges = self.contradictions();
+        let disagree = || {
+            format!(
+                "its triangles disagree about inside and outside at {edges} edges, which `frazil mesh check` lists; holes are \
+                 closed by cones, look at the result"
+            )
+        };
+        self.doubts().map(String::from).or_else(|| (edges > 0).then(disagree))
+    }
+
+    /// Whether its imprints have ragged edges.
+    pub fn has_noise(&self) -> bool {
+        self.noise
+    }
+
+    /// The motion itself.
+    pub fn motion(&self) -> &dyn Motion {
+        &*self.motion
+    }
+
+    /// Boundary of the chain that the body sweeps from `from` to `to` (s); the pose itself when they
+    /// are equal. `tolerance` (cells) bounds the error against true arcs and flat moving triangles.
+    ///
+    /// # Errors
+    /// When a pose cannot be computed or a vertex is too far away for the lattice.
+    pub fn faces(
+        &self,
+        ctx: &Context,
+        from: f64,
+        to: f64,
+        lattice: &Lattice,
+        tolerance: f64,
+        window: &Window,
+    ) -> Result<Vec<Face>> {
+        let near = Near::new(window, self.longest_edge / lattice.voxel);
+        let mut poses = self.poses(ctx, from, to, lattice, tolerance, &near)?;
+        ctx.check()?;
+        let apart = self.welds_part(&poses, lattice);
+        let separate;
+        let topology = if apart {
+            let identity: Vec<u32> = (0..self.motion.vertex_count() as u32).collect();
+            separate = Topology::new(self.triangles(), identity.len(), &identity, true);
+            &separate
+        } else {
+            &self.shape.topology
+        };
+        poses.iter_mut().for_each(|pose| topology.complete(pose));
+        let refined = refine(ctx, topology, &mut poses, tolerance, |step, edge| near.sees(step, &edge))?;
+        ctx.check()?;
+        let levels: Vec<Vec<Fixed>> = poses
+            .par_iter()
+            .map(|pose| pose.iter().map(|&cells| lattice.fix(cells)).collect())
+            .collect::<Result<_>>()?;
+        let weights = Weights { solid: 1, swept: 1 };
+        boundary(ctx, refined.as_ref().unwrap_or(topology), &levels, weights, window)
+    }
+
+    /// Poses (cells) at times so dense that straight steps stay within `tolerance` of the motion.
+    fn poses(
+        &self,
+        ctx: &Context,
+        from: f64,
+        to: f64,
+        lattice: &Lattice,
+        tolerance: f64,
+        near: &Near,
+    ) -> Result<Vec<Vec<DVec3>>> {
+        let at = |time: f64| -> Result<Vec<DVec3>> {
+            ctx.check()?;
+            let mut pose = Vec::new();
+            self.motion.pose(time, &mut pose)?;
+            pose.iter_mut().for_each(|position| *position = lattice.to_cells(*position));
+            // Check the extent before allocating anything proportional to it.
+            pose.iter().try_for_each(|&cells| lattice.fix(cells).map(drop))?;
+            Ok(pose)
+        };
+        let mut poses = vec![at(from)?];
+        if to <= from {
+            return Ok(poses);
+        }
+        let ends = self.ends(from, to)?;
+        let mut begin = from;
+        for end in ends {
+            let first = poses.last().expect("the first pose is there").clone();
+            let last = at(end)?;
+            let quarter = |&t: &f64| at(begin + t * (end - begin));
+            let quarters: Vec<Vec<DVec3>> =
+                [0.25, 0.5, 0.75].par_iter().map(quarter).collect::<Result<_>>()?;
+            let steps =
+                self.steps(&[&first, &quarters[0], &quarters[1], &quarters[2], &last], tolerance, near);
+            let count = poses.len() + steps;
+            let bytes = (count * self.shape.topology.vertex_count() * BYTES_PER_POSITION) as u64;
+            ctx.allow("the poses of a body (a shorter motion or larger cells need fewer)", bytes)?;
+            let step = |step: usize| at(begin + (end - begin) * step as f64 / steps as f64);
+            poses.extend((1..steps).into_par_iter().map(step).collect::<Result<Vec<_>>>()?);
+            poses.push(last);
+            begin = end;
+        }
+        Ok(poses)
+    }
+
+    /// Upper bound on its rotation (radians) from `from` to `to` (s).
+    ///
+    /// # Errors
+    /// More than 64 turns.
+    pub fn turning(&self, from: f64, to: f64) -> Result<f64> {
+        let turning = self.motion.turning(from, to);
+        if turning > MOST_TURNING {
+            return Err(Error::argument(format!(
+                "{} turns by {:.0} degrees in a step, more than {:.0}",
+                self.name().unwrap_or("an object"),
+                turning.to_degrees(),
+                MOST_TURNING.to_degrees()
+            )));
+        }
+        Ok(turning)
+    }
+
+    /// Ends of the parts of an interval in which steps are chosen: the motion's breaks, and times between which it turns so
+    /// little that five poses show how far its paths are from straight lines.
+    fn ends(&self, from: f64, to: f64) -> Result<Vec<f64>> {
+        self.turning(from, to)?;
+        let mut ends = Vec::new();
+        let mut begin = from;
+        for end in self.motion.breaks(from, to).into_iter().chain([to]) {
+            let parts = (self.motion.turning(begin, end) / TURNING).ceil().max(1.0);
+            ends.extend((1..parts as usize).map(|part| begin + (end - begin) * part as f64 / parts));
+            ends.push(end);
+            begin = end;
+        }
+        Ok(ends)
+    }
+
+    /// Number of equal steps an interval needs, from five poses at its quarters.
+    fn steps(&self, probes: &[&Vec<DVec3>; 5], tolerance: f64, near: &Near) -> usize {
+        let bend = |vertex: usize| -> f64 {
+            let path = probes.map(|probe| probe[vertex]);
+            if !near.reaches(&path) {
+                return 0.0;
+            }
+            let off = |(index, t): (usize, f64)| (path[index] - path[0].lerp(&path[4], t)).norm_squared();
+            [(1, 0.25), (2, 0.5), (3, 0.75)].map(off).into_iter().fold(0.0, f64::max)
+        };
+        let vertices = (0..probes[0].len()).into_par_iter().with_min_len(GRAIN);
+        let bend = vertices.map(bend).reduce(|| 0.0, f64::max);
+        let arcs = (bend.sqrt() / tolerance).sqrt();
+        let ends = [&probes[0][..], &probes[4][..]];
+        let own = self.shape.topology.own_vertices as u32;
+        // Enough that the faces that edges sweep, once the edges are split, are well shaped.
+        let twist = |edge: &[u32; 2]| {
+            let error = if edge[1] < own { edge_error(ends, *edge) } else { 0.0 };
+            if error <= tolerance || !near.sees(ends, edge) {
+                return 0.0;
+            }
+            let [i, j] = edge.map(|vertex| vertex as usize);
+            let way = (ends[1][i] - ends[0][i]).norm().max((ends[1][j] - ends[0][j]).norm());
+            let length = (ends[0][i] - ends[0][j]).norm().max((ends[1][i] - ends[1][j]).norm());
+            let steps = SHORTER * (error / tolerance * way / length).sqrt();
+            steps.min((way / LEAST_WAY).max(MOST_OF_ARCS * arcs))
+        };
+        let twists =
+            self.shape.topology.edges.par_iter().with_min_len(GRAIN).map(twist).reduce(|| 0.0, f64::max);
+        arcs.max(twists).ceil().clamp(1.0, MOST_STEPS) as usize
+    }
+
+    /// Whether welded vertices have moved apart in poses (cells), by more than the rounding of their coordinates.
+    fn welds_part(&self, poses: &[Vec<DVec3>], lattice: &Lattice) -> bool {
+        let Shape { weld, slack, .. } = &*self.shape;
+        let origin = DVec3::from(lattice.origin.map(f64::from));
+        let rounding = |cells: &DVec3| {
+            let farthest = (cells + origin).amax() * lattice.voxel;
+            (slack + f64::from(STEPS as i32) * 3f64.sqrt() * spacing(farthest)) / lattice.voxel
+        };
+        let is_apart = |(vertex, &first): (usize, &u32)| {
+            let first = first as usize;
+            let differ = |pose: &Vec<DVec3>| {
+                pose[vertex] != pose[first] && (pose[vertex] - pose[first]).norm() > rounding(&pose[vertex])
+            };
+            first != vertex && poses.iter().any(differ)
+        };
+        weld.firsts.iter().enumerate().any(is_apart)
+    }
+}
+
+/// Tests whether moving vertices and edges can touch the window.
+struct Near {
+    low: DVec3,
+    high: DVec3,
+    longest: f64,
+}
+
+impl Near {
+    fn new(window: &Window, longest: f64) -> Self {
+        let cells = |p: Fixed| DVec3::from(p.map(|value| f64::from(value) / f64::from(UNITS)));
+        Self { low: cells(window.min), high: cells(window.max), longest }
+    }
+
+    fn touches(&self, path: impl Iterator<Item = DVec3>, margin: f64) -> bool {
+        let (mut low, mut high) = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
+        path.for_each(|p| (low, high) = (low.inf(&p), high.sup(&p)));
+        (0..3).all(|a| high[a] + margin >= self.low[a] && low[a] - margin <= self.high[a])
+    }
+
+    /// Whether a face at a vertex on this path can touch the window.
+    fn reaches(&self, path: &[DVec3]) -> bool {
+        self.touches(path.iter().copied(), self.longest)
+    }
+
+    /// Whether what an edge sweeps in a step can touch the window.
+    fn sees(&self, step: [&[DVec3]; 2], edge: &[u32; 2]) -> bool {
+        self.touches(step.into_iter().flat_map(|pose| edge.map(|vertex| pose[vertex as usize])), 1.0)
+    }
+}
+
+impl Shape {
+    /// Of a motion that has this pose at a time (s), where the hash of its triangles and its vertices at equal positions are known.
+    fn new(motion: &dyn Motion, time: f64, pose: &[DVec3], triangles: u128, exact: Vec<u32>) -> Result<Self> {
+        let own = motion.triangles();
+        let (mut boundary, mut weld) =
+            (Boundary::default(), Weld { firsts: exact.clone(), ..Weld::default() });
+        if !motion.keeps_its_welds() && Topology::new(own, pose.len(), &exact, false).has_lone_triangles() {
+            boundary = Boundary::of(own, &exact);
+            weld = welded(motion, time, &exact, &boundary)?;
+        }
+        let apart = |&vertex: &u32| {
+            let first = weld.firsts[vertex as usize];
+            (pose[vertex as usize] - pose[first as usize]).norm()
+        };
+        let slack = weld.near.iter().map(apart).fold(0.0, f64::max);
+        let mut orientation = Orientation::of(pose, own, &weld.firsts, Closing::Caps);
+        let of = |orientation: &Orientation| {
+            let oriented = (!orientation.is_unchanged()).then(|| orientation.applied(own));
+            let topology = Topology::new(oriented.as_deref().unwrap_or(own), pose.len(), &weld.firsts, false);
+            let contradictions = topology.contradictions();
+            (oriented, topology, contradictions)
+        };
+        let (mut oriented, mut topology, mut contradictions) = of(&orientation);
+        topology.close();
+        if orientation.has_open() {
+            // As the motion has the triangles, all of them.
+            let mut closed = pose.to_vec();
+            topology.complete(&mut closed);
+            let [before, now] = orientation.volumes();
+            if volume(&topology, &closed) - now + before < 0.0 {
+                orientation.turn_open();
+                (oriented, topology, contradictions) = of(&orientation);
+                topology.close();
+            }
+        }
+        let doubts = orientation.warning();
+        Ok(Self { triangles, exact, boundary, weld, slack, oriented, topology, contradictions, doubts })
+    }
+
+    /// Whether a motion with the same triangles and the same vertices at equal positions has the same corners at a time (s).
+    fn is_welded_alike(&self, motion: &dyn Motion, time: f64) -> Result<bool> {
+        Ok(self.boundary.is_empty() || welded(motion, time, &self.exact, &self.boundary)? == self.weld)
+    }
+}
+
+/// The corners of a motion at a time (s), by the rounding of its coordinates as they were read.
+fn welded(motion: &dyn Motion, time: f64, exact: &[u32], boundary: &Boundary) -> Result<Weld> {
+    let mut read = Vec::new();
+    motion.pose_as_read(time, &mut read)?;
+    Ok(Weld::with_boundary(&read, motion.triangles(), exact.to_vec(), boundary))
+}
+
+fn hash_of(triangles: &[[u32; 3]]) -> u128 {
+    let mut hash = Xxh3::new();
+    let mut bytes = [0; 12 * 256];
+    for part in triangles.chunks(256) {
+        let indices = part.as_flattened();
+        let used = bytes.chunks_exact_mut(4).zip(indices);
+        used.for_each(|(to, index)| to.copy_from_slice(&index.to_le_bytes()));
+        hash.update(&bytes[..4 * indices.len()]);
+    }
+    hash.digest128()
+}
+
+/// Volume of the solid (m3), summed in an order that does not depend on threads.
+fn volume(topology: &Topology, pose: &[DVec3]) -> f64 {
+    let six = |simplex: &super::topology::Simplex| {
+        let [a, b, c] = simplex.v.map(|vertex| pose[vertex as usize]);
+        a.dot(&b.cross(&c)) * f64::from(simplex.sign)
+    };
+    let parts: Vec<f64> =
+        topology.simplices.par_chunks(GRAIN).map(|part| part.iter().map(six).sum()).collect();
+    parts.iter().sum::<f64>() / 6.0
+}

@@ -1,0 +1,6 @@
+//! A moving mesh as the chain needs it: topology, poses, and where its surface passes.
+
+pub(in crate::sweep) mod body;
+pub(in crate::sweep) mod passages;
+mod refine;
+pub(in crate::sweep) mod topology;

@@ -1,0 +1,371 @@
+//! Data passed from one process to another: descriptions of a file's grids, or grids, with their leaves as plain
+//! blocks, or points.
+//!
+//! A parcel is `MAGIC`, the length of its head, the head, and for each grid three arrays: origins, masks, values of its
+//! leaves. The magic number is written last: without it a parcel is incomplete. The reader checks every length,
+//! as a damaged file may have misled the process that wrote it.
+
+use std::fs::File;
+use std::io::{IoSlice, Write};
+use std::os::unix::fs::FileExt;
+
+use super::mapping::Mapping;
+use super::parcel_points;
+use crate::geometry::Points;
+use crate::numeric::blocks::{Mask, Values};
+use crate::vdb::bridge::ffi;
+use crate::vdb::file::GridInfo;
+use crate::vdb::grid::{FloatGrid, MetaValue};
+use crate::vdb::leaf::{Leaf, LeafValues, Vectors};
+use crate::vdb::vectors::{AnyGrid, VectorGrid};
+
+/// The first bytes of a parcel; they change with its format.
+const MAGIC: [u8; 8] = *b"frzpack3";
+/// Arrays begin at multiples of this.
+pub(in crate::vdb) const ALIGN: usize = 64;
+/// Bytes of a leaf of such values in each of the three arrays.
+const fn sizes<V>() -> [usize; 3] {
+    [12, size_of::<Mask>(), size_of::<V>()]
+}
+/// Leaves that one write takes.
+const BATCH: usize = 512;
+
+/// The contents of a parcel.
+pub(in crate::vdb) enum Contents {
+    /// Descriptions of a file's grids.
+    Infos(Vec<GridInfo>),
+    /// Grids.
+    Grids(Vec<AnyGrid>),
+    /// Points, and the attributes that they are without.
+    Points(Points, Vec<String>),
+    /// Why there is neither; the message follows the file's name.
+    Refusal(String),
+}
+
+/// Writes a parcel into an empty file.
+///
+/// # Errors
+/// What the operating system reports, or OpenVDB when memory runs out.
+pub(in crate::vdb) fn pack(mut file: &File, contents: &Contents) -> Result<(), String> {
+    let mut head = Head::default();
+    let mut lists: Vec<Leaves<'_>> = Vec::new();
+    match contents {
+        Contents::Refusal(text) => {
+            head.number(0);
+            head.text(text);
+        }
+        Contents::Infos(infos) => {
+            head.number(1);
+            head.number(infos.len() as u64);
+            infos.iter().for_each(|info| head.info(info));
+        }
+        // Below, as they have no leaves.
+        Contents::Points(..) => {}
+        Contents::Grids(grids) => {
+            head.number(2);
+            head.number(grids.len() as u64);
+            for grid in grids {
+                let leaves = match grid {
+                    AnyGrid::Floats(grid) => grid.leaves().map(Leaves::Floats),
+                    AnyGrid::Vectors(grid) => grid.leaves().map(Leaves::Vectors),
+                };
+                let leaves = leaves.map_err(|error| error.to_string())?;
+                head.grid(grid, leaves.count()).map_err(|error| error.what().to_string())?;
+                lists.push(leaves);
+            }
+        }
+    }
+    if let Contents::Points(points, skipped) = contents {
+        head.number(3);
+        parcel_points::describe(&mut head, points, skipped);
+    }
+    let io = |error: std::io::Error| error.to_string();
+    let start = [&[0; 8][..], &(head.0.len() as u64).to_le_bytes(), &head.0].concat();
+    let mut at = start.len();
+    file.write_all(&start).map_err(io)?;
+    for leaves in &lists {
+        let written = match leaves {
+            Leaves::Floats(leaves) => write_leaves(file, &mut at, leaves),
+            Leaves::Vectors(leaves) => write_leaves(file, &mut at, leaves),
+        };
+        written.map_err(io)?;
+    }
+    if let Contents::Points(points, _) = contents {
+        parcel_points::write(file, &mut at, points).map_err(io)?;
+    }
+    file.write_all_at(&MAGIC, 0).map_err(io)
+}
+
+/// The leaves of a grid.
+enum Leaves<'a> {
+    Floats(Vec<Leaf<'a>>),
+    Vectors(Vec<Leaf<'a, Vectors>>),
+}
+
+impl Leaves<'_> {
+    fn count(&self) -> usize {
+        match self {
+            Self::Floats(leaves) => leaves.len(),
+            Self::Vectors(leaves) => leaves.len(),
+        }
+    }
+}
+
+fn write_leaves<V: LeafValues>(
+    mut file: &File,
+    at: &mut usize,
+    leaves: &[Leaf<'_, V>],
+) -> std::io::Result<()> {
+    for (array, size) in sizes::<V>().into_iter().enumerate() {
+        file.write_all(&[0; ALIGN][..at.next_multiple_of(ALIGN) - *at])?;
+        *at = at.next_multiple_of(ALIGN) + size * leaves.len();
+        for batch in leaves.chunks(BATCH) {
+            if array == 0 {
+                let origins: Vec<u8> =
+                    batch.iter().flat_map(|leaf| leaf.origin).flat_map(i32::to_ne_bytes).collect();
+                file.write_all(&origins)?;
+                continue;
+            }
+            let mut slices: Vec<IoSlice<'_>> = batch
+                .iter()
+                .map(|leaf| IoSlice::new(if array == 1 { leaf.mask_bytes() } else { leaf.value_bytes() }))
+                .collect();
+            let mut left = slices.as_mut_slice();
+            while !left.is_empty() {
+                let written = file.write_vectored(left)?;
+                IoSlice::advance_slices(&mut left, written);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Opens a parcel; none when it is incomplete or contradicts itself.
+pub(in crate::vdb) fn unpack(parcel: &Mapping, threads: usize) -> Option<Contents> {
+    let mut start = Cursor(parcel);
+    (start.take(8)? == MAGIC).then_some(())?;
+    let length = usize::try_from(start.number()?).ok()?;
+    let mut head = Cursor(start.take(length)?);
+    let mut at = 16 + length;
+    let kind = head.number()?;
+    if kind == 0 {
+        return Some(Contents::Refusal(head.text()?));
+    }
+    if kind == 3 {
+        let (points, skipped) = parcel_points::read(&mut head, parcel, at)?;
+        return Some(Contents::Points(points, skipped));
+    }
+    let count = head.number()?;
+    match kind {
+        1 => Some(Contents::Infos((0..count).map(|_| head.info()).collect::<Option<_>>()?)),
+        2 => {
+            let grids = (0..count).map(|_| grid(&mut head, parcel, &mut at, threads));
+            Some(Contents::Grids(grids.collect::<Option<_>>()?))
+        }
+        _ => None,
+    }
+}
+
+/// Builds a grid: a copy for each leaf, nothing more.
+fn grid(head: &mut Cursor<'_>, parcel: &[u8], at: &mut usize, threads: usize) -> Option<AnyGrid> {
+    let call = ffi::Call { threads: threads as i32, cancel: 0 };
+    let is_vectors = head.number()? != 0;
+    let own = head.bytes()?;
+    let mut component = || Some(f32::from_bits(head.number()? as u32));
+    let background = [component()?, component()?, component()?];
+    let tiles = (0..head.number()?).map(|_| head.tile()).collect::<Option<Vec<_>>>()?;
+    let count = usize::try_from(head.number()?).ok()?;
+    if is_vectors {
+        let Arrays { origins, values, masks } = arrays::<Vectors>(parcel, at, count)?;
+        let mut inner = ffi::assemble_vectors(own, background, &tiles).ok()?;
+        let constants = vec![0.0; 3 * count];
+        let mut blocks = ffi::make_vector_blocks(&call, &origins, &values, &masks, &constants).ok()?;
+        ffi::put_vector_blocks(inner.pin_mut(), blocks.pin_mut()).ok()?;
+        return Some(AnyGrid::Vectors(VectorGrid { inner }));
+    }
+    let Arrays { origins, values, masks } = arrays::<Values>(parcel, at, count)?;
+    let mut inner = ffi::assemble(own, background[0], &tiles).ok()?;
+    let mut blocks = ffi::make_blocks(&call, &origins, &values, &masks, &vec![0.0; count]).ok()?;
+    ffi::put_blocks(inner.pin_mut(), blocks.pin_mut()).ok()?;
+    Some(AnyGrid::Floats(FloatGrid { inner }))
+}
+
+/// Where the leaves of a grid lie.
+struct Arrays {
+    origins: Vec<i32>,
+    /// Addresses.
+    values: Vec<usize>,
+    masks: Vec<usize>,
+}
+
+/// The arrays of so many leaves, from an offset in the parcel; the offset moves past them.
+fn arrays<V>(parcel: &[u8], at: &mut usize, count: usize) -> Option<Arrays> {
+    let sizes = sizes::<V>();
+    let mut arrays = [&parcel[..0]; 3];
+    for (array, size) in arrays.iter_mut().zip(sizes) {
+        let begin = at.next_multiple_of(ALIGN);
+        *at = begin.checked_add(size.checked_mul(count)?)?;
+        *array = parcel.get(begin..*at)?;
+    }
+    let [origins, masks, values] = arrays;
+    let whole = |four: &[u8]| i32::from_ne_bytes([four[0], four[1], four[2], four[3]]);
+    let origins: Vec<i32> = origins.chunks_exact(4).map(whole).collect();
+    origins.iter().all(|place| place % 8 == 0).then_some(())?;
+    let addresses = |array: &[u8], size: usize| -> Vec<usize> {
+        (0..count).map(|leaf| array.as_ptr() as usize + leaf * size).collect()
+    };
+    Some(Arrays { origins, values: addresses(values, sizes[2]), masks: addresses(masks, sizes[1]) })
+}
+
+/// Builds a head.
+#[derive(Default)]
+pub(in crate::vdb) struct Head(Vec<u8>);
+
+impl Head {
+    pub(in crate::vdb) fn number(&mut self, number: u64) {
+        self.0.extend(number.to_ne_bytes());
+    }
+
+    pub(in crate::vdb) fn bytes(&mut self, bytes: &[u8]) {
+        self.number(bytes.len() as u64);
+        self.0.extend(bytes);
+    }
+
+    pub(in crate::vdb) fn text(&mut self, text: &str) {
+        self.bytes(text.as_bytes());
+    }
+
+    fn option(&mut self, number: Option<u64>) {
+        self.number(number.is_some().into());
+        self.number(number.unwrap_or(0));
+    }
+
+    fn info(&mut self, info: &GridInfo) {
+        let words = [&info.name, &info.value_type, &info.class, &info.compression];
+        words.iter().for_each(|text| self.text(text));
+        self.number(info.voxel.to_bits());
+        self.option(info.active_voxels);
+        self.option(info.memory);
+        self.number(info.half.into());
+        self.number(info.bbox.is_some().into());
+        let (low, high) = info.bbox.unwrap_or_default();
+        low.iter().chain(&high).for_each(|&place| self.number(place as u64));
+        self.number(info.metadata.len() as u64);
+        for (key, value) in &info.metadata {
+            self.text(key);
+            let (kind, number, text, word) = match value {
+                MetaValue::Text(text) => (0, 0, text.as_str(), ""),
+                MetaValue::Float(value) => (1, value.to_bits().into(), "", ""),
+                MetaValue::Double(value) => (2, value.to_bits(), "", ""),
+                MetaValue::Int(value) => (3, *value as u64, "", ""),
+                MetaValue::Bool(value) => (4, u64::from(*value), "", ""),
+                MetaValue::Other(word, text) => (5, 0, text.as_str(), word.as_str()),
+            };
+            self.number(kind);
+            self.number(number);
+            self.text(text);
+            self.text(word);
+        }
+    }
+
+    fn grid(&mut self, grid: &AnyGrid, leaves: usize) -> Result<(), cxx::Exception> {
+        let (own, background, tiles) = match grid {
+            AnyGrid::Floats(grid) => {
+                let background = [grid.background(), 0.0, 0.0];
+                (ffi::grid_head(&grid.inner)?, background, ffi::tiles(&grid.inner)?)
+            }
+            AnyGrid::Vectors(grid) => {
+                (ffi::vector_head(&grid.inner)?, grid.background(), ffi::vector_tiles(&grid.inner)?)
+            }
+        };
+        self.number(matches!(grid, AnyGrid::Vectors(_)).into());
+        self.bytes(own.as_bytes());
+        background.iter().for_each(|component| self.number(component.to_bits().into()));
+        self.number(tiles.len() as u64);
+        for tile in tiles {
+            let [x, y, z] = [tile.x, tile.y, tile.z].map(|place| place as u32);
+            let [a, b, c] = tile.value.map(f32::to_bits);
+            let words = [x, y, z, tile.level, tile.active.into(), a, b, c];
+            self.0.extend(words.iter().flat_map(|word| word.to_ne_bytes()));
+        }
+        self.number(leaves as u64);
+        Ok(())
+    }
+}
+
+/// The rest of a head.
+pub(in crate::vdb) struct Cursor<'a>(&'a [u8]);
+
+impl<'a> Cursor<'a> {
+    fn take(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(count)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    pub(in crate::vdb) fn number(&mut self) -> Option<u64> {
+        Some(u64::from_ne_bytes(self.take(8)?.try_into().ok()?))
+    }
+
+    pub(in crate::vdb) fn bytes(&mut self) -> Option<&'a [u8]> {
+        let length = usize::try_from(self.number()?).ok()?;
+        self.take(length)
+    }
+
+    pub(in crate::vdb) fn text(&mut self) -> Option<String> {
+        Some(String::from_utf8_lossy(self.bytes()?).into_owned())
+    }
+
+    fn option(&mut self) -> Option<Option<u64>> {
+        let (is_there, number) = (self.number()?, self.number()?);
+        Some((is_there != 0).then_some(number))
+    }
+
+    fn tile(&mut self) -> Option<ffi::Tile> {
+        let mut word = || Some(u32::from_ne_bytes(self.take(4)?.try_into().ok()?));
+        let [x, y, z, level, active] = [word()?, word()?, word()?, word()?, word()?];
+        let value = [word()?, word()?, word()?].map(f32::from_bits);
+        let [x, y, z] = [x, y, z].map(|place| place as i32);
+        let known = (1..=3).contains(&level);
+        known.then_some(ffi::Tile { x, y, z, level, active: active != 0, value })
+    }
+
+    fn info(&mut self) -> Option<GridInfo> {
+        let [name, value_type, class, compression] = [self.text()?, self.text()?, self.text()?, self.text()?];
+        let voxel = f64::from_bits(self.number()?);
+        let (active_voxels, memory) = (self.option()?, self.option()?);
+        let half = self.number()? != 0;
+        let has_box = self.number()? != 0;
+        let mut place = || Some(self.number()? as i32);
+        let (low, high) = ([place()?, place()?, place()?], [place()?, place()?, place()?]);
+        let metadata = (0..self.number()?).map(|_| self.meta()).collect::<Option<_>>()?;
+        let bbox = has_box.then_some((low, high));
+        Some(GridInfo {
+            name,
+            value_type,
+            class,
+            voxel,
+            active_voxels,
+            bbox,
+            memory,
+            half,
+            compression,
+            metadata,
+        })
+    }
+
+    fn meta(&mut self) -> Option<(String, MetaValue)> {
+        let key = self.text()?;
+        let (kind, number, text, word) = (self.number()?, self.number()?, self.text()?, self.text()?);
+        let value = match kind {
+            0 => MetaValue::Text(text),
+            1 => MetaValue::Float(f32::from_bits(number as u32)),
+            2 => MetaValue::Double(f64::from_bits(number)),
+            3 => MetaValue::Int(number as i64),
+            4 => MetaValue::Bool(number != 0),
+            5 => MetaValue::Other(word, text),
+            _ => return None,
+        };
+        Some((key, value))
+    }
+}
