@@ -115,6 +115,9 @@ fn displaced(liquid: &Shallow) -> (TriMesh, Vec<f32>) {
             mesh.triangles.extend([[a, b, c], [a, c, d]]);
         }
     }
-    mesh.positions.iter_mut().filter(|place| !place.y.is_finite()).for_each(|place| place.y = 0.0);
+    mesh.positions
+        .iter_mut()
+        .filter(|position| !position.y.is_finite())
+        .for_each(|position| position.y = 0.0);
     (mesh, opacities)
 }

@@ -68,7 +68,11 @@ fn main() -> frazil::Result<()> {
             step.cells().write(&folder.join("cells.ply"))?;
             step.after(false).write(&folder.join("cut.ply"))?;
             step.after(true).write(&folder.join("made.ply"))?;
-            return particles::write(&folder.join("liquid.bgeo"), &Points::at(SPACING, &to.places)?, false);
+            return particles::write(
+                &folder.join("liquid.bgeo"),
+                &Points::at(SPACING, &to.positions)?,
+                false,
+            );
         }
         from = to;
     }
@@ -164,8 +168,8 @@ fn cells_of([a, b, c]: [DVec3; 3]) -> Vec<[i32; 3]> {
     let pairs = (0..PARTS).flat_map(|i| (0..PARTS - i).map(move |j| [i, j]));
     let cell = |pair: [usize; 2]| {
         let [u, v] = pair.map(share);
-        let place = (a * u + b * v + c * (1.0 - u - v)) / CELL;
-        [0, 1, 2].map(|axis| place[axis].floor() as i32)
+        let position = (a * u + b * v + c * (1.0 - u - v)) / CELL;
+        [0, 1, 2].map(|axis| position[axis].floor() as i32)
     };
     pairs.map(cell).collect()
 }
@@ -195,8 +199,8 @@ impl Drawing {
     fn write(mut self, path: &Path) -> frazil::Result<()> {
         // A picture's colours go from the least number to the greatest: a triangle without a size has 0 and 1.
         let first = self.mesh.positions.len() as u32;
-        let place = self.mesh.positions.first().copied().unwrap_or_default();
-        self.mesh.positions.extend([place; 3]);
+        let position = self.mesh.positions.first().copied().unwrap_or_default();
+        self.mesh.positions.extend([position; 3]);
         self.mesh.triangles.push([first, first + 1, first + 2]);
         self.stage.extend([0.0, 1.0, 1.0]);
         let stage =
@@ -215,15 +219,15 @@ fn ball() -> Vec<DVec3> {
         0.2 * ((state >> 40) as f64 / (1u64 << 24) as f64 - 0.5)
     };
     let on = || -7..7;
-    let mut places = Vec::new();
+    let mut positions = Vec::new();
     for [x, y, z] in on().flat_map(|x| on().flat_map(move |y| on().map(move |z| [x, y, z]))) {
-        let place = DVec3::new(f64::from(x), f64::from(y), f64::from(z)) + DVec3::repeat(0.5);
-        let moved = place + DVec3::new(off(), off(), off());
-        if place.norm() < RADIUS {
-            places.push(moved);
+        let position = DVec3::new(f64::from(x), f64::from(y), f64::from(z)) + DVec3::repeat(0.5);
+        let moved = position + DVec3::new(off(), off(), off());
+        if position.norm() < RADIUS {
+            positions.push(moved);
         }
     }
-    places
+    positions
 }
 
 /// The middle of the ball on a side, -1 or 1, at a frame (spacings).
@@ -233,20 +237,20 @@ fn middle(side: f64, frame: i32) -> DVec3 {
 
 /// The particles of both balls at a frame, by whose ids each is the same in all of them.
 fn liquid(ball: &[DVec3], frame: i32) -> Particles {
-    let half = |side: f64| ball.iter().map(move |place| (place + middle(side, frame)) * SPACING);
-    let places: Vec<DVec3> = half(-1.0).chain(half(1.0)).collect();
-    Particles { ids: (0..places.len() as i64).collect(), velocities: Vec::new(), places }
+    let half = |side: f64| ball.iter().map(move |position| (position + middle(side, frame)) * SPACING);
+    let positions: Vec<DVec3> = half(-1.0).chain(half(1.0)).collect();
+    Particles { ids: (0..positions.len() as i64).collect(), velocities: Vec::new(), positions }
 }
 
 /// The mesh at frame 0: around each ball a sphere with ripples.
 fn first_mesh() -> TriMesh {
     let (directions, triangles) = sphere(4);
     let half = |side: f64| {
-        let place = |way: &DVec3| {
+        let position = |way: &DVec3| {
             let wave = libm::sin(9.0 * way.x) * libm::sin(9.0 * way.y) * libm::sin(9.0 * way.z);
             ((way * (RADIUS + 0.35 * wave) + middle(side, 0)) * SPACING).cast::<f32>()
         };
-        TriMesh { positions: directions.iter().map(place).collect(), triangles: triangles.clone() }
+        TriMesh { positions: directions.iter().map(position).collect(), triangles: triangles.clone() }
     };
     let mut both = half(-1.0);
     both.append(&half(1.0));
@@ -255,7 +259,7 @@ fn first_mesh() -> TriMesh {
 
 /// Directions and triangles of a sphere: an octahedron whose triangles are divided in four, so often.
 fn sphere(times: usize) -> (Vec<DVec3>, Vec<[u32; 3]>) {
-    let mut places = vec![DVec3::x(), -DVec3::x(), DVec3::y(), -DVec3::y(), DVec3::z(), -DVec3::z()];
+    let mut positions = vec![DVec3::x(), -DVec3::x(), DVec3::y(), -DVec3::y(), DVec3::z(), -DVec3::z()];
     let mut triangles: Vec<[u32; 3]> =
         vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
     for _ in 0..times {
@@ -264,13 +268,13 @@ fn sphere(times: usize) -> (Vec<DVec3>, Vec<[u32; 3]>) {
         for [a, b, c] in triangles {
             let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[i, j]| {
                 *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
-                    places.push((places[i as usize] + places[j as usize]).normalize());
-                    places.len() as u32 - 1
+                    positions.push((positions[i as usize] + positions[j as usize]).normalize());
+                    positions.len() as u32 - 1
                 })
             });
             finer.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
         }
         triangles = finer;
     }
-    (places, triangles)
+    (positions, triangles)
 }

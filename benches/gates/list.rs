@@ -318,7 +318,7 @@ pub const GATES: &[Gate] = &[
     none("surface.repair_fuzz", "meshes"),
     yes("surface.cubes_fit"),
     // A mesh that is rebuilt where liquid merges and splits: frames in which it is no closed surface, or in which a sliver was made; how
-    // deep places are that it surrounds neither once nor never, and their share of its volume.
+    // deep positions are that it surrounds neither once nor never, and their share of its volume.
     none("surface.rebuilt_valid", "frames"),
     gate("surface.rebuilt_winding_depth", "cells", Most(1.0), Open),
     gate("surface.rebuilt_winding_volume", "1", Most(1.0e-4), Open),
@@ -400,7 +400,7 @@ pub const GATES: &[Gate] = &[
     gate("shallow.delivery", "1", Most(1.0e-3), Most(1.0e-5)),
     // A basin that runs empty through a hole, against Torricelli's law.
     gate("shallow.orifice", "%", Most(2.0), Most(0.5)),
-    // A current down a slope (Huppert 1982): how far its exponent is from 1/3, and its front from its place.
+    // A current down a slope (Huppert 1982): how far its exponent is from 1/3, and its front from its position.
     gate("shallow.huppert_exponent", "1", Most(0.015), Most(0.008)),
     gate("shallow.huppert_exponent_coarse", "1", Open, Open),
     gate("shallow.huppert_front", "%", Most(5.0), Most(3.0)),

@@ -110,15 +110,15 @@ impl Set<'_> {
 /// them; flagged within 7 of the gap.
 fn balls(scale: i32) -> Vec<Node> {
     let cell = 1.0 / f64::from(scale);
-    let node = |place: [i32; 3]| {
-        let at = DVec3::from(place.map(f64::from)) * cell;
+    let node = |position: [i32; 3]| {
+        let at = DVec3::from(position.map(f64::from)) * cell;
         let ball = |side: f64| (at - DVec3::new(side * 8.75, 0.0, 0.0)).norm() - 8.0;
         let (a, b) = (ball(-1.0), ball(1.0));
         // Smooth minimum.
         let near = (6.0 - (a - b).abs()).max(0.0) / 6.0;
         let (phi, gamma) = ((a.min(b) - near * near * 1.5) / cell, a.min(b) / cell);
         let is_flagged = at.norm() <= 7.0;
-        Node { place, gamma: gamma.clamp(-4.0, 4.0) as f32, phi: phi.clamp(-5.0, 5.0) as f32, is_flagged }
+        Node { position, gamma: gamma.clamp(-4.0, 4.0) as f32, phi: phi.clamp(-5.0, 5.0) as f32, is_flagged }
     };
     let on = |axis: usize| -HALF[axis] * scale..=HALF[axis] * scale;
     on(0).flat_map(|x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z]))).map(node).collect()

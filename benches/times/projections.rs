@@ -10,14 +10,14 @@ use rayon::prelude::*;
 /// A vertex that advection carried.
 pub struct Vertex {
     /// Cells.
-    pub place: DVec3,
+    pub position: DVec3,
     /// Unit normal of the mesh.
     pub normal: DVec3,
     /// Distance from the surface that it is to have (cells), negative inside.
     pub delta: f64,
 }
 
-/// Where a vertex goes (cells); none where no such place is found.
+/// Where a vertex goes (cells); none where no such position is found.
 pub type Project = fn(&mut Sampler<'_>, &Vertex) -> Option<DVec3>;
 
 /// The ways, with their names.
@@ -33,32 +33,32 @@ const ARRIVED: f64 = 0.005;
 const STEPS: usize = 64;
 
 fn by_foot(sampler: &mut Sampler<'_>, vertex: &Vertex) -> Option<DVec3> {
-    foot(sampler, vertex.place).map(|foot| foot.at(vertex.delta))
+    foot(sampler, vertex.position).map(|foot| foot.at(vertex.delta))
 }
 
 fn by_gradient(sampler: &mut Sampler<'_>, vertex: &Vertex) -> Option<DVec3> {
-    let (phi, slope) = sampler.at(vertex.place)?;
+    let (phi, slope) = sampler.at(vertex.position)?;
     let unit = DVec3::from(slope.map(f64::from)).try_normalize(1e-3)?;
-    Some(vertex.place - unit * (f64::from(phi) - vertex.delta))
+    Some(vertex.position - unit * (f64::from(phi) - vertex.delta))
 }
 
-/// The nearer of the places outward and inward.
+/// The nearer of the positions outward and inward.
 fn by_normal(sampler: &mut Sampler<'_>, vertex: &Vertex) -> Option<DVec3> {
     let ways = [vertex.normal, -vertex.normal].map(|way| march(sampler, vertex, way).map(|far| way * far));
     let nearest = ways.into_iter().flatten().min_by(|a, b| a.norm().total_cmp(&b.norm()));
-    nearest.map(|way| vertex.place + way)
+    nearest.map(|way| vertex.position + way)
 }
 
 fn onto_surface(sampler: &mut Sampler<'_>, vertex: &Vertex) -> Option<DVec3> {
     by_normal(sampler, &Vertex { delta: 0.0, ..*vertex })
 }
 
-/// How far along a way (cells) the surface is as far away as it is to be. No step passes such a place: a distance changes by no
+/// How far along a way (cells) the surface is as far away as it is to be. No step passes such a position: a distance changes by no
 /// more than one moves.
 fn march(sampler: &mut Sampler<'_>, vertex: &Vertex, way: DVec3) -> Option<f64> {
     let mut far = 0.0;
     for _ in 0..STEPS {
-        let (phi, _) = sampler.at(vertex.place + way * far)?;
+        let (phi, _) = sampler.at(vertex.position + way * far)?;
         let left = (f64::from(phi) - vertex.delta).abs();
         if left < ARRIVED {
             return Some(far);
@@ -68,18 +68,19 @@ fn march(sampler: &mut Sampler<'_>, vertex: &Vertex, way: DVec3) -> Option<f64> 
     None
 }
 
-/// The distance (m) of each place from the surface; NaN where it is too far to have one.
-pub fn measured(distances: &Distances, places: &[DVec3]) -> Vec<f64> {
+/// The distance (m) of each position from the surface; NaN where it is too far to have one.
+pub fn measured(distances: &Distances, positions: &[DVec3]) -> Vec<f64> {
     let mut sampler = Sampler::new(distances);
     let cell = distances.cell();
-    let one = |place: &DVec3| foot(&mut sampler, place / cell).map_or(f64::NAN, |foot| foot.distance * cell);
-    places.iter().map(one).collect()
+    let one =
+        |position: &DVec3| foot(&mut sampler, position / cell).map_or(f64::NAN, |foot| foot.distance * cell);
+    positions.iter().map(one).collect()
 }
 
 /// A mesh that follows particles, projected in one of the ways.
 pub struct Follower {
     project: Project,
-    /// With the triangles, and the places that advection gave last (m).
+    /// With the triangles, and the positions that advection gave last (m).
     mesh: TriMesh,
     /// m.
     pub vertices: Vec<DVec3>,
@@ -94,7 +95,7 @@ pub struct Follower {
 }
 
 impl Follower {
-    /// Vertices at places (m) that keep distances `delta` (m).
+    /// Vertices at positions (m) that keep distances `delta` (m).
     pub fn new(project: Project, mesh: &TriMesh, vertices: Vec<DVec3>, delta: Vec<f64>) -> Self {
         let is_placed = vec![true; vertices.len()];
         Self { project, mesh: mesh.clone(), vertices, delta, is_placed, missed: 0, turned_over: 0 }
@@ -110,12 +111,12 @@ impl Follower {
         distances: &Distances,
     ) {
         let there = carried(ctx, &self.vertices, from, to, dt, params).expect("a step");
-        self.mesh.positions = there.iter().map(|place| place.cast()).collect();
+        self.mesh.positions = there.iter().map(|position| position.cast()).collect();
         let normals = self.mesh.normals();
         let (project, cell, most) = (self.project, distances.cell(), params.change * params.spacing);
         let one = |sampler: &mut Sampler<'_>, n: usize| {
-            let (place, delta) = (there[n] / cell, self.delta[n] / cell);
-            let to = project(sampler, &Vertex { place, normal: normals[n].cast(), delta })? * cell;
+            let (position, delta) = (there[n] / cell, self.delta[n] / cell);
+            let to = project(sampler, &Vertex { position, normal: normals[n].cast(), delta })? * cell;
             ((to - there[n]).norm() <= most).then_some(to)
         };
         let all = (0..there.len()).into_par_iter().with_min_len(1024);
@@ -132,8 +133,8 @@ impl Follower {
 
 /// How many triangles look the other way than before.
 fn turned_over(triangles: &[[u32; 3]], before: &[DVec3], after: &[DVec3]) -> usize {
-    let normal = |places: &[DVec3], corners: [u32; 3]| {
-        let [a, b, c] = corners.map(|vertex| places[vertex as usize]);
+    let normal = |positions: &[DVec3], corners: [u32; 3]| {
+        let [a, b, c] = corners.map(|vertex| positions[vertex as usize]);
         (b - a).cross(&(c - a))
     };
     triangles.iter().filter(|corners| normal(before, **corners).dot(&normal(after, **corners)) < 0.0).count()

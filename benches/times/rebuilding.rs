@@ -147,7 +147,7 @@ fn cells(ctx: &Context, scene: &Sequence, steps: usize) {
              connected parts, its first triangles that are left, its volume over that of r / 4, and how far from it the vertices \
              of r / 4 are.",
             scene.name,
-            scene.at(0).places.len(),
+            scene.at(0).positions.len(),
             scene.mesh.triangles.len()
         ),
         "cell | by | matching | topology and meshing | frames matched | triangles | parts | first triangles left | volume | \
@@ -192,7 +192,7 @@ fn flagged_only(ctx: &Context, scene: &Sequence, runs: &[Run; 2]) {
         "mesh | s a frame | triangles | flagged vertices | crossings | parts | volume | \
          from the particles' surface: mean, p95, max (r)",
     );
-    let own = own_surface(ctx, &runs[0].particles.places, scene.spacing);
+    let own = own_surface(ctx, &runs[0].particles.positions, scene.spacing);
     for (name, run) in ["flagged only", "rebuilt"].into_iter().zip(runs) {
         let mesh = run.tracker.mesh();
         let faults = Faults::of(&mesh);
@@ -231,7 +231,7 @@ fn shares<'a>(runs: impl Iterator<Item = (&'a str, &'a Run)>) {
         println!(
             "| {name}, {} frames | frazil | {} | {} | {:.0} % |{each} {:.3} |",
             run.steps,
-            run.particles.places.len(),
+            run.particles.positions.len(),
             run.tracker.triangles().len(),
             run.share_matched(),
             run.whole / run.steps as f64

@@ -81,7 +81,7 @@ fn phases(name: &str, ball: &Ball, thesis: Option<(usize, usize, [f64; 4])>, ste
     for threads in [1, cores].into_iter().take(cores.min(2)) {
         let times = phase_times(threads, ball, Params::for_spacing(ball.spacing), steps);
         let who = format!("frazil, {threads} thread{}", if threads > 1 { "s" } else { "" });
-        row(&who, ball.places.len(), ball.mesh.triangles.len(), times);
+        row(&who, ball.positions.len(), ball.mesh.triangles.len(), times);
     }
 }
 
@@ -96,7 +96,7 @@ fn of_cache(mesh: &TriMesh, frames: &[Particles], cores: usize) {
         let reports: Vec<_> = frames[..FIRST].windows(2).map(step).collect();
         let times = PHASES.map(|phase| median(reports.iter().map(|report| time(report, phase)).collect()));
         let each = times.map(|time| format!("{time:.3}")).join(" | ");
-        let (particles, triangles) = (frames[0].places.len(), mesh.triangles.len());
+        let (particles, triangles) = (frames[0].positions.len(), mesh.triangles.len());
         let (who, sum) = (format!("frazil, {threads} thread(s)"), times.iter().sum::<f64>());
         println!("| spot_drop | {particles} | {triangles} | {who} | {each} | {sum:.2} |");
     }
@@ -145,21 +145,21 @@ fn weightings(cores: usize, spot: &[Particles]) {
 fn left_out(ctx: &Context, frames: &[Particles], weighting: Weighting) -> [f64; 3] {
     let params = Params { weighting, ..Params::for_spacing(spot::SPACING) };
     let others: Vec<Particles> = frames.iter().map(|frame| part(frame, |id| id % 10 != 0)).collect();
-    let Particles { ids, mut places, .. } = part(&frames[0], |id| id % 10 == 0);
+    let Particles { ids, mut positions, .. } = part(&frames[0], |id| id % 10 == 0);
     for pair in others.windows(2) {
-        places = carried(ctx, &places, &pair[0], &pair[1], 1.0 / spot::FPS, &params).expect("a step");
+        positions = carried(ctx, &positions, &pair[0], &pair[1], 1.0 / spot::FPS, &params).expect("a step");
     }
     let last = part(&frames[frames.len() - 1], |id| id % 10 == 0);
-    let there: HashMap<i64, DVec3> = last.ids.into_iter().zip(last.places).collect();
-    let off = |(id, place): (&i64, &DVec3)| Some((there.get(id)? - place).norm() / spot::SPACING);
-    spread(ids.iter().zip(&places).filter_map(off).collect())
+    let there: HashMap<i64, DVec3> = last.ids.into_iter().zip(last.positions).collect();
+    let off = |(id, position): (&i64, &DVec3)| Some((there.get(id)? - position).norm() / spot::SPACING);
+    spread(ids.iter().zip(&positions).filter_map(off).collect())
 }
 
 /// The particles whose id is wanted.
 fn part(frame: &Particles, is_wanted: fn(i64) -> bool) -> Particles {
-    let rows = frame.ids.iter().zip(&frame.places).filter(|(id, _)| is_wanted(**id));
-    let (ids, places) = rows.map(|(id, place)| (*id, *place)).unzip();
-    Particles { ids, places, velocities: Vec::new() }
+    let rows = frame.ids.iter().zip(&frame.positions).filter(|(id, _)| is_wanted(**id));
+    let (ids, positions) = rows.map(|(id, position)| (*id, *position)).unzip();
+    Particles { ids, positions, velocities: Vec::new() }
 }
 
 /// Cells of r beside those of r / 2.
@@ -203,7 +203,7 @@ fn tracked(ctx: &Context, frames: &[Particles], cell: f64) -> String {
 
 /// The surface of particles of a spacing (m), on cells finer than those that meshes follow it on.
 fn truth(ctx: &Context, particles: &Particles, spacing: f64) -> TriMesh {
-    let phi = Implicit::new(ctx, &particles.places, spacing, 0.25 * spacing).expect("a surface");
+    let phi = Implicit::new(ctx, &particles.positions, spacing, 0.25 * spacing).expect("a surface");
     Isosurface::new(&phi).mesh(&phi)
 }
 
@@ -215,9 +215,9 @@ fn off_distance(
     delta: &[f64],
     kept: &[bool],
 ) -> [f64; 3] {
-    let places: Vec<Vec3> = vertices.iter().map(|place| place.cast()).collect();
-    let found = distances(surface, &places, 0.25 * spacing);
-    let known = (0..places.len()).filter(|vertex| kept[*vertex] && !delta[*vertex].is_nan());
+    let positions: Vec<Vec3> = vertices.iter().map(|position| position.cast()).collect();
+    let found = distances(surface, &positions, 0.25 * spacing);
+    let known = (0..positions.len()).filter(|vertex| kept[*vertex] && !delta[*vertex].is_nan());
     spread(known.map(|vertex| (found[vertex] - delta[vertex].abs()).abs() / spacing).collect())
 }
 
@@ -227,7 +227,7 @@ struct Set<'a> {
     spacing: f64,
     mesh: TriMesh,
     frames: &'a [Particles],
-    /// How far the mesh lies beside its place at the first frame, when its distances are known (m).
+    /// How far the mesh lies beside its position at the first frame, when its distances are known (m).
     aside: DVec3,
     /// Where vertices should be at the last frame, if that is known.
     image: Option<fn(DVec3, usize) -> DVec3>,
@@ -252,7 +252,7 @@ fn projections(cores: usize, spot: &[Particles]) {
          not projected (% of vertices and frames) | triangles turned over, in all frames",
     );
     let ball = rippled();
-    let at = |frame| numbered(ball.places.iter().map(|place| once_around(*place, frame)).collect());
+    let at = |frame| numbered(ball.positions.iter().map(|position| once_around(*position, frame)).collect());
     let frames: Vec<Particles> = (0..=50).map(at).collect();
     let rest = [frames[0].clone(), frames[0].clone()];
     compare(cores, &Set { image: Some(once_around), ..Set::of(&ball, "ball, turns", &frames) });
@@ -265,16 +265,16 @@ fn projections(cores: usize, spot: &[Particles]) {
     }
 }
 
-/// A ball whose mesh has one vertex at each place, and ripples short enough for normals that do not lead to the surface.
+/// A ball whose mesh has one vertex at each position, and ripples short enough for normals that do not lead to the surface.
 fn rippled() -> Ball {
     let mut out = ball(10.0, 60, 0.0);
     let size = 10.0 * out.spacing;
-    for place in &mut out.mesh.positions {
-        let unit = place.cast::<f64>().normalize();
+    for position in &mut out.mesh.positions {
+        let unit = position.cast::<f64>().normalize();
         let wave = (20.0 * unit.x).sin() * (20.0 * unit.y).sin() * (20.0 * unit.z).sin();
-        *place = (unit * (size + 0.25 * wave * out.spacing)).cast();
+        *position = (unit * (size + 0.25 * wave * out.spacing)).cast();
     }
-    let firsts = coincident(out.mesh.positions.iter().map(|place| place.cast()));
+    let firsts = coincident(out.mesh.positions.iter().map(|position| position.cast()));
     for vertex in out.mesh.triangles.as_flattened_mut() {
         *vertex = firsts[*vertex as usize];
     }
@@ -285,16 +285,16 @@ fn rippled() -> Ball {
 /// Distances from the particles' surface, on cells of r / 2.
 fn signed(ctx: &Context, particles: &Particles, params: Params) -> Distances {
     let cell = params.cell * params.spacing;
-    let phi = Implicit::new(ctx, &particles.places, params.spacing, cell).expect("a surface");
+    let phi = Implicit::new(ctx, &particles.positions, params.spacing, cell).expect("a surface");
     Distances::new(ctx, &phi, &Isosurface::new(&phi), (REACH / params.cell) as f32).expect("distances")
 }
 
 fn compare(cores: usize, set: &Set<'_>) {
     let ctx = context(cores);
     let params = Params::for_spacing(set.spacing);
-    let begin: Vec<DVec3> = set.mesh.positions.iter().map(|place| place.cast()).collect();
+    let begin: Vec<DVec3> = set.mesh.positions.iter().map(|position| position.cast()).collect();
     let delta = measured(&signed(&ctx, &set.frames[0], params), &begin);
-    let aside: Vec<DVec3> = begin.iter().map(|place| place + set.aside).collect();
+    let aside: Vec<DVec3> = begin.iter().map(|position| position + set.aside).collect();
     let mut followers =
         WAYS.map(|(_, project)| Follower::new(project, &set.mesh, aside.clone(), delta.clone()));
     for pair in set.frames.windows(2) {
@@ -308,7 +308,7 @@ fn compare(cores: usize, set: &Set<'_>) {
     for ((name, _), follower) in WAYS.iter().zip(&followers) {
         let image = set.image.map_or("-".to_string(), |image| {
             let pairs = follower.vertices.iter().zip(&begin);
-            let off = pairs.map(|(vertex, place)| (vertex - image(*place, steps)).norm() / set.spacing);
+            let off = pairs.map(|(vertex, position)| (vertex - image(*position, steps)).norm() / set.spacing);
             text(spread(off.collect()))
         });
         let Follower { vertices, delta, is_placed, missed, turned_over, .. } = follower;

@@ -167,7 +167,7 @@ pub fn check_output(path: &Path) -> Result<(), Failure> {
 pub struct Losses<'a> {
     /// File or pattern.
     pub output: &'a Path,
-    /// Whether places stay what they are.
+    /// Whether positions stay what they are.
     pub keeps_space: bool,
     /// Whether the input is a sequence whose meshes all get the triangles of the first.
     pub is_sequence: bool,
@@ -387,7 +387,7 @@ impl Args {
         Ok(arrays)
     }
 
-    /// Whether places stay what they are.
+    /// Whether positions stay what they are.
     fn keeps_space(&self) -> bool {
         self.space.space().keeps_vectors() && self.to_scale == 1.0 && self.to_up == Axis::Y
     }

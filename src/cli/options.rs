@@ -84,15 +84,15 @@ pub fn warn_if_far(path: &Path, mesh: &TriMesh) {
 
 /// Brings vertices that are one corner to one position: once they are scaled, nothing says what rounding they have.
 pub fn join_corners(mesh: &mut TriMesh) {
-    let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
-    Weld::of(&places, &mesh.triangles).unify(&mut mesh.positions);
+    let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
+    Weld::of(&positions, &mesh.triangles).unify(&mut mesh.positions);
 }
 
 /// Warns of corners of a file's mesh that rounding does not decide.
 #[cfg(feature = "vdb")]
 pub fn warn_of_corners(path: &Path, mesh: &TriMesh) {
-    let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
-    if let Some(what) = Weld::of(&places, &mesh.triangles).warning() {
+    let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
+    if let Some(what) = Weld::of(&positions, &mesh.triangles).warning() {
         log::warn!("{}: {what}", path.display());
     }
 }

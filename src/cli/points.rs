@@ -132,20 +132,20 @@ impl Conversion<'_> {
                 format!("{}: several frames need a pattern such as grains.%04d.ply", self.output.display());
             return Err(Failure::refused(what));
         }
-        let place = |pattern: &Option<Pattern>, path: &Path, frame: i32| -> PathBuf {
+        let position = |pattern: &Option<Pattern>, path: &Path, frame: i32| -> PathBuf {
             pattern.as_ref().map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
         };
         output::check_writable(self.output).before()?;
         for frame in frames.iter() {
-            let from = place(&input, self.input, frame);
-            output::refuse_input(&place(&output, self.output, frame), [from.as_path()]).before()?;
+            let from = position(&input, self.input, frame);
+            output::refuse_input(&position(&output, self.output, frame), [from.as_path()]).before()?;
         }
         let (mut each, mut made, mut count) = (Each::default(), 0, 0);
         for frame in frames.iter() {
             session.ctx.check().during()?;
             let one = || {
-                let read = self.read(&place(&input, self.input, frame))?;
-                self.write(&place(&output, self.output, frame), frame, &read, session)?;
+                let read = self.read(&position(&input, self.input, frame))?;
+                self.write(&position(&output, self.output, frame), frame, &read, session)?;
                 Ok(read.points.count())
             };
             if let Some(points) = each.take(frame, one())? {

@@ -18,10 +18,10 @@ impl<T: Copy + Default + Send + Sync> Lists<T> {
         let mut start = vec![0u32; count + 1];
         parts.iter().flatten().for_each(|&(list, _)| start[list as usize + 1] += 1);
         (0..count).for_each(|list| start[list + 1] += start[list]);
-        let mut place = start.clone();
+        let mut position = start.clone();
         let mut items = vec![T::default(); start[count] as usize];
         for &(list, item) in parts.iter().flatten() {
-            let slot = &mut place[list as usize];
+            let slot = &mut position[list as usize];
             items[*slot as usize] = item;
             *slot += 1;
         }

@@ -66,7 +66,7 @@ impl Region {
     }
 
     /// The block with this index.
-    pub fn place(&self, index: usize) -> [i32; 3] {
+    pub fn position(&self, index: usize) -> [i32; 3] {
         let [_, ny, nz] = self.size();
         let at = [index / (ny * nz), index / nz % ny, index % nz];
         [0, 1, 2].map(|axis| self.low[axis] + at[axis] as i32)

@@ -13,33 +13,33 @@ pub struct Columns {
     /// The index of each column between them, or [`NONE`].
     indices: Vec<u32>,
     /// The column of each index.
-    places: Vec<[i32; 2]>,
+    positions: Vec<[i32; 2]>,
 }
 
 impl Columns {
     /// An empty set of columns from `low` to `high`.
     pub fn new(low: [i32; 2], high: [i32; 2]) -> Self {
         let size = [0, 1].map(|axis| (i64::from(high[axis]) - i64::from(low[axis]) + 1).max(0) as usize);
-        Self { low, high, indices: vec![NONE; size[0] * size[1]], places: Vec::new() }
+        Self { low, high, indices: vec![NONE; size[0] * size[1]], positions: Vec::new() }
     }
 
     /// Adds a column between `low` and `high`, unless it is in the set.
     pub fn add(&mut self, column: [i32; 2]) {
-        let place = self.place(column).expect("between the least and the greatest");
-        if self.indices[place] == NONE {
-            self.indices[place] = self.places.len() as u32;
-            self.places.push(column);
+        let position = self.position(column).expect("between the least and the greatest");
+        if self.indices[position] == NONE {
+            self.indices[position] = self.positions.len() as u32;
+            self.positions.push(column);
         }
     }
 
     /// Number of lines.
     pub fn lines(&self) -> usize {
-        self.places.len() * LINES
+        self.positions.len() * LINES
     }
 
     /// The index of the line with these coordinates (voxels).
     pub fn line(&self, [p, q]: [i32; 2]) -> Option<usize> {
-        let index = self.indices[self.place([p >> 3, q >> 3])?];
+        let index = self.indices[self.position([p >> 3, q >> 3])?];
         (index != NONE).then(|| index as usize * LINES + ((p & 7) << 3 | (q & 7)) as usize)
     }
 
@@ -52,11 +52,11 @@ impl Columns {
 
     /// The coordinates of a line.
     pub fn coordinates(&self, line: usize) -> [i32; 2] {
-        let ([p, q], inner) = (self.places[line / LINES], (line % LINES) as i32);
+        let ([p, q], inner) = (self.positions[line / LINES], (line % LINES) as i32);
         [p * 8 + (inner >> 3), q * 8 + (inner & 7)]
     }
 
-    fn place(&self, column: [i32; 2]) -> Option<usize> {
+    fn position(&self, column: [i32; 2]) -> Option<usize> {
         let within = (0..2).all(|axis| (self.low[axis]..=self.high[axis]).contains(&column[axis]));
         let [i, j, width] =
             [column[0] - self.low[0], column[1] - self.low[1], self.high[1] - self.low[1] + 1].map(i64::from);

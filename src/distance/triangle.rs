@@ -35,10 +35,11 @@ pub struct Triangle {
 impl Triangle {
     /// Prepares a fixed-point triangle relative to a block's corner (cells from the origin voxel).
     pub fn new(v: &[Fixed; 3], corner: [i32; 3]) -> Self {
-        let place = |p: &Fixed| [0, 1, 2].map(|axis| (p[axis] - corner[axis] * UNITS) as f32 / UNITS as f32);
+        let position =
+            |p: &Fixed| [0, 1, 2].map(|axis| (p[axis] - corner[axis] * UNITS) as f32 / UNITS as f32);
         // Integer differences are exact: the normal of a sliver keeps its direction.
         let n = cross(difference(v[1], v[0]), difference(v[2], v[0]));
-        Self::with_normal([place(&v[0]), place(&v[1]), place(&v[2])], n)
+        Self::with_normal([position(&v[0]), position(&v[1]), position(&v[2])], n)
     }
 
     /// Prepares a triangle with corners in cells from a block's corner.

@@ -175,7 +175,7 @@ pub fn passes_left(axis: Axis, a: Fixed, b: Fixed, [p, q]: [i32; 2]) -> bool {
     left_of(a, b, edge_function(a, b, line))
 }
 
-/// Calls `see` with each line through voxels that a face crosses: the line's coordinates, the place on its axis
+/// Calls `see` with each line through voxels that a face crosses: the line's coordinates, the position on its axis
 /// (cells; never exactly on a voxel), and the change of the winding number there in the direction of the axis.
 pub fn each_crossing(
     face: &Face,

@@ -1,4 +1,4 @@
-//! The air around the tiles: a flow whose cells are twice as wide, over the same place and some way around it, with another one
+//! The air around the tiles: a flow whose cells are twice as wide, over the same position and some way around it, with another one
 //! around it, and so on. It gives the tiles the pressure and the velocity at their border, as if the air went on: one tile of
 //! padding does.
 //!
@@ -59,7 +59,7 @@ pub fn restrict(fine: &Flow, wide: &mut Flow) {
     }
 }
 
-/// Place of a wide cell in a fine tile.
+/// Position of a wide cell in a fine tile.
 fn part(index: usize) -> [usize; 3] {
     [index / (PART * PART), index / PART % PART, index % PART]
 }
@@ -96,7 +96,7 @@ pub struct Reader<'a> {
 /// Wide cells on an axis that the interpolation of a fine tile reads: those that it covers and one on each side.
 const READ: usize = PART + 2;
 
-/// For each of eight fine places on an axis: the first of the two wide cells read, counted from the first of [`READ`], and the
+/// For each of eight fine positions on an axis: the first of the two wide cells read, counted from the first of [`READ`], and the
 /// weight of the second.
 type Weights = [(usize, f32); 8];
 
@@ -110,7 +110,7 @@ fn weights(is_centre: bool) -> Weights {
 }
 
 impl Reader<'_> {
-    /// Interpolates at the places of a fine tile's values.
+    /// Interpolates at the positions of a fine tile's values.
     pub fn read(&self, window: &mut Window, coord: Coord) -> Tile {
         let parent = coord.map(|x| x.div_euclid(WIDER));
         let mut out = [self.outside; 512];

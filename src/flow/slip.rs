@@ -80,7 +80,7 @@ pub fn extend(tiles: &Tiles, operator: &Operator, solids: &Solids, velocity: &mu
     }
 }
 
-/// The places of bits that are set.
+/// The positions of bits that are set.
 fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let at = (mask != 0).then(|| mask.trailing_zeros() as usize)?;
@@ -94,7 +94,7 @@ const FIRST: u64 = 0x0101_0101_0101_0101;
 /// The first row of a layer.
 const ROW: u64 = 0xff;
 
-/// The places next to those of a mask, with the masks of the six tiles around.
+/// The positions next to those of a mask, with the masks of the six tiles around.
 fn beside(own: &[u64; 8], [low_x, high_x, low_y, high_y, low_z, high_z]: &[[u64; 8]; 6]) -> [u64; 8] {
     std::array::from_fn(|x| {
         let left = if x > 0 { own[x - 1] } else { low_x[7] };
@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_beside_masks_are_those_with_a_neighbour_in_them() {
+    fn positions_beside_masks_are_those_with_a_neighbour_in_them() {
         let tiles = Tiles::new(&[[0, 0, 0]]);
         let near = tiles.neighbours()[0];
         let mut state = 1u64;

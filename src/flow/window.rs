@@ -17,7 +17,7 @@ const FIRST: usize = MOST as usize * (LAYER + ROW) + 8;
 const MASK: usize = 16383;
 /// Room for the values: those that cubic interpolation reads lie up to three layers, rows and values behind the first one.
 const ROOM: usize = MASK + 1 + 3 * (LAYER + ROW) + 8;
-/// Room for rounding (cells) in the sum of a cell's place and a displacement.
+/// Room for rounding (cells) in the sum of a cell's position and a displacement.
 const ROUNDING: f32 = 1.0e-4;
 
 /// Cells that a window covers on each axis, counted from the tile's first one: `low` and those up to `high`, without it.
@@ -119,7 +119,7 @@ impl Window {
         self.values[index..].first_chunk().unwrap_or(&[0.0; 2])
     }
 
-    /// Trilinear interpolation at the places of a row's cells, moved by displacements (cells).
+    /// Trilinear interpolation at the positions of a row's cells, moved by displacements (cells).
     #[inline(always)]
     pub fn sample(&self, row: usize, ways: &[Lanes; 3]) -> Lanes {
         let (corners, weights) = self.corners(row, ways, None);
@@ -133,7 +133,7 @@ impl Window {
         interpolate(&corners, &weights)
     }
 
-    /// Trilinear interpolation, with the least and the greatest of the eight values around each place.
+    /// Trilinear interpolation, with the least and the greatest of the eight values around each position.
     #[inline(always)]
     pub fn sample_bounded(&self, row: usize, ways: &[Lanes; 3]) -> [Lanes; 3] {
         let (corners, weights) = self.corners(row, ways, None);
@@ -143,8 +143,8 @@ impl Window {
         [interpolate(&corners, &weights), least, most]
     }
 
-    /// Cubic interpolation (Lagrange's, of the 4 x 4 x 4 values around) at the places of a row's cells, moved by displacements
-    /// (cells), with the least and the greatest of the eight values around each place.
+    /// Cubic interpolation (Lagrange's, of the 4 x 4 x 4 values around) at the positions of a row's cells, moved by displacements
+    /// (cells), with the least and the greatest of the eight values around each position.
     #[inline(always)]
     pub fn sample_cubic(&self, row: usize, ways: &[Lanes; 3]) -> [Lanes; 3] {
         let (base, weights) = cell(row, ways, None, LAYER + ROW + 1);
@@ -167,7 +167,7 @@ impl Window {
         [combined(layers, &x), least, most]
     }
 
-    /// The values at the eight corners of the cells of places, and the corners' weights.
+    /// The values at the eight corners of the cells of positions, and the corners' weights.
     #[inline(always)]
     fn corners(&self, row: usize, ways: &[Lanes; 3], between: Option<usize>) -> ([Lanes; 8], Weights) {
         let (base, weights) = cell(row, ways, between, 0);
@@ -187,8 +187,8 @@ impl Window {
     }
 }
 
-/// The indices of the first corners of the cells of places, less `before`, and the weights of the lower and the upper corners. Mirrored
-/// places have mirrored weights to the last bit.
+/// The indices of the first corners of the cells of positions, less `before`, and the weights of the lower and the upper corners. Mirrored
+/// positions have mirrored weights to the last bit.
 #[inline(always)]
 fn cell(row: usize, ways: &[Lanes; 3], between: Option<usize>, before: usize) -> ([usize; 8], Weights) {
     let (zero, one, half) = (Lanes::all(0.0), Lanes::all(1.0), Lanes::all(0.5));
@@ -211,7 +211,7 @@ fn cell(row: usize, ways: &[Lanes; 3], between: Option<usize>, before: usize) ->
     ((index + (Lanes::all(first) + STEPS)).0.map(|index| index.to_bits() as usize & MASK), weights)
 }
 
-/// Weights of four values in a row for a place between the middle two, from the linear weights of these.
+/// Weights of four values in a row for a position between the middle two, from the linear weights of these.
 #[inline(always)]
 fn lagrange([low, high]: [Lanes; 2]) -> [Lanes; 4] {
     let one = Lanes::all(1.0);

@@ -3,7 +3,7 @@
 use super::DVec3;
 use crate::error::{Error, Result};
 
-/// A point cloud. Places are split into a voxel and an offset within it, as VDB Points stores them: they keep the same
+/// A point cloud. Positions are split into a voxel and an offset within it, as VDB Points stores them: they keep the same
 /// resolution however far they lie from the origin, and pass through a file bit by bit.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Points {
@@ -11,7 +11,7 @@ pub struct Points {
     pub voxel_size: f64,
     /// The voxel of each point; voxel (i, j, k) has its centre at (i, j, k) x `voxel_size`.
     pub cells: Vec<[i32; 3]>,
-    /// The place of each point relative to the centre of its voxel (voxels), from -0.5 to 0.5.
+    /// The position of each point relative to the centre of its voxel (voxels), from -0.5 to 0.5.
     pub offsets: Vec<[f32; 3]>,
     /// What else is known of each point; no two attributes have the same name.
     pub attributes: Vec<Attribute>,
@@ -20,7 +20,7 @@ pub struct Points {
 /// A named property of points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attribute {
-    /// Name, not empty; `P` stands for the place and cannot be one.
+    /// Name, not empty; `P` stands for the position and cannot be one.
     pub name: String,
     /// Values.
     pub values: Values,
@@ -231,10 +231,10 @@ impl Points {
         DVec3::from([0, 1, 2].map(|axis| f64::from(cell[axis]) + f64::from(offset[axis]))) * self.voxel_size
     }
 
-    /// Least and greatest corner of the box around the points' places (m); none without points.
+    /// Least and greatest corner of the box around the points' positions (m); none without points.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        let places = (0..self.count()).map(|point| self.position(point));
-        places.map(|place| (place, place)).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
+        let positions = (0..self.count()).map(|point| self.position(point));
+        positions.map(|position| (position, position)).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
     }
 
     /// The values of the attribute of this name.
@@ -262,7 +262,7 @@ impl Points {
         }
     }
 
-    /// Adds other points behind these, which have the same attributes and voxels; without any points they take the others' place.
+    /// Adds other points behind these, which have the same attributes and voxels; without any points they take the others' position.
     /// A value that all of both share stays one.
     ///
     /// # Errors
@@ -355,15 +355,15 @@ mod tests {
     use super::*;
 
     fn three() -> Points {
-        let places = [[0.26, -0.26, 0.0], [1.0e6, 0.0, -3.0], [0.0; 3]].map(DVec3::from);
-        let mut points = Points::at(0.5, &places).unwrap();
+        let positions = [[0.26, -0.26, 0.0], [1.0e6, 0.0, -3.0], [0.0; 3]].map(DVec3::from);
+        let mut points = Points::at(0.5, &positions).unwrap();
         points.set("id", Values::Long(Column::Each(vec![5, 6, 7])));
         points.set("pscale", Values::Float(Column::Uniform(0.1)));
         points
     }
 
     #[test]
-    fn places_are_split_and_put_together_again() {
+    fn positions_are_split_and_put_together_again() {
         let points = three();
         assert_eq!(points.cells, [[1, -1, 0], [2_000_000, 0, -6], [0; 3]]);
         assert!((points.position(0) - DVec3::new(0.26, -0.26, 0.0)).norm() < 1e-8);

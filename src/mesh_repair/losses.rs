@@ -87,5 +87,5 @@ fn named_bounds(mesh: &TriMesh) -> [DVec3; 2] {
     let nowhere = [DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY)];
     let corners =
         mesh.triangles.as_flattened().iter().map(|&vertex| mesh.positions[vertex as usize].cast::<f64>());
-    corners.fold(nowhere, |[low, high], place| [low.inf(&place), high.sup(&place)])
+    corners.fold(nowhere, |[low, high], position| [low.inf(&position), high.sup(&position)])
 }

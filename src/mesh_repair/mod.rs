@@ -175,7 +175,7 @@ fn rebuild(ctx: &Context, closed: &Closed, own: usize, cell: f64) -> Result<Opti
     for &vertex in closed.triangles.as_flattened() {
         in_cells[vertex as usize] = lattice.to_cells(closed.positions[vertex as usize].cast());
     }
-    let fixed = in_cells.iter().map(|place| lattice.fix(*place)).collect::<Result<Vec<_>>>()?;
+    let fixed = in_cells.iter().map(|position| lattice.fix(*position)).collect::<Result<Vec<_>>>()?;
     let pierces = Pierces::of(&fixed, &closed.triangles);
     let shape = Shape { fixed, triangles: closed.triangles.clone(), pierces };
     ctx.check()?;
@@ -208,7 +208,7 @@ pub(super) struct Rebuilt {
     pub slivers: usize,
 }
 
-/// Rebuilds a mesh, whose vertices have these places (cells of the lattice), in the flagged cells and in as many more as it takes: rung by rung, until
+/// Rebuilds a mesh, whose vertices have these positions (cells of the lattice), in the flagged cells and in as many more as it takes: rung by rung, until
 /// the result is a closed 2-manifold.
 ///
 /// # Errors
@@ -234,7 +234,7 @@ pub(super) fn ladder(
         };
         let Some((mut draft, cells)) = tried(ctx, shape, set, in_cells, inside)? else { continue };
         let slivers = tidied(&mut draft, lattice);
-        let is_whole = Topology::of(draft.places.len(), &draft.triangles).is_watertight();
+        let is_whole = Topology::of(draft.positions.len(), &draft.triangles).is_watertight();
         if draft.triangles.is_empty() || (is_whole && (slivers == 0 || rung == 3)) {
             return Ok(Rebuilt { draft, cells, rung, slivers });
         }
@@ -242,18 +242,18 @@ pub(super) fn ladder(
     Err(Error::Internal("a mesh could not be rebuilt".into()))
 }
 
-/// Takes slivers out until none comes back where places are rounded to the 32 bits that files have. Returns how many are left.
+/// Takes slivers out until none comes back where positions are rounded to the 32 bits that files have. Returns how many are left.
 fn tidied(draft: &mut Draft, lattice: &Lattice) -> usize {
     let origin = DVec3::from(lattice.origin.map(f64::from));
     let mut slivers = usize::MAX;
     for _ in 0..ROUNDS {
-        let made = draft.places.iter_mut().zip(&draft.is_made).filter(|(_, is_made)| **is_made);
+        let made = draft.positions.iter_mut().zip(&draft.is_made).filter(|(_, is_made)| **is_made);
         let mut is_round = true;
-        for (place, _) in made {
-            let world: Vec3 = ((*place + origin) * lattice.voxel).cast();
+        for (position, _) in made {
+            let world: Vec3 = ((*position + origin) * lattice.voxel).cast();
             let round = world.cast::<f64>() / lattice.voxel - origin;
-            is_round &= (round - *place).amax() < 1e-9;
-            *place = round;
+            is_round &= (round - *position).amax() < 1e-9;
+            *position = round;
         }
         if is_round && slivers == 0 {
             break;
@@ -325,7 +325,7 @@ fn finished(
         Some(position) => *position,
         None => ((place + origin) * lattice.voxel).cast(),
     };
-    let positions = draft.places.iter().enumerate().map(place).collect();
+    let positions = draft.positions.iter().enumerate().map(place).collect();
     let mesh = TriMesh { positions, triangles: draft.triangles };
     let used = crate::geometry::mesh::used(mesh.positions.len(), &mesh.triangles);
     let names: Vec<u32> = used.unwrap_or_else(|| (0..mesh.positions.len() as u32).collect());

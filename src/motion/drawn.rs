@@ -51,11 +51,11 @@ impl Faces {
     }
 
     /// Keeps the positions of vertices that triangles name.
-    pub fn keep_moving<T: Copy>(&self, places: &mut Vec<T>) {
+    pub fn keep_moving<T: Copy>(&self, positions: &mut Vec<T>) {
         if let Some((used, _)) = &self.moving {
             // They ascend: none is overwritten before it is read.
-            used.iter().enumerate().for_each(|(to, &from)| places[to] = places[from as usize]);
-            places.truncate(used.len());
+            used.iter().enumerate().for_each(|(to, &from)| positions[to] = positions[from as usize]);
+            positions.truncate(used.len());
         }
     }
 }

@@ -33,7 +33,7 @@ pub struct Gait {
     pub spread: f64,
     /// Fraction of the time that something stands, 0..=1.
     pub standing: f64,
-    /// y of the lowest place (m).
+    /// y of the lowest position (m).
     pub lowest: f64,
     /// Greatest height of the figure (m).
     pub height: f64,

@@ -48,7 +48,7 @@ pub fn between(from: &[Vec3], to: &[Vec3], part: f64, out: &mut Vec<DVec3>) {
 }
 
 /// Bounding box of positions; without any, infinite and with its corners swapped.
-pub fn span(places: &[DVec3]) -> (DVec3, DVec3) {
+pub fn span(positions: &[DVec3]) -> (DVec3, DVec3) {
     let none = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
-    places.iter().fold(none, |(low, high), place| (low.inf(place), high.sup(place)))
+    positions.iter().fold(none, |(low, high), position| (low.inf(position), high.sup(position)))
 }

@@ -18,7 +18,7 @@ pub struct Key {
     pub turn: DVec3,
 }
 
-/// Keys in ascending order: place and angles change linearly between them, or with ease, and rest outside.
+/// Keys in ascending order: position and angles change linearly between them, or with ease, and rest outside.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Keys {
     keys: Vec<Key>,
@@ -49,7 +49,7 @@ impl Keys {
         Self { ease, ..self }
     }
 
-    /// Rotation and place at a time.
+    /// Rotation and position at a time.
     pub fn at(&self, time: f64) -> (Rotation3<f64>, DVec3) {
         let (at, turn) = self.numbers(time);
         (turned(turn), at)
@@ -65,7 +65,7 @@ impl Keys {
         turns.windows(2).map(|pair| (pair[1] - pair[0]).abs().sum()).sum()
     }
 
-    /// Place and angles at a time.
+    /// Position and angles at a time.
     fn numbers(&self, time: f64) -> (DVec3, DVec3) {
         let next = self.keys.partition_point(|key| key.time <= time);
         match (next.checked_sub(1).map(|index| self.keys[index]), self.keys.get(next)) {
@@ -80,7 +80,7 @@ impl Keys {
         }
     }
 
-    /// Place and angles on the cubic before key `next`.
+    /// Position and angles on the cubic before key `next`.
     fn eased(&self, next: usize, time: f64) -> (DVec3, DVec3) {
         let (a, b) = (self.keys[next - 1], self.keys[next]);
         let (span, part) = (b.time - a.time, (time - a.time) / (b.time - a.time));
@@ -213,9 +213,9 @@ impl Placed {
         Self { inner, space, keys }
     }
 
-    fn place(&self, time: f64, places: &mut [DVec3]) {
+    fn position(&self, time: f64, positions: &mut [DVec3]) {
         let (rotation, at) = self.keys.at(time);
-        places.iter_mut().for_each(|p| *p = rotation * self.space.place(*p) + at);
+        positions.iter_mut().for_each(|p| *p = rotation * self.space.position(*p) + at);
     }
 }
 
@@ -230,7 +230,7 @@ impl Motion for Placed {
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.inner.pose(time, out)?;
-        self.place(time, out);
+        self.position(time, out);
         Ok(())
     }
 
@@ -244,7 +244,7 @@ impl Motion for Placed {
 
     fn drawn_pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.inner.drawn_pose(time, out)?;
-        self.place(time, out);
+        self.position(time, out);
         Ok(())
     }
 

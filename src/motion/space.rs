@@ -40,7 +40,7 @@ impl Space {
     }
 
     /// A position of the file in metres, Y up.
-    pub fn place(&self, p: DVec3) -> DVec3 {
+    pub fn position(&self, p: DVec3) -> DVec3 {
         self.vector(p - self.origin)
     }
 
@@ -53,20 +53,20 @@ impl Space {
         }
     }
 
-    /// Brings points of the file into metres, Y up: places, voxels, the vectors `v`, `vel`, `velocity` and `rest`, and the radius
+    /// Brings points of the file into metres, Y up: positions, voxels, the vectors `v`, `vel`, `velocity` and `rest`, and the radius
     /// `pscale`. Other attributes stay as they are.
     pub fn bring(&self, cloud: &mut Cloud) {
         if *self == Self::OWN {
             return;
         }
-        cloud.places.iter_mut().for_each(|place| *place = self.place(*place));
+        cloud.positions.iter_mut().for_each(|position| *position = self.position(*position));
         cloud.voxel_size = cloud.voxel_size.map(|size| size * self.scale);
         for attribute in &mut cloud.attributes {
             match (attribute.name.as_str(), &mut attribute.values) {
                 (name @ ("v" | "vel" | "velocity" | "rest"), Values::Vector(column)) => {
                     let space = if name == "rest" { *self } else { self.without_origin() };
                     for vector in column.stored_mut() {
-                        *vector = space.place(DVec3::from(vector.map(f64::from))).cast::<f32>().into();
+                        *vector = space.position(DVec3::from(vector.map(f64::from))).cast::<f32>().into();
                     }
                 }
                 ("pscale", Values::Float(column)) => {

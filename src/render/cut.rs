@@ -36,9 +36,9 @@ impl Plane {
     /// Where a ray meets the plane; none where it never does.
     fn meets(self, eye: DVec3, toward: DVec3) -> Option<DVec3> {
         let distance = (self.at - eye[self.axis]) / toward[self.axis];
-        let mut place = eye + toward * distance;
-        place[self.axis] = self.at;
-        (distance > 0.0 && distance.is_finite()).then_some(place)
+        let mut position = eye + toward * distance;
+        position[self.axis] = self.at;
+        (distance > 0.0 && distance.is_finite()).then_some(position)
     }
 }
 
@@ -48,12 +48,12 @@ impl fmt::Display for Plane {
     }
 }
 
-/// Reads the values at places (m) into a list, which it clears first.
+/// Reads the values at positions (m) into a list, which it clears first.
 type Read = dyn Fn(&Context, &[DVec3], &mut Vec<f32>) -> Result<()> + Send + Sync;
 /// Least and greatest corner (m); none of nothing.
 type Bounds = Option<(DVec3, DVec3)>;
 
-/// A number at each place, such as a distance or a density.
+/// A number at each position, such as a distance or a density.
 pub struct Field {
     read: Box<Read>,
     range: [f32; 2],
@@ -61,7 +61,7 @@ pub struct Field {
 }
 
 impl Field {
-    /// A field that `read` samples: it gets places (m) and puts their values into a list, which it clears first. Values of `range`
+    /// A field that `read` samples: it gets positions (m) and puts their values into a list, which it clears first. Values of `range`
     /// take the colours from dark blue to pale yellow, those outside the colours of its ends. `bounds` are the least and the
     /// greatest corner of what is to be seen (m).
     pub fn new(
@@ -142,8 +142,8 @@ impl Cut {
                 let [x, y] = [pixel % width, pixel / width].map(|at| at as f64 + 0.5);
                 self.plane.meets(camera.eye, lens.through(x, y))
             };
-            let places: Vec<Option<DVec3>> = (first..first + pixels.len() / 3).map(meets).collect();
-            self.fill(ctx, &places, pixels)?;
+            let positions: Vec<Option<DVec3>> = (first..first + pixels.len() / 3).map(meets).collect();
+            self.fill(ctx, &positions, pixels)?;
         }
         for outline in &self.outlines {
             ctx.check()?;
@@ -152,20 +152,20 @@ impl Cut {
         Ok(Picture { size, rgb })
     }
 
-    /// Gives pixels the colours of the field at their places.
-    fn fill(&self, ctx: &Context, places: &[Option<DVec3>], pixels: &mut [u8]) -> Result<()> {
+    /// Gives pixels the colours of the field at their positions.
+    fn fill(&self, ctx: &Context, positions: &[Option<DVec3>], pixels: &mut [u8]) -> Result<()> {
         let empty = bytes(EMPTY);
         let Some(field) = &self.field else {
             pixels.chunks_exact_mut(3).for_each(|pixel| pixel.copy_from_slice(&empty));
             return Ok(());
         };
-        let sampled: Vec<DVec3> = places.iter().map(|place| place.unwrap_or_default()).collect();
+        let sampled: Vec<DVec3> = positions.iter().map(|position| position.unwrap_or_default()).collect();
         let mut values = Vec::new();
         (field.read)(ctx, &sampled, &mut values)?;
-        let paint = |(pixel, (place, value)): (&mut [u8], (&Option<DVec3>, &f32))| {
-            pixel.copy_from_slice(&place.map_or(empty, |_| field.colour(*value)));
+        let paint = |(pixel, (position, value)): (&mut [u8], (&Option<DVec3>, &f32))| {
+            pixel.copy_from_slice(&position.map_or(empty, |_| field.colour(*value)));
         };
-        let numbers = places.par_iter().zip(&values);
+        let numbers = positions.par_iter().zip(&values);
         ctx.pool().install(|| pixels.par_chunks_exact_mut(3).zip(numbers).for_each(paint));
         Ok(())
     }
@@ -193,8 +193,8 @@ impl Outline {
                 for x in near(a[0], b[0], width) {
                     let distance = distance(a, b, [x as f64 + 0.5, y as f64 + 0.5]);
                     let part = (0.5 * (LINE + 1.0) - distance).clamp(0.0, 1.0);
-                    let place = &mut cover[y * width + x];
-                    *place = (*place).max((255.0 * part).round() as u8);
+                    let position = &mut cover[y * width + x];
+                    *position = (*position).max((255.0 * part).round() as u8);
                 }
             }
         }
@@ -206,26 +206,26 @@ impl Outline {
 fn seen(lens: &Lens, [a, b]: [DVec3; 2]) -> Option<[[f64; 2]; 2]> {
     let [from, to] = [a, b].map(|end| lens.depth(end));
     let nearest = NEAREST * a.norm().max(b.norm());
-    let place = |depth: f64| a.lerp(&b, (depth - from) / (to - from));
+    let position = |depth: f64| a.lerp(&b, (depth - from) / (to - from));
     let (a, b) = match (from >= nearest, to >= nearest) {
         (true, true) => (a, b),
-        (true, false) => (a, place(nearest)),
-        (false, true) => (place(nearest), b),
+        (true, false) => (a, position(nearest)),
+        (false, true) => (position(nearest), b),
         (false, false) => return None,
     };
     Some([lens.pixel(a)?, lens.pixel(b)?])
 }
 
-/// The pixels of a row or column of `count` that a line between two of its places may cover.
+/// The pixels of a row or column of `count` that a line between two of its positions may cover.
 fn near(a: f64, b: f64, count: usize) -> Range<usize> {
     let first = (a.min(b) - LINE).floor().max(0.0) as usize;
     let last = (a.max(b) + LINE).ceil().max(0.0) as usize;
     first..last.min(count)
 }
 
-/// Distance of a place from a segment (pixels).
-fn distance(a: [f64; 2], b: [f64; 2], place: [f64; 2]) -> f64 {
-    let [way, offset] = [b, place].map(|end| [end[0] - a[0], end[1] - a[1]]);
+/// Distance of a position from a segment (pixels).
+fn distance(a: [f64; 2], b: [f64; 2], position: [f64; 2]) -> f64 {
+    let [way, offset] = [b, position].map(|end| [end[0] - a[0], end[1] - a[1]]);
     let length = way[0] * way[0] + way[1] * way[1];
     let along = (way[0] * offset[0] + way[1] * offset[1]) / length;
     let along = if length > 0.0 { along.clamp(0.0, 1.0) } else { 0.0 };
@@ -270,20 +270,20 @@ mod tests {
     /// Distances from a sphere around a centre, in a box of 2 m around the origin.
     fn ball(centre: DVec3, radius: f64) -> Field {
         let bounds = Some((DVec3::repeat(-1.0), DVec3::repeat(1.0)));
-        Field::new(bounds, [-0.2, 0.2], move |_, places, out| {
+        Field::new(bounds, [-0.2, 0.2], move |_, positions, out| {
             out.clear();
-            out.extend(places.iter().map(|place| ((place - centre).norm() - radius) as f32));
+            out.extend(positions.iter().map(|position| ((position - centre).norm() - radius) as f32));
             Ok(())
         })
     }
 
-    /// The place that a pixel of a picture of that box shows, by the directions to the right and upward.
-    fn place(plane: Plane, [x, y]: [usize; 2], [right, up]: [DVec3; 2]) -> DVec3 {
+    /// The position that a pixel of a picture of that box shows, by the directions to the right and upward.
+    fn position(plane: Plane, [x, y]: [usize; 2], [right, up]: [DVec3; 2]) -> DVec3 {
         // The box fills the height but for 4 % at each edge.
         let pixel = 2.0 / 0.92 / 90.0;
-        let mut place = right * ((x as f64 + 0.5 - 60.0) * pixel) + up * ((45.0 - y as f64 - 0.5) * pixel);
-        place[plane.axis] = plane.at;
-        place
+        let mut position = right * ((x as f64 + 0.5 - 60.0) * pixel) + up * ((45.0 - y as f64 - 0.5) * pixel);
+        position[plane.axis] = plane.at;
+        position
     }
 
     #[test]
@@ -298,7 +298,7 @@ mod tests {
             let camera = Camera::facing(cut.bounds().unwrap(), plane, SIZE);
             let picture = cut.draw(&ctx, &camera, SIZE).unwrap();
             for (pixel, rgb) in picture.rgb.as_chunks::<3>().0.iter().enumerate() {
-                let at = place(plane, [pixel % 120, pixel / 120], axes);
+                let at = position(plane, [pixel % 120, pixel / 120], axes);
                 let expected = field.colour(((at - centre).norm() - 0.5) as f32);
                 let off = (0..3).map(|n| expected[n].abs_diff(rgb[n])).max().unwrap();
                 assert!(off <= 1, "axis {axis}, {at:?}: {rgb:?} is not {expected:?}");
@@ -319,7 +319,7 @@ mod tests {
         let after = bare.with_surface(&mesh, [0.0; 3]).draw(&ctx, &camera, SIZE).unwrap();
         let mut covered = 0;
         for (pixel, rgb) in after.rgb.as_chunks::<3>().0.iter().enumerate() {
-            let at = place(plane, [pixel % 120, pixel / 120], [DVec3::x(), DVec3::y()]);
+            let at = position(plane, [pixel % 120, pixel / 120], [DVec3::x(), DVec3::y()]);
             let (x, y) = (at.x, at.y);
             // Signed distance from the rectangle (pixels): exact inside, and at most the true one outside.
             let off = (-0.6 - x).max(x - 0.5).max((-0.4 - y).max(y - 0.3)) * 0.92 * 90.0 / 2.0;

@@ -133,8 +133,8 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             (state >> 40) as f64 / (1u64 << 24) as f64
         };
-        let places: Vec<DVec3> = (0..400).map(|_| DVec3::from([0.0; 3].map(|_: f64| random()))).collect();
-        let mut points = Points::at(0.1, &places).unwrap();
+        let positions: Vec<DVec3> = (0..400).map(|_| DVec3::from([0.0; 3].map(|_: f64| random()))).collect();
+        let mut points = Points::at(0.1, &positions).unwrap();
         points.set("pscale", Values::Float(Column::Uniform(0.03)));
         let cloud = Cloud::new(&points, None).unwrap();
         let shadows = Shadows::new(std::slice::from_ref(&cloud)).unwrap();

@@ -153,10 +153,10 @@ impl<'a> Splats<'a> {
             }
         }
         let mut nearest = vec![(f32::INFINITY, 0, 0); tiles.len() * AREA];
-        nearest.par_chunks_mut(AREA).zip(&tiles).enumerate().try_for_each(|(tile, (place, list))| {
+        nearest.par_chunks_mut(AREA).zip(&tiles).enumerate().try_for_each(|(tile, (position, list))| {
             ctx.check()?;
             let corner = [tile % across * TILE, tile / across * TILE];
-            draw_tile(&view, clouds, list.iter().map(|&n| &seen[n as usize]), corner, place);
+            draw_tile(&view, clouds, list.iter().map(|&n| &seen[n as usize]), corner, position);
             Ok::<(), Error>(())
         })?;
         Ok(Self { clouds, across, nearest })
@@ -192,7 +192,7 @@ fn draw_tile<'s>(
     for (n, seen) in list.enumerate() {
         if n.is_multiple_of(LOOK) {
             let rows = tile.chunks(TILE).take(bottom);
-            if rows.flat_map(|row| &row[..right]).all(|place| place.0 <= seen.least) {
+            if rows.flat_map(|row| &row[..right]).all(|position| position.0 <= seen.least) {
                 return;
             }
         }
@@ -202,15 +202,15 @@ fn draw_tile<'s>(
         };
         for y in inside(seen.rows, corner[1], bottom) {
             for x in inside(seen.columns, corner[0], right) {
-                let place = &mut tile[y * TILE + x];
-                if place.0 <= seen.least {
+                let position = &mut tile[y * TILE + x];
+                if position.0 <= seen.least {
                     continue;
                 }
                 let Some(distance) = view.meet(centre, seen.radius, corner[0] + x, corner[1] + y) else {
                     continue;
                 };
-                if (distance as f32) < place.0 {
-                    *place = (distance as f32, seen.cloud, seen.sphere);
+                if (distance as f32) < position.0 {
+                    *position = (distance as f32, seen.cloud, seen.sphere);
                 }
             }
         }

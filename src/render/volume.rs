@@ -43,9 +43,9 @@ impl Fog {
             leaves.iter().map(|leaf| (leaf.origin, Part::Dense(leaf.values, leaf.mask))).collect();
         for tile in &tiles {
             let edge = edge(tile) as i32;
-            let places = (0..edge * edge * edge).map(|n| [n / (edge * edge), n / edge % edge, n % edge]);
+            let positions = (0..edge * edge * edge).map(|n| [n / (edge * edge), n / edge % edge, n % edge]);
             let origin = |at: Origin| [0, 1, 2].map(|axis| tile.origin[axis] + DIM as i32 * at[axis]);
-            parts.extend(places.map(|at| (origin(at), Part::Even(tile.value))));
+            parts.extend(positions.map(|at| (origin(at), Part::Even(tile.value))));
         }
         Self::of_parts(ctx, placement, parts, extinction).map_err(|error| match error {
             Error::Argument(what) => wrong(what),
@@ -66,8 +66,8 @@ impl Field {
             GridClass::LevelSet => [-grid.background().abs(), grid.background().abs()],
             _ => range(ctx, &grid)?,
         };
-        let read = move |ctx: &Context, places: &[DVec3], values: &mut Vec<f32>| {
-            grid.sample_linear(ctx, places, values)
+        let read = move |ctx: &Context, positions: &[DVec3], values: &mut Vec<f32>| {
+            grid.sample_linear(ctx, positions, values)
         };
         Ok(Self::new(bounds, range, read))
     }

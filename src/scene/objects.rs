@@ -25,7 +25,7 @@ pub struct Objects<'a> {
     names: Vec<String>,
 }
 
-/// The objects at a frame: places (m) and velocities (m/s) of each one's vertices.
+/// The objects at a frame: positions (m) and velocities (m/s) of each one's vertices.
 pub struct Poses {
     frame: i32,
     meshes: Vec<(Vec<Vec3>, Vec<Vec3>)>,

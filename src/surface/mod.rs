@@ -19,7 +19,7 @@
 //! | fading | delta becomes less: detail of a runny liquid does not last |
 //! | delta | the distance from phi = 0 that a vertex keeps: its detail, signed as phi |
 //! | patch | 4 x 4 x 4 nodes, which are evaluated together |
-//! | foot | the place of phi = 0 that belongs to a vertex: the vertex without its detail |
+//! | foot | the position of phi = 0 that belongs to a vertex: the vertex without its detail |
 //! | Gamma, psi | the signed distance from the mesh; Gamma - phi |
 //! | change | what a step made of the mesh's vertices and triangles, where it was rebuilt or improved |
 //! | flagged | of a vertex: its projection failed or jumped (it stays where advection put it), or there is surface beside its foot that no triangle of feet covers |
@@ -76,8 +76,8 @@ use crate::geometry::DVec3;
 /// Particles of a frame; all arrays that are not empty have one value for each.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Particles {
-    /// Places (m).
-    pub places: Vec<DVec3>,
+    /// Positions (m).
+    pub positions: Vec<DVec3>,
     /// Velocities (m/s); may be empty.
     pub velocities: Vec<[f32; 3]>,
     /// Numbers by which particles are the same from frame to frame; may be empty.
@@ -90,14 +90,14 @@ impl Particles {
     /// # Errors
     /// Names the first particle at fault, counted from 1.
     pub fn validate(&self) -> Result<()> {
-        let count = self.places.len();
+        let count = self.positions.len();
         let refuse = |what: String| Err(Error::argument(what));
         for (name, length) in [("velocities", self.velocities.len()), ("ids", self.ids.len())] {
             if length != 0 && length != count {
                 return refuse(format!("there are {count} particles, but {length} {name}"));
             }
         }
-        if let Some(at) = self.places.iter().position(|place| !place.iter().all(|x| x.is_finite())) {
+        if let Some(at) = self.positions.iter().position(|position| !position.iter().all(|x| x.is_finite())) {
             return refuse(format!("the place of particle {} is not finite", at + 1));
         }
         if let Some(at) = self.velocities.iter().position(|speed| !speed.iter().all(|x| x.is_finite())) {

@@ -119,8 +119,8 @@ impl Tracker {
             (true, true) if own.len() == count => own,
             (true, true) => return wrong("has sizes that do not fit".into()),
             (true, false) => {
-                let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
-                sizes(&places, &mesh.triangles)
+                let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
+                sizes(&positions, &mesh.triangles)
             }
         };
         let drift = match (params.rebuild, drift.vertices.len()) {

@@ -4,17 +4,17 @@ use super::{Implicit, Isosurface, Particles};
 use crate::context::Context;
 use crate::geometry::{DVec3, TriMesh};
 
-/// Places of a lattice, from one distance (m) of its centre to another; from 0 on they are a ball.
+/// Positions of a lattice, from one distance (m) of its centre to another; from 0 on they are a ball.
 pub fn shell(centre: DVec3, from: f64, to: f64) -> Vec<DVec3> {
     let most = to.ceil() as i32;
     let on = || (-most..=most).map(f64::from);
     let all = on().flat_map(|x| on().flat_map(move |y| on().map(move |z| DVec3::new(x, y, z))));
-    all.filter(|place| (from..=to).contains(&place.norm())).map(|place| place + centre).collect()
+    all.filter(|position| (from..=to).contains(&position.norm())).map(|position| position + centre).collect()
 }
 
-/// Particles at these places, numbered from 0 on, without velocities.
-pub fn numbered(places: Vec<DVec3>) -> Particles {
-    Particles { ids: (0..places.len() as i64).collect(), velocities: Vec::new(), places }
+/// Particles at these positions, numbered from 0 on, without velocities.
+pub fn numbered(positions: Vec<DVec3>) -> Particles {
+    Particles { ids: (0..positions.len() as i64).collect(), velocities: Vec::new(), positions }
 }
 
 /// Two balls, whose centres lie at `apart` and at `-apart` (m).
@@ -23,7 +23,7 @@ pub fn two_balls(radius: f64, apart: DVec3) -> Particles {
 }
 
 /// The surface of the particles themselves, in cells of half a spacing.
-pub fn own_surface(ctx: &Context, places: &[DVec3]) -> TriMesh {
-    let phi = Implicit::new(ctx, places, 1.0, 0.5).unwrap();
+pub fn own_surface(ctx: &Context, positions: &[DVec3]) -> TriMesh {
+    let phi = Implicit::new(ctx, positions, 1.0, 0.5).unwrap();
     Isosurface::new(&phi).mesh(&phi)
 }

@@ -34,7 +34,7 @@ use crate::geometry::{DVec3, TriMesh};
 #[derive(Debug, Clone)]
 pub struct Tracker {
     pub(super) params: Params,
-    /// Places of vertices (m).
+    /// Positions of vertices (m).
     pub(super) vertices: Vec<DVec3>,
     pub(super) triangles: Vec<[u32; 3]>,
     /// Distance from the surface that each vertex keeps (m); NaN: it was too far from it to have one.
@@ -100,7 +100,7 @@ impl Tracker {
         params.validate()?;
         mesh.validate()?;
         particles.validate()?;
-        if particles.places.is_empty() {
+        if particles.positions.is_empty() {
             return Err(Error::argument("there are no particles"));
         }
         if params.rebuild && !Topology::of(mesh.positions.len(), &mesh.triangles).is_watertight() {
@@ -108,7 +108,7 @@ impl Tracker {
                 "the mesh is not closed and 2-manifold by index, as it must be to be rebuilt",
             ));
         }
-        let vertices: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
+        let vertices: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
         let flags = vec![false; vertices.len()];
         let (delta, lasting, bare, reach) = (Vec::new(), Vec::new(), Vec::new(), REACH[0]);
         let triangles = mesh.triangles.clone();
@@ -143,7 +143,7 @@ impl Tracker {
             if wanted <= tracker.reach && covers(&deep, &wider) {
                 tracker.check_overlap(known)?;
                 let Covered { apart, bare, .. } =
-                    ctx.phase("cover", || tracker.cover(ctx, &surface, &feet, (&particles.places, true)))?;
+                    ctx.phase("cover", || tracker.cover(ctx, &surface, &feet, (&particles.positions, true)))?;
                 tracker.bare = bare;
                 let (lost, triangles) = (tracker.vertices.len() - known, surface.1.count());
                 return Ok((tracker, StepReport { lost, triangles, apart, ..StepReport::default() }));
@@ -217,7 +217,7 @@ impl Tracker {
     /// The mesh (m).
     pub fn mesh(&self) -> TriMesh {
         TriMesh {
-            positions: self.vertices.iter().map(|place| place.cast()).collect(),
+            positions: self.vertices.iter().map(|position| position.cast()).collect(),
             triangles: self.triangles.clone(),
         }
     }
@@ -233,7 +233,7 @@ impl Tracker {
         self.is_rebuilt
     }
 
-    /// Places of the vertices (m).
+    /// Positions of the vertices (m).
     pub fn vertices(&self) -> &[DVec3] {
         &self.vertices
     }
@@ -260,13 +260,13 @@ impl Tracker {
     /// too far apart for the grid, or more memory than the context allows; cancel.
     pub fn step(&mut self, ctx: &Context, from: &Particles, to: &Particles, dt: f64) -> Result<StepReport> {
         validate_step(from, to, dt)?;
-        if to.places.is_empty() {
+        if to.positions.is_empty() {
             return self.dry_up(ctx, from, dt);
         }
         let (next, phases) = ctx.step(10, || {
             let paths = Paths::between(from, to, dt)?;
             let (carried, parts) = ctx.phase("advect", || self.carried(ctx, &paths))?;
-            let surface = match self.ahead.ready(&to.places) {
+            let surface = match self.ahead.ready(&to.positions) {
                 Some(surface) => surface,
                 None => Arc::new(ctx.phase("phi", || self.surface_of(ctx, to))?),
             };
@@ -288,7 +288,8 @@ impl Tracker {
                 gather(&self.vertices, &self.triangles, &is_lost, &mut vertices);
             }
             let feet: Vec<Option<DVec3>> = flags.iter().map(Flag::foot).collect();
-            let mut covered = ctx.phase("cover", || self.cover(ctx, &surface, &feet, (&to.places, false)))?;
+            let mut covered =
+                ctx.phase("cover", || self.cover(ctx, &surface, &feet, (&to.positions, false)))?;
             covered.bare.iter_mut().zip(&self.bare).for_each(|(now, ever)| *now &= !ever);
             let count = |kind: Flag| flags.iter().filter(|flag| **flag == kind).count();
             let is_flagged = |(flag, is_bare): (&Flag, &bool)| flag.foot().is_none() || *is_bare;
@@ -314,7 +315,7 @@ impl Tracker {
             let mut ahead = Ahead::default();
             if self.params.rebuild {
                 let change =
-                    || self.changed(ctx, &next, &feet, &covered, (&surface.0, &distances), &to.places);
+                    || self.changed(ctx, &next, &feet, &covered, (&surface.0, &distances), &to.positions);
                 let (change, ready) = self.with_next(ctx, change)?;
                 (next.report.change, ahead) = (change, ready);
             }
@@ -339,7 +340,7 @@ impl Tracker {
         Ok(report)
     }
 
-    /// What of the particles' surface the mesh does not cover: whole parts, and the vertices beside other such places.
+    /// What of the particles' surface the mesh does not cover: whole parts, and the vertices beside other such positions.
     fn cover(
         &self,
         ctx: &Context,
@@ -351,18 +352,18 @@ impl Tracker {
         ctx.check()?;
         let spacing = 1.0 / self.params.cell;
         let cover = Cover { feet, triangles: &self.triangles, spacing, is_first };
-        let (bare, places) = cover.beside_bare(ctx, phi, surface, &parts)?;
+        let (bare, positions) = cover.beside_bare(ctx, phi, surface, &parts)?;
         let bubble = if self.params.every { spacing.powi(3) } else { f64::INFINITY };
         let lacking = match self.params.rebuild {
             true => parts.lacking(phi, surface, &Wanted { crowd: self.crowd(particles), bubble }),
             false => Lacking::default(),
         };
-        Ok(Covered { apart: parts.apart(phi, surface), bare, places, reach: cover.reach(), lacking })
+        Ok(Covered { apart: parts.apart(phi, surface), bare, positions, reach: cover.reach(), lacking })
     }
 
-    /// Particles at these places, of which each part of the mesh must hold some.
-    pub(super) fn crowd<'a>(&self, places: &'a [DVec3]) -> Crowd<'a> {
-        Crowd { places, spacing: self.params.spacing, least: self.params.min_drop.max(1) }
+    /// Particles at these positions, of which each part of the mesh must hold some.
+    pub(super) fn crowd<'a>(&self, positions: &'a [DVec3]) -> Crowd<'a> {
+        Crowd { positions, spacing: self.params.spacing, least: self.params.min_drop.max(1) }
     }
 
     pub(super) fn carried(&self, ctx: &Context, paths: &Paths) -> Result<(Vec<DVec3>, usize)> {
@@ -373,7 +374,7 @@ impl Tracker {
 
     pub(super) fn surface_of(&self, ctx: &Context, particles: &Particles) -> Result<(Implicit, Isosurface)> {
         let Params { spacing, cell, .. } = self.params;
-        let phi = Implicit::new(ctx, &particles.places, spacing, cell * spacing)?;
+        let phi = Implicit::new(ctx, &particles.positions, spacing, cell * spacing)?;
         let surface = Isosurface::new(&phi);
         Ok((phi, surface))
     }
@@ -390,8 +391,8 @@ impl Tracker {
             return REACH[0];
         }
         let mut of = |share: f64| {
-            let place = ((far.len() - 1) as f64 * share) as usize;
-            let far = *far.select_nth_unstable_by(place, f32::total_cmp).1;
+            let position = ((far.len() - 1) as f64 * share) as usize;
+            let far = *far.select_nth_unstable_by(position, f32::total_cmp).1;
             self.reach_for(f64::from(far) / self.params.spacing)
         };
         let reach = of(MOST);
@@ -401,8 +402,8 @@ impl Tracker {
     /// The distance of each vertex from the surface (m), and its foot (cells).
     fn measure(&self, distances: &Distances) -> (Vec<f32>, Vec<Option<DVec3>>) {
         let cell = distances.cell();
-        let one = |sampler: &mut Sampler<'_>, place: &DVec3| match foot(sampler, place / cell) {
-            Some(foot) => ((foot.distance * cell) as f32, Some(foot.place)),
+        let one = |sampler: &mut Sampler<'_>, position: &DVec3| match foot(sampler, position / cell) {
+            Some(foot) => ((foot.distance * cell) as f32, Some(foot.position)),
             None => (f32::NAN, None),
         };
         let vertices = self.vertices.par_iter().with_min_len(1024);
@@ -425,7 +426,7 @@ impl Tracker {
                 || Sampler::new(distances),
                 |sampler, (vertices, delta)| {
                     ctx.check()?;
-                    let place = |(vertex, delta): (&mut DVec3, &f32)| {
+                    let position = |(vertex, delta): (&mut DVec3, &f32)| {
                         let Some(foot) = foot(sampler, *vertex / cell).filter(|_| !delta.is_nan()) else {
                             return Flag::Lost;
                         };
@@ -437,9 +438,9 @@ impl Tracker {
                         if moved > STILL {
                             *vertex = to;
                         }
-                        Flag::Placed(foot.place)
+                        Flag::Placed(foot.position)
                     };
-                    Ok(vertices.iter_mut().zip(delta).map(place).collect())
+                    Ok(vertices.iter_mut().zip(delta).map(position).collect())
                 },
             )
             .collect::<Result<_>>()?;
@@ -469,9 +470,9 @@ pub(super) struct Next {
 /// What of the particles' surface the mesh does not cover.
 pub(super) struct Covered {
     pub apart: Vec<Apart>,
-    /// Vertices beside places that it does not cover, and these (cells).
+    /// Vertices beside positions that it does not cover, and these (cells).
     pub bare: Vec<bool>,
-    pub places: Vec<DVec3>,
+    pub positions: Vec<DVec3>,
     /// How near is beside (cells).
     pub reach: f64,
     /// What it should have of the parts that it does not cover at all.

@@ -46,7 +46,7 @@ pub(super) mod ffi {
         x: i32,
         y: i32,
         z: i32,
-        /// 1 for a place of 8 voxels along an edge, 2 for 128, 3 for 4096.
+        /// 1 for a position of 8 voxels along an edge, 2 for 128, 3 for 4096.
         level: u32,
         active: bool,
         /// Of a float the first number.
@@ -244,7 +244,7 @@ pub(super) mod ffi {
         ) -> Result<UniquePtr<VectorGrid>>;
 
         type PointGrid;
-        /// Points, with the places within their voxels as the first array. `order` lists the points by leaf and voxel, or is
+        /// Points, with the positions within their voxels as the first array. `order` lists the points by leaf and voxel, or is
         /// empty when they are in that order; `starts` are the indices in it of the first point of each leaf.
         fn make_points(
             call: &Call,

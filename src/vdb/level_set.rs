@@ -128,9 +128,9 @@ fn same_lattice(a: &FloatGrid, b: &FloatGrid) -> Result<()> {
         return Err(Error::argument(what));
     }
     // A cell's corner and its neighbours along the axes determine an affine map.
-    let places = [DVec3::zeros(), DVec3::x(), DVec3::y(), DVec3::z()];
-    let apart = |place: DVec3| (a.index_to_world(place) - b.index_to_world(place)).amax();
-    if places.into_iter().map(apart).fold(0.0, f64::max) > 1e-6 * cell_a {
+    let positions = [DVec3::zeros(), DVec3::x(), DVec3::y(), DVec3::z()];
+    let apart = |position: DVec3| (a.index_to_world(position) - b.index_to_world(position)).amax();
+    if positions.into_iter().map(apart).fold(0.0, f64::max) > 1e-6 * cell_a {
         return Err(Error::argument("the level sets' cells are shifted or turned against each other"));
     }
     Ok(())

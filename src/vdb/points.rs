@@ -66,14 +66,14 @@ pub fn to_bytes(ctx: &Context, name: &str, points: &Points, options: &WriteOptio
     let leaf = |n: usize| at(n).map(|part| part >> 3);
     let count = points.count();
     let starts: Vec<usize> = (0..count).filter(|&n| n == 0 || leaf(n) != leaf(n - 1)).collect();
-    let places = ffi::PointArray {
+    let positions = ffi::PointArray {
         name: "P".into(),
         kind: 4,
         uniform: false,
         address: points.offsets.as_ptr() as usize,
     };
     let arrays: Vec<ffi::PointArray> =
-        std::iter::once(places).chain(points.attributes.iter().map(array)).collect();
+        std::iter::once(positions).chain(points.attributes.iter().map(array)).collect();
     let (call, _running) = call(ctx);
     let (cells, order) = (points.cells.as_flattened(), order.as_deref().unwrap_or_default());
     let grid =
@@ -93,7 +93,7 @@ pub fn write(ctx: &Context, path: &Path, name: &str, points: &Points, options: &
 
 /// The points of the grid of that name; without a name those of the file's first grid of points. Codecs of 16 and 8 bits are
 /// decoded; attributes of types that [`Values`] does not hold are named in a warning and left out, groups without one. A
-/// transform that is more than a voxel size becomes part of the places.
+/// transform that is more than a voxel size becomes part of the positions.
 ///
 /// In a program that called [`guard::install`], files that are not its own are decoded by another process.
 ///
@@ -168,9 +168,9 @@ pub(super) fn of_grid(
     for attribute in &head.attributes {
         let ffi::PointAttribute { name, type_name, kind, uniform } = attribute;
         let count = if *uniform { 1 } else { head.count };
-        // The places are an array even where all points lie in the middle of their voxel.
-        let is_place = name == "P";
-        let count = if is_place { head.count } else { count };
+        // The positions are an array even where all points lie in the middle of their voxel.
+        let is_position = name == "P";
+        let count = if is_position { head.count } else { count };
         macro_rules! column {
             ($type:ty, $values:expr) => {{
                 let mut values = room::<$type>(count).ok_or_else(out_of_memory)?;
@@ -188,7 +188,7 @@ pub(super) fn of_grid(
                 let values = values.into_iter().map(|byte| byte != 0).collect();
                 Values::Bool(shared(values, *uniform))
             }),
-            4 if is_place => {
+            4 if is_position => {
                 points.offsets = column!([f32; 3], |values| values);
                 continue;
             }
@@ -203,7 +203,7 @@ pub(super) fn of_grid(
     if points.offsets.len() != points.cells.len() {
         return Err("the .vdb file is damaged, or its points have no places".into());
     }
-    place(&mut points, &head)?;
+    position(&mut points, &head)?;
     points.validate().map_err(|error| error.to_string())?;
     Ok((points, skipped))
 }
@@ -223,9 +223,9 @@ fn shared<T: Copy>(values: Vec<T>, uniform: bool) -> Column<T> {
     }
 }
 
-/// Brings places into voxels of their own, where the file has another transform than a voxel size or has points outside
+/// Brings positions into voxels of their own, where the file has another transform than a voxel size or has points outside
 /// the voxels that it puts them in.
-fn place(points: &mut Points, head: &ffi::PointsHead) -> std::result::Result<(), String> {
+fn position(points: &mut Points, head: &ffi::PointsHead) -> std::result::Result<(), String> {
     if !head.is_linear {
         return Err(format!("grid \"{}\" has points in a space that is not linear", head.name));
     }
@@ -247,8 +247,8 @@ fn place(points: &mut Points, head: &ffi::PointsHead) -> std::result::Result<(),
             [0, 1, 2].map(|to| m[12 + to] + (0..3).map(|from| index[from] * m[4 * from + to]).sum::<f64>()),
         )
     };
-    let places: Vec<DVec3> = points.cells.iter().zip(&points.offsets).map(world).collect();
-    let placed = Points::at(head.voxel, &places).map_err(|error| error.to_string())?;
+    let positions: Vec<DVec3> = points.cells.iter().zip(&points.offsets).map(world).collect();
+    let placed = Points::at(head.voxel, &positions).map_err(|error| error.to_string())?;
     (points.cells, points.offsets) = (placed.cells, placed.offsets);
     Ok(())
 }

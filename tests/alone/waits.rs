@@ -47,7 +47,7 @@ fn terminate_all_along(folder: &Path, arguments: &str, step: Duration, most: u32
 
 /// A sheet of so many squares each way, all of it open at its rim.
 fn sheet(n: u32) -> TriMesh {
-    let place = |i: u32| {
+    let position = |i: u32| {
         Vec3::new((i / (n + 1)) as f32, ((i * 7919) % 13) as f32 * 0.01, (i % (n + 1)) as f32) * 0.001
     };
     let square = |i: u32| {
@@ -55,7 +55,7 @@ fn sheet(n: u32) -> TriMesh {
         [[a, a + 1, a + n + 1], [a + 1, a + n + 2, a + n + 1]]
     };
     TriMesh {
-        positions: (0..(n + 1) * (n + 1)).map(place).collect(),
+        positions: (0..(n + 1) * (n + 1)).map(position).collect(),
         triangles: (0..n * n).flat_map(square).collect(),
     }
 }

@@ -53,28 +53,28 @@ impl Dice {
     }
 }
 
-/// A body; places in cells.
+/// A body; positions in cells.
 #[derive(Clone)]
 pub struct Body {
     pub name: String,
-    pub places: Vec<DVec3>,
+    pub positions: Vec<DVec3>,
     /// Counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
     /// Triangles that close it where it is open, each from a rim to a vertex in its middle, which is the last corner; rim by rim.
     pub closing: Vec<[u32; 3]>,
-    /// Bodies of one group may share places, and are inside out together.
+    /// Bodies of one group may share positions, and are inside out together.
     pub group: usize,
     /// Whether edges may have more than two triangles.
     pub is_tangled: bool,
 }
 
 impl Body {
-    /// A shape that is closed, by place at least, times `size`.
+    /// A shape that is closed, by position at least, times `size`.
     pub fn of(name: &str, shape: TriMesh, size: f64) -> Self {
         let shape = if shape.volume() < 0.0 { shape.reversed() } else { shape };
         Self {
             name: name.into(),
-            places: shape.positions.iter().map(|place| place.cast::<f64>() * size).collect(),
+            positions: shape.positions.iter().map(|position| position.cast::<f64>() * size).collect(),
             triangles: shape.triangles,
             closing: Vec::new(),
             group: 0,
@@ -84,14 +84,14 @@ impl Body {
 
     /// Moves it (cells).
     pub fn moved(mut self, by: DVec3) -> Self {
-        self.places.iter_mut().for_each(|place| *place += by);
+        self.positions.iter_mut().for_each(|position| *position += by);
         self
     }
 
     /// Makes it smaller or larger about its middle.
     pub fn scaled(mut self, by: f64) -> Self {
-        let middle = self.places.iter().sum::<DVec3>() / self.places.len() as f64;
-        self.places.iter_mut().for_each(|place| *place = middle + (*place - middle) * by);
+        let middle = self.positions.iter().sum::<DVec3>() / self.positions.len() as f64;
+        self.positions.iter_mut().for_each(|position| *position = middle + (*position - middle) * by);
         self
     }
 
@@ -100,27 +100,30 @@ impl Body {
         let x = dice.direction();
         let z = x.cross(&dice.direction()).normalize();
         let y = z.cross(&x);
-        self.places.iter_mut().for_each(|place| *place = x * place.x + y * place.y + z * place.z);
+        self.positions
+            .iter_mut()
+            .for_each(|position| *position = x * position.x + y * position.y + z * position.z);
         self
     }
 
     /// Presses it along the axes.
     fn pressed(mut self, dice: &mut Dice) -> Self {
         let by = DVec3::from([(); 3].map(|()| dice.between(0.25, 1.0)));
-        self.places.iter_mut().for_each(|place| *place = place.component_mul(&by));
+        self.positions.iter_mut().for_each(|position| *position = position.component_mul(&by));
         self
     }
 
-    /// Moves each place by up to an edge, so that the surface crosses itself. None where little of the volume would be left.
+    /// Moves each position by up to an edge, so that the surface crosses itself. None where little of the volume would be left.
     fn shaken(&self, dice: &mut Dice) -> Option<Self> {
-        let length = |[a, b, _]: &[u32; 3]| (self.places[*a as usize] - self.places[*b as usize]).norm();
+        let length =
+            |[a, b, _]: &[u32; 3]| (self.positions[*a as usize] - self.positions[*b as usize]).norm();
         let mean = self.triangles.iter().map(length).sum::<f64>() / self.triangles.len() as f64;
         let most = mean * dice.between(0.2, 1.0);
-        let moves: Vec<DVec3> = self.places.iter().map(|_| dice.vector(most)).collect();
+        let moves: Vec<DVec3> = self.positions.iter().map(|_| dice.vector(most)).collect();
         let mut shaken = self.clone();
-        // Vertices at one place stay together.
-        for (place, first) in shaken.places.iter_mut().zip(coincident(self.places.iter().copied())) {
-            *place += moves[first as usize];
+        // Vertices at one position stay together.
+        for (position, first) in shaken.positions.iter_mut().zip(coincident(self.positions.iter().copied())) {
+            *position += moves[first as usize];
         }
         shaken.name.insert_str(0, "noisy ");
         (shaken.volume() > 0.3 * self.volume()).then_some(shaken)
@@ -129,7 +132,7 @@ impl Body {
     /// Enclosed volume (cells^3).
     fn volume(&self) -> f64 {
         let six = |triangle: &[u32; 3]| {
-            let [a, b, c] = triangle.map(|vertex| self.places[vertex as usize]);
+            let [a, b, c] = triangle.map(|vertex| self.positions[vertex as usize]);
             a.dot(&b.cross(&c))
         };
         self.triangles.iter().chain(&self.closing).map(six).sum::<f64>() / 6.0
@@ -146,7 +149,7 @@ impl Body {
         let open: Vec<([u32; 2], i32)> =
             edges.chunk_by(|a, b| a.0 == b.0).map(sum).filter(|(_, times)| *times != 0).collect();
         // Those that hang together get the least of their vertices as label.
-        let mut labels: Vec<u32> = (0..self.places.len() as u32).collect();
+        let mut labels: Vec<u32> = (0..self.positions.len() as u32).collect();
         loop {
             let mut is_settled = true;
             for ([a, b], _) in &open {
@@ -165,15 +168,15 @@ impl Body {
         rims.sort_unstable();
         rims.dedup();
         for rim in rims {
-            let middle = self.places.len() as u32;
+            let middle = self.positions.len() as u32;
             let (mut sum, mut count) = (DVec3::zeros(), 0.0);
             for ([a, b], times) in open.iter().filter(|&edge| label(edge) == rim) {
-                sum += self.places[*a as usize] + self.places[*b as usize];
+                sum += self.positions[*a as usize] + self.positions[*b as usize];
                 count += 2.0;
                 let back = if *times > 0 { [*b, *a, middle] } else { [*a, *b, middle] };
                 self.closing.extend((0..times.abs()).map(|_| back));
             }
-            self.places.push(sum / count);
+            self.positions.push(sum / count);
         }
         self
     }
@@ -230,10 +233,10 @@ fn level(budget: usize) -> usize {
 fn star(dice: &mut Dice, level: usize) -> TriMesh {
     let waves = [(); 3].map(|()| (dice.vector(6.0), dice.between(0.0, 6.3)));
     let mut mesh = icosphere(level);
-    for place in &mut mesh.positions {
-        let unit: DVec3 = place.cast();
+    for position in &mut mesh.positions {
+        let unit: DVec3 = position.cast();
         let high = waves.iter().map(|(along, begin)| libm::sin(along.dot(&unit) + begin)).sum::<f64>();
-        *place = (unit * (0.7 + 0.1 * high)).cast();
+        *position = (unit * (0.7 + 0.1 * high)).cast();
     }
     mesh
 }
@@ -304,7 +307,7 @@ const MODELS: [&str; 7] = [
     "beetle-alt.obj",
 ];
 
-/// The models that are there, vertices at one place joined.
+/// The models that are there, vertices at one position joined.
 pub fn models() -> Vec<TriMesh> {
     let read = |name: &&str| {
         let path = data(&format!("mesh/{name}"));
@@ -312,7 +315,7 @@ pub fn models() -> Vec<TriMesh> {
             eprintln!("skipped: no mesh/{name}");
         }
         let mut model = mesh::read(&path?).expect("a mesh");
-        let same = coincident(model.positions.iter().map(|place| place.cast()));
+        let same = coincident(model.positions.iter().map(|position| position.cast()));
         model.triangles.iter_mut().for_each(|triangle| *triangle = triangle.map(|n| same[n as usize]));
         model.triangles.retain(|triangle| !is_collapsed(triangle));
         Some(model.without_unused())
@@ -330,7 +333,7 @@ pub fn model(dice: &mut Dice, models: &[TriMesh], size: f64, budget: usize) -> B
     let mut mesh = decimated(dice, &models[which], budget);
     let (low, high) = mesh.bounds().expect("a model has vertices");
     let (middle, half) = ((low + high) / 2.0, (high - low).amax() / 2.0);
-    mesh.positions.iter_mut().for_each(|place| *place = (*place - middle) / half);
+    mesh.positions.iter_mut().for_each(|position| *position = (*position - middle) / half);
     let mut body = Body::of("model", mesh, size).closed();
     body.is_tangled = true;
     if !body.closing.is_empty() {
@@ -351,16 +354,16 @@ fn decimated(dice: &mut Dice, model: &TriMesh, budget: usize) -> TriMesh {
     let mut numbers: HashMap<[i64; 3], u32> = HashMap::new();
     let mut sums: Vec<(DVec3, f64)> = Vec::new();
     let mut joined = Vec::with_capacity(model.positions.len());
-    for place in &model.positions {
-        let place: DVec3 = place.cast();
-        let at = (place + shift) / cube;
+    for position in &model.positions {
+        let position: DVec3 = position.cast();
+        let at = (position + shift) / cube;
         let next = sums.len() as u32;
         let number = *numbers.entry([at.x, at.y, at.z].map(|x| x.floor() as i64)).or_insert(next);
         if number == next {
             sums.push((DVec3::zeros(), 0.0));
         }
         let (sum, count) = &mut sums[number as usize];
-        *sum += place;
+        *sum += position;
         *count += 1.0;
         joined.push(number);
     }

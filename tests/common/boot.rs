@@ -57,12 +57,12 @@ pub fn left_boot() -> TriMesh {
     boot
 }
 
-/// How far the middle of a right boot lies inward (towards +X) at a place along it (m): the big toe is inside.
+/// How far the middle of a right boot lies inward (towards +X) at a position along it (m): the big toe is inside.
 fn bend(z: f32) -> f32 {
     0.014 * ((z - 0.03).max(0.0) / 0.16).powi(2)
 }
 
-/// Half the sole's width at a place along the boot (m).
+/// Half the sole's width at a position along the boot (m).
 fn half_width(z: f32) -> f32 {
     let s = ((z - 0.0525) / 0.1425).clamp(-1.0, 1.0);
     let round = (1.0 - s * s).max(0.0).powf(0.36);
@@ -89,7 +89,7 @@ fn upper() -> TriMesh {
             let angle = std::f32::consts::TAU * point as f32 / RING as f32;
             let (sine, cosine) = angle.sin_cos();
             let z = (front + back) / 2.0 + (front - back) / 2.0 * cosine;
-            // The outline's own place along the sole, squeezed into this ring.
+            // The outline's own position along the sole, squeezed into this ring.
             let along = 0.0525 + 0.1425 * cosine;
             let x = sine.signum() * half_width(along).max(0.02 * sine.abs()) * width;
             // Low rings follow the sole, high ones are level.

@@ -26,18 +26,18 @@ pub struct Ball {
 }
 
 impl Ball {
-    /// Around a hole with these places: it may be closed in any way within its own size and three cells.
-    fn around(places: &[DVec3], cell: f64) -> Self {
-        let centre = places.iter().sum::<DVec3>() / places.len() as f64;
-        let reach = places.iter().map(|place| (place - centre).norm()).fold(0.0, f64::max);
+    /// Around a hole with these positions: it may be closed in any way within its own size and three cells.
+    fn around(positions: &[DVec3], cell: f64) -> Self {
+        let centre = positions.iter().sum::<DVec3>() / positions.len() as f64;
+        let reach = positions.iter().map(|position| (position - centre).norm()).fold(0.0, f64::max);
         Self { centre, radius: 3.0 * reach + 3.0 * cell }
     }
 }
 
 impl Broken {
-    /// Whether it is not known what is meant at a place (m).
-    pub fn is_unclear(&self, place: DVec3) -> bool {
-        self.unclear.iter().any(|ball| (place - ball.centre).norm() < ball.radius)
+    /// Whether it is not known what is meant at a position (m).
+    pub fn is_unclear(&self, position: DVec3) -> bool {
+        self.unclear.iter().any(|ball| (position - ball.centre).norm() < ball.radius)
     }
 }
 
@@ -82,12 +82,12 @@ pub fn mesh(seed: u64, models: &[TriMesh]) -> Broken {
     if kind < 2 {
         at = at.map(f64::round);
     }
-    let place = |place: &DVec3| -> Vec3 { ((place + at) * cell).cast() };
-    let parts = bodies.iter().map(|body| part(body, place)).collect::<Vec<TriMesh>>();
+    let position = |position: &DVec3| -> Vec3 { ((position + at) * cell).cast() };
+    let parts = bodies.iter().map(|body| part(body, position)).collect::<Vec<TriMesh>>();
     let mut making = Making::of(&mut dice, &bodies, &parts, cell);
     if dice.one_in(8) {
         making.what.push("a far vertex that is not used".into());
-        making.mesh.positions.push(place(&(dice.direction() * (1000.0 * span))));
+        making.mesh.positions.push(position(&(dice.direction() * (1000.0 * span))));
     }
     making.add_faults(&mut dice);
     let Making { mesh, unclear, what, .. } = making;
@@ -96,7 +96,7 @@ pub fn mesh(seed: u64, models: &[TriMesh]) -> Broken {
     Broken { mesh, cell, what, parts, unclear }
 }
 
-/// Bodies of any shape at any place, some of them twice or within another.
+/// Bodies of any shape at any position, some of them twice or within another.
 fn anywhere(dice: &mut Dice, span: f64, budget: usize) -> Vec<Body> {
     let count = 1 + dice.below(6);
     let mut bodies: Vec<Body> = Vec::new();
@@ -170,9 +170,9 @@ fn with_model(dice: &mut Dice, span: f64, budget: usize, models: &[TriMesh]) -> 
 }
 
 /// What a body is meant to be: closed, and turned outward as rounding leaves it.
-fn part(body: &Body, place: impl Fn(&DVec3) -> Vec3) -> TriMesh {
+fn part(body: &Body, position: impl Fn(&DVec3) -> Vec3) -> TriMesh {
     let triangles = [&body.triangles[..], &body.closing[..]].concat();
-    let part = TriMesh { positions: body.places.iter().map(place).collect(), triangles };
+    let part = TriMesh { positions: body.positions.iter().map(position).collect(), triangles };
     if part.volume() < 0.0 { part.reversed() } else { part }
 }
 
@@ -331,8 +331,9 @@ impl Making {
 
     /// What is meant is not known around these triangles.
     fn blur(&mut self, triangles: &[usize]) {
-        let places: Vec<DVec3> = triangles.iter().flat_map(|triangle| self.mesh.corners(*triangle)).collect();
-        self.unclear.push(Ball::around(&places, self.cell));
+        let positions: Vec<DVec3> =
+            triangles.iter().flat_map(|triangle| self.mesh.corners(*triangle)).collect();
+        self.unclear.push(Ball::around(&positions, self.cell));
     }
 
     /// Gives all or some corners vertices of their own.

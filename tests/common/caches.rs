@@ -8,8 +8,9 @@ use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
 
-/// Places (m), velocities (m/s), identities and one more number of the four.
-pub const PLACES: [[f32; 3]; 4] = [[0.1, -2.5, 1e-7], [1.0, 0.0, 3.0], [4.0, 5.0, -6.0], [0.25, 0.5, 0.75]];
+/// Positions (m), velocities (m/s), identities and one more number of the four.
+pub const POSITIONS: [[f32; 3]; 4] =
+    [[0.1, -2.5, 1e-7], [1.0, 0.0, 3.0], [4.0, 5.0, -6.0], [0.25, 0.5, 0.75]];
 pub const VELOCITIES: [[f32; 3]; 4] = [[0.0, -9.81, 0.0], [1.5, 0.1, 0.2], [-1.0, 2.0, 3.0], [0.0; 3]];
 pub const IDS: [u32; 4] = [7, 3_000_000_000, 0, 12];
 pub const KINDS: [u8; 4] = [0, 1, 255, 1];
@@ -44,7 +45,7 @@ pub fn vtk(binary: bool, version: &str, dataset: &str) -> Vec<u8> {
     let mut out = (head + "FIELD FieldData 1\nTIME 1 1 double\n").into_bytes();
     vtk_numbers(&mut out, binary, &[0.5f64], |n| n.to_be_bytes());
     out.extend(b"POINTS 4 float\n");
-    vtk_numbers(&mut out, binary, PLACES.as_flattened(), |n| n.to_be_bytes());
+    vtk_numbers(&mut out, binary, POSITIONS.as_flattened(), |n| n.to_be_bytes());
     let cells = if dataset == "POLYDATA" { "VERTICES" } else { "CELLS" };
     if version == "5.1" {
         out.extend(b"METADATA\nINFORMATION 1\nNAME L2_NORM_RANGE LOCATION vtkDataArray\nDATA 2 0 1\n\n");
@@ -157,7 +158,7 @@ impl Vtu {
             ),
         );
         let mut appended = Vec::new();
-        for points in PLACES
+        for points in POSITIONS
             .chunks(4 / self.pieces)
             .enumerate()
             .map(|(n, points)| n * points.len()..(n + 1) * points.len())
@@ -193,9 +194,9 @@ impl Vtu {
             array("kind", "UInt8", 1, kinds);
             array("mass of each", "Float32", 1, mass);
             array("pair", "Float32", 2, pair);
-            let places = floats(PLACES[points.clone()].as_flattened());
-            array("Points", "Float32", 3, places);
-            // Points have a place of their own.
+            let positions = floats(POSITIONS[points.clone()].as_flattened());
+            array("Points", "Float32", 3, positions);
+            // Points have a position of their own.
             let at = xml.rfind("<DataArray").unwrap();
             xml.insert_str(
                 at,
@@ -237,7 +238,7 @@ pub fn bgeo() -> Vec<u8> {
     name(&mut out, "pscale", 1, 0);
     out.extend([0; 4]);
     for n in 0..4 {
-        PLACES[n].iter().chain(&[1.0]).for_each(|part| out.extend(part.to_be_bytes()));
+        POSITIONS[n].iter().chain(&[1.0]).for_each(|part| out.extend(part.to_be_bytes()));
         out.extend((n as i32 - 1).to_be_bytes());
         out.extend(1u32.to_be_bytes());
         VELOCITIES[n].iter().chain(&[0.5, 0.5, 0.125]).for_each(|part| out.extend(part.to_be_bytes()));

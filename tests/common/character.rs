@@ -28,19 +28,20 @@ pub fn farthest_from_blender(path: &Path) -> (f64, f64) {
     let (mut vertices, mut farthest, mut height) = (Vec::new(), 0.0f64, 0.0);
     for line in BLENDER.lines().filter(|line| !line.starts_with('#')) {
         let numbers: Vec<f64> = line.split(' ').map(|word| word.parse().unwrap()).collect();
-        let places: Vec<DVec3> = numbers[1..].chunks(3).map(|p| DVec3::new(p[0], p[1], p[2])).collect();
+        let positions: Vec<DVec3> = numbers[1..].chunks(3).map(|p| DVec3::new(p[0], p[1], p[2])).collect();
         character.pose(numbers[0] / 24.0, &mut pose).unwrap();
         if vertices.is_empty() {
-            // Blender numbers the vertices as the file does: at the first frame each is known by its place.
-            let nearest = |place: &DVec3| {
-                let distance = |vertex: &usize| (pose[*vertex] - place).norm();
+            // Blender numbers the vertices as the file does: at the first frame each is known by its position.
+            let nearest = |position: &DVec3| {
+                let distance = |vertex: &usize| (pose[*vertex] - position).norm();
                 (0..pose.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
             };
-            vertices = places.iter().map(nearest).collect::<Vec<usize>>();
+            vertices = positions.iter().map(nearest).collect::<Vec<usize>>();
             let heights = pose.iter().map(|p| p.y);
             height = heights.clone().fold(f64::MIN, f64::max) - heights.fold(f64::MAX, f64::min);
         }
-        let apart = vertices.iter().zip(&places).map(|(&vertex, place)| (pose[vertex] - place).norm());
+        let apart =
+            vertices.iter().zip(&positions).map(|(&vertex, position)| (pose[vertex] - position).norm());
         farthest = apart.fold(farthest, f64::max);
     }
     assert_eq!(vertices.len(), VERTICES);

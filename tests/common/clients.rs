@@ -62,7 +62,7 @@ pub fn particles_python() -> Option<PathBuf> {
 }
 
 /// pysplashsurf and meshio read a file of particles and write down what they see: of each particle, in the file's order, its
-/// identity (64-bit integer) and its place (three doubles).
+/// identity (64-bit integer) and its position (three doubles).
 pub fn reads_particles(python: &Path, file: &Path, records: &Path) -> Result<String, String> {
     let mut command = Command::new(python);
     command.arg(root().join("tests/clients/particles.py")).arg(file).arg(records);

@@ -21,19 +21,19 @@ impl Whole {
             assert!(bits >> 52 != 0, "{value} is a denormal");
             let mantissa = (bits & ((1 << 52) - 1) | 1 << 52) as u128;
             let zeros = mantissa.trailing_zeros() as i32;
-            let place = (bits >> 52) as i32 - 1075 + zeros + scale;
-            assert!(place >= 0, "{value} is no multiple of 2^-{scale}");
-            let wide = mantissa >> zeros << (place % 32);
+            let position = (bits >> 52) as i32 - 1075 + zeros + scale;
+            assert!(position >= 0, "{value} is no multiple of 2^-{scale}");
+            let wide = mantissa >> zeros << (position % 32);
             for turn in 0..3 {
                 let digit = (wide >> (32 * turn)) as i64 & 0xffff_ffff;
-                digits[place as usize / 32 + turn] = if value < 0.0 { -digit } else { digit };
+                digits[position as usize / 32 + turn] = if value < 0.0 { -digit } else { digit };
             }
         }
         Self(digits)
     }
 
     fn sum(self, other: Self, sign: i64) -> Self {
-        Self(std::array::from_fn(|place| self.0[place] + sign * other.0[place]))
+        Self(std::array::from_fn(|position| self.0[position] + sign * other.0[position]))
     }
 
     /// Digits of one sign.
@@ -53,9 +53,9 @@ impl Whole {
 
     fn times(&self, other: &Self) -> Self {
         let mut digits = [0; Self::DIGITS];
-        for (place, digit) in self.0.iter().enumerate().filter(|(_, digit)| **digit != 0) {
+        for (position, digit) in self.0.iter().enumerate().filter(|(_, digit)| **digit != 0) {
             for (other, factor) in other.0.iter().enumerate().filter(|(_, factor)| **factor != 0) {
-                digits[place + other] += i128::from(*digit) * i128::from(*factor);
+                digits[position + other] += i128::from(*digit) * i128::from(*factor);
             }
         }
         Self::carried(digits)
@@ -86,15 +86,16 @@ fn area(a: Vec3, b: Vec3, s: &[Whole; 2]) -> Whole {
 
 /// The triangles that the vertical line at (x, z) crosses. They are those of a line that is really shifted, by (2^-200, 2^-400).
 fn changes(mesh: &TriMesh, at: [f64; 2]) -> Vec<Change> {
-    let exact = at.map(|place| Whole::of(place, 448));
+    let exact = at.map(|position| Whole::of(position, 448));
     let mut shifted = exact;
-    for (place, shift) in shifted.iter_mut().zip([200, 400]) {
-        *place = place.sum(Whole::of(1.0, 448 - shift), 1);
+    for (position, shift) in shifted.iter_mut().zip([200, 400]) {
+        *position = position.sum(Whole::of(1.0, 448 - shift), 1);
     }
     let around = |corners: &[Vec3; 3]| {
         [0, 2].iter().zip(at).all(|(&axis, at)| {
-            let places = corners.map(|corner| f64::from(corner[axis]));
-            places.iter().any(|place| *place <= at) && places.iter().any(|place| *place >= at)
+            let positions = corners.map(|corner| f64::from(corner[axis]));
+            positions.iter().any(|position| *position <= at)
+                && positions.iter().any(|position| *position >= at)
         })
     };
     let corners = mesh.triangles.iter().map(|triangle| triangle.map(|n| mesh.positions[n as usize]));
@@ -149,14 +150,16 @@ pub fn wrong(mesh: &TriMesh, at: [f64; 2], heights: &Heights, solids: &[Solid]) 
     units.sort_unstable();
     units.dedup();
     // Crossings nearer than 2^-8 units to a middle may be on either side of it.
-    let winding = |place: f64| {
-        let height = heights.low + place * heights.unit;
+    let winding = |position: f64| {
+        let height = heights.low + position * heights.unit;
         changes.iter().filter(|change| change.is_above(height)).map(|change| change.change).sum::<i32>()
     };
     units.retain(|&unit| {
         let is_solid = solids.iter().any(|[bottom, top]| *bottom <= unit && unit < *top);
         let middle = f64::from(unit) + 0.5;
-        [middle - 1.0 / 256.0, middle + 1.0 / 256.0].into_iter().all(|place| is_solid != (winding(place) > 0))
+        [middle - 1.0 / 256.0, middle + 1.0 / 256.0]
+            .into_iter()
+            .all(|position| is_solid != (winding(position) > 0))
     });
     units
 }
@@ -176,7 +179,7 @@ pub fn random(dice: &mut Dice, cell: f64) -> TriMesh {
             place.cast::<f32>()
         };
         mesh.append(&TriMesh {
-            positions: body.places.iter().map(position).collect(),
+            positions: body.positions.iter().map(position).collect(),
             triangles: body.triangles,
         });
     }

@@ -71,9 +71,9 @@ impl Motion for Mirrored {
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         let along = 1.0 - 3.0 * (1.0 - (2.0 * time - 1.0).abs());
-        let place = |p: &Vec3| DVec3::new(f64::from(p.x) * along, f64::from(p.y), f64::from(p.z));
+        let position = |p: &Vec3| DVec3::new(f64::from(p.x) * along, f64::from(p.y), f64::from(p.z));
         out.clear();
-        out.extend(self.0.positions.iter().map(place));
+        out.extend(self.0.positions.iter().map(position));
         Ok(())
     }
 

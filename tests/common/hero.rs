@@ -1,4 +1,4 @@
-//! A skinned figure that walks in its place, as a .glb file: made by code, for demonstrations and tests.
+//! A skinned figure that walks in its position, as a .glb file: made by code, for demonstrations and tests.
 
 use std::f32::consts::PI;
 
@@ -16,7 +16,7 @@ const SHIN: f32 = 0.42;
 const SINK: f32 = 0.07;
 const LIFT: f32 = 0.3;
 
-/// Joints: name, parent, place at rest (m).
+/// Joints: name, parent, position at rest (m).
 const JOINTS: [(&str, usize, [f32; 3]); 10] = [
     ("hips", 0, [0.0, 0.92, 0.0]),
     ("thigh_l", 0, [0.1, 0.92, 0.0]),
@@ -44,9 +44,9 @@ impl Skin {
     fn tube(&mut self, rings: &[([f32; 3], f32, f32)], hangs: impl Fn(f32) -> (u8, u8, f32)) {
         const AROUND: u32 = 20;
         let first = self.positions.len() as u32;
-        let mut add = |place: [f32; 3]| {
-            let (a, b, part) = hangs(place[1]);
-            self.positions.push(place);
+        let mut add = |position: [f32; 3]| {
+            let (a, b, part) = hangs(position[1]);
+            self.positions.push(position);
             self.joints.push([a, b, 0, 0]);
             self.weights.push([1.0 - part, part, 0.0, 0.0]);
         };
@@ -141,10 +141,10 @@ pub fn glb() -> Vec<u8> {
         [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -x, -y, -z, 1.0]
     };
     let inverse = file.floats("MAT4", &JOINTS.iter().flat_map(inverse).collect::<Vec<f32>>());
-    let node = |(index, (name, parent, place)): (usize, &(&str, usize, [f32; 3]))| {
+    let node = |(index, (name, parent, position)): (usize, &(&str, usize, [f32; 3]))| {
         let from = if index == 0 { [0.0; 3] } else { JOINTS[*parent].2 };
         let children: Vec<usize> = (1..JOINTS.len()).filter(|child| JOINTS[*child].1 == index).collect();
-        let offset: Vec<f32> = (0..3).map(|axis| place[axis] - from[axis]).collect();
+        let offset: Vec<f32> = (0..3).map(|axis| position[axis] - from[axis]).collect();
         let mut node = json!({ "name": name, "translation": offset });
         if !children.is_empty() {
             node["children"] = json!(children);
@@ -166,9 +166,9 @@ pub fn glb() -> Vec<u8> {
     chunks(json.to_string().into_bytes(), file.bytes)
 }
 
-fn bounds(places: &[[f32; 3]]) -> ([f32; 3], [f32; 3]) {
+fn bounds(positions: &[[f32; 3]]) -> ([f32; 3], [f32; 3]) {
     let fold = |pick: fn(f32, f32) -> f32, start: f32| {
-        [0, 1, 2].map(|axis| places.iter().map(|place| place[axis]).fold(start, pick))
+        [0, 1, 2].map(|axis| positions.iter().map(|position| position[axis]).fold(start, pick))
     };
     (fold(f32::min, f32::MAX), fold(f32::max, f32::MIN))
 }

@@ -111,7 +111,7 @@ impl Terrain {
         mesh
     }
 
-    /// Height (m) of the mesh over a place; none beyond its rim.
+    /// Height (m) of the mesh over a position; none beyond its rim.
     pub fn height_at(&self, x: f64, z: f64) -> Option<f64> {
         let [u, v] = [(x, 0), (z, 1)].map(|(at, axis)| (at + 0.5 * SIZE[axis]) / SQUARE);
         let counts = Self::counts();
@@ -151,8 +151,8 @@ impl Terrain {
         let snow = layer(ctx, &initial::Ground::Mesh(mesh.clone()), &[], &Cover::Depth(DEPTH), CELL, 3.0);
         let (bodies, ground) = ([self.ball(clearance)], [Ground::new(&mesh)]);
         let lowest = mesh.bounds().map_or(0.0, |(low, _)| f64::from(low.y)) - 1.0;
-        story(ctx, snow.unwrap(), &bodies, params, (&ground, None, lowest), |place| {
-            self.height_at(place.x, place.z).map(|height| height - place.y)
+        story(ctx, snow.unwrap(), &bodies, params, (&ground, None, lowest), |position| {
+            self.height_at(position.x, position.z).map(|height| height - position.y)
         })
     }
 }
@@ -167,8 +167,8 @@ pub fn squeeze(ctx: &Context, params: Params) -> Outcome {
         let keys = Keys::new(vec![key(0.0, 0.14), key(0.4, 0.016), key(0.5, 0.016)]).unwrap();
         Body::new(Box::new(Rigid::new(cuboid([0.03, 0.3, 0.16]), keys)), 0.0).unwrap()
     };
-    story(ctx, snow.unwrap(), &[plate(-1.0), plate(1.0)], params, (&[], Some(0.0), -1.0), |place| {
-        Some(-place.y)
+    story(ctx, snow.unwrap(), &[plate(-1.0), plate(1.0)], params, (&[], Some(0.0), -1.0), |position| {
+        Some(-position.y)
     })
 }
 
@@ -177,7 +177,7 @@ pub fn params(seed: u64) -> Params {
     Params { seed, compression: [0.5, 0.0, 0.75][seed as usize % 3], ..Params::for_cell(CELL) }
 }
 
-/// The outcome of snow that bodies remove, on ground and a floor, with the lowest height of grains; `depth` is how deep (m) a place
+/// The outcome of snow that bodies remove, on ground and a floor, with the lowest height of grains; `depth` is how deep (m) a position
 /// lies behind them, none beyond them.
 fn story(
     ctx: &Context,
@@ -204,7 +204,7 @@ fn story(
         let lost = (paid + owed - report.owed - report.born as f64).abs();
         owed = report.owed;
         out.unaccounted = out.unaccounted.max(lost).max(out.born.abs_diff(grains.count() + gone) as f64);
-        for deep in grains.places().filter_map(&depth) {
+        for deep in grains.positions().filter_map(&depth) {
             if deep > 1.0e-6 * params.radius {
                 (out.behind, out.deepest) = (out.behind + 1, out.deepest.max(deep));
             }

@@ -1,4 +1,4 @@
-//! A ball of jelly with raised letters: it falls, is squashed, bends and twists. Where each place of it goes is a formula that
+//! A ball of jelly with raised letters: it falls, is squashed, bends and twists. Where each position of it goes is a formula that
 //! keeps all volumes, so that it moves as a viscous liquid may.
 
 use std::f64::consts::TAU;
@@ -43,8 +43,8 @@ const TEXT: [&str; 7] = [
 pub struct Jelly {
     /// Distance between particles (m).
     pub spacing: f64,
-    /// Places of the particles (m).
-    pub places: Vec<DVec3>,
+    /// Positions of the particles (m).
+    pub positions: Vec<DVec3>,
     /// The sculpted surface.
     pub mesh: TriMesh,
 }
@@ -54,19 +54,19 @@ impl Jelly {
     pub fn new(spacing: f64, n: usize) -> Self {
         let size = RADIUS + LETTERS + FLUTES;
         // The surface of particles lies half a spacing above the outermost.
-        let is_inside = |place: DVec3| place.norm() + 0.5 * spacing <= reach(direction(place));
-        let places = filled(spacing, 0.1, size, is_inside);
+        let is_inside = |position: DVec3| position.norm() + 0.5 * spacing <= reach(direction(position));
+        let positions = filled(spacing, 0.1, size, is_inside);
         let mut mesh = globe(1.0, 2 * n, n);
-        for place in &mut mesh.positions {
-            let unit = direction(place.cast());
-            *place = (unit * reach(unit)).cast();
+        for position in &mut mesh.positions {
+            let unit = direction(position.cast());
+            *position = (unit * reach(unit)).cast();
         }
-        Self { spacing, places, mesh }
+        Self { spacing, positions, mesh }
     }
 
     /// Numbers of the mesh's vertices that tell letters from the body: 1 on letters, less beside them.
     pub fn paint(&self) -> MeshArray {
-        let values = self.mesh.positions.iter().map(|place| paint(direction(place.cast()))).collect();
+        let values = self.mesh.positions.iter().map(|position| paint(direction(position.cast()))).collect();
         MeshArray { name: "paint".into(), on: On::Vertices, number: Number::F32, values }
     }
 
@@ -75,9 +75,9 @@ impl Jelly {
     /// # Errors
     /// None for a spacing over 0.
     pub fn points(&self, frame: i32) -> frazil::Result<Points> {
-        let places: Vec<DVec3> = self.places.iter().map(|place| moved(*place, frame)).collect();
-        let mut points = Points::at(self.spacing, &places)?;
-        points.set("id", Values::Long(Column::Each((0..places.len() as i64).collect())));
+        let positions: Vec<DVec3> = self.positions.iter().map(|position| moved(*position, frame)).collect();
+        let mut points = Points::at(self.spacing, &positions)?;
+        points.set("id", Values::Long(Column::Each((0..positions.len() as i64).collect())));
         points.set("pscale", Values::Float(Column::Uniform((0.5 * self.spacing) as f32)));
         Ok(points)
     }
@@ -85,7 +85,7 @@ impl Jelly {
     /// The mesh at the first frame, which is where the tracker finds it.
     pub fn first_mesh(&self) -> TriMesh {
         let mut mesh = self.mesh.clone();
-        mesh.positions.iter_mut().for_each(|place| *place = moved(place.cast(), 1).cast());
+        mesh.positions.iter_mut().for_each(|position| *position = moved(position.cast(), 1).cast());
         mesh
     }
 
@@ -113,8 +113,8 @@ impl Jelly {
     }
 }
 
-/// Where a place of the ball at rest is at a frame (m).
-pub fn moved(place: DVec3, frame: i32) -> DVec3 {
+/// Where a position of the ball at rest is at a frame (m).
+pub fn moved(position: DVec3, frame: i32) -> DVec3 {
     let time = f64::from(frame - 1) / FPS;
     let since = (time - CONTACT).max(0.0);
     let fallen = 0.5 * GRAVITY * (CONTACT * CONTACT - time * time).max(0.0);
@@ -124,15 +124,15 @@ pub fn moved(place: DVec3, frame: i32) -> DVec3 {
     // Each of these steps keeps volumes: lower and as much wider; layers turned; layers moved.
     let lower = 1.0 - swing(0.4, 2.5, 1.8);
     let wider = 1.0 / lower.sqrt();
-    let (x, y, z) = (place.x * wider, (place.y + RADIUS) * lower, place.z * wider);
+    let (x, y, z) = (position.x * wider, (position.y + RADIUS) * lower, position.z * wider);
     let (sine, cosine) = libm::sincos(swing(2.4, 1.0, 1.25) * y);
     let (x, z) = (x * cosine + z * sine, z * cosine - x * sine);
     DVec3::new(x + swing(1.1, 1.2, 1.6) * y * y, y + fallen, z)
 }
 
-/// The unit vector to a place; up for the centre.
-fn direction(place: DVec3) -> DVec3 {
-    place.try_normalize(0.0).unwrap_or_else(DVec3::y)
+/// The unit vector to a position; up for the centre.
+fn direction(position: DVec3) -> DVec3 {
+    position.try_normalize(0.0).unwrap_or_else(DVec3::y)
 }
 
 /// Distance of the surface from the centre in a direction (m).

@@ -38,7 +38,7 @@ impl Random {
     }
 }
 
-/// Places of particles on a grid of a spacing (m), moved by up to `jitter` (spacings), where the grid's places are inside.
+/// Positions of particles on a grid of a spacing (m), moved by up to `jitter` (spacings), where the grid's positions are inside.
 pub fn filled(spacing: f64, jitter: f64, size: f64, is_inside: impl Fn(DVec3) -> bool) -> Vec<DVec3> {
     let mut random = Random(1);
     let count = (size / spacing).ceil() as i32;
@@ -46,11 +46,11 @@ pub fn filled(spacing: f64, jitter: f64, size: f64, is_inside: impl Fn(DVec3) ->
     for x in -count..=count {
         for y in -count..=count {
             for z in -count..=count {
-                let place =
+                let position =
                     (DVec3::new(f64::from(x), f64::from(y), f64::from(z)) + DVec3::repeat(0.5)) * spacing;
                 let moved = random.vector(jitter * spacing);
-                if is_inside(place) {
-                    out.push(place + moved);
+                if is_inside(position) {
+                    out.push(position + moved);
                 }
             }
         }
@@ -59,15 +59,15 @@ pub fn filled(spacing: f64, jitter: f64, size: f64, is_inside: impl Fn(DVec3) ->
 }
 
 /// Particles with ids from 0 on.
-pub fn numbered(places: Vec<DVec3>) -> Particles {
-    let ids = (0..places.len() as i64).collect();
-    Particles { places, ids, velocities: Vec::new() }
+pub fn numbered(positions: Vec<DVec3>) -> Particles {
+    let ids = (0..positions.len() as i64).collect();
+    Particles { positions, ids, velocities: Vec::new() }
 }
 
 /// A ball of liquid: its spacing (m), particles, and a mesh around it with ripples of `detail` spacings.
 pub struct Ball {
     pub spacing: f64,
-    pub places: Vec<DVec3>,
+    pub positions: Vec<DVec3>,
     pub mesh: TriMesh,
 }
 
@@ -75,24 +75,25 @@ pub struct Ball {
 pub fn ball(radius: f64, n: usize, detail: f64) -> Ball {
     let spacing = 0.01;
     let size = radius * spacing;
-    let places = filled(spacing, 0.1, size, |place| place.norm() <= size);
+    let positions = filled(spacing, 0.1, size, |position| position.norm() <= size);
     let mut mesh = sphere(1.0, n);
-    for place in &mut mesh.positions {
-        let unit = place.normalize();
+    for position in &mut mesh.positions {
+        let unit = position.normalize();
         let wave = libm::sinf(9.0 * unit.x) * libm::sinf(9.0 * unit.y) * libm::sinf(9.0 * unit.z);
-        *place = unit * (size + detail * f64::from(wave) * spacing) as f32;
+        *position = unit * (size + detail * f64::from(wave) * spacing) as f32;
     }
-    Ball { spacing, places, mesh }
+    Ball { spacing, positions, mesh }
 }
 
-/// The function of Solenthaler et al. (2007) at a place (m), with the thickness of thin liquids, summed over all particles; for
+/// The function of Solenthaler et al. (2007) at a position (m), with the thickness of thin liquids, summed over all particles; for
 /// cells of half a spacing.
-pub fn plain_phi(places: &[DVec3], spacing: f64, at: DVec3) -> f64 {
+pub fn plain_phi(positions: &[DVec3], spacing: f64, at: DVec3) -> f64 {
     let radius = SUPPORT * spacing;
     let mean = |at: DVec3| {
-        let weight = |place: &DVec3| (1.0 - (place - at).norm_squared() / (radius * radius)).max(0.0).powi(3);
-        let sum: f64 = places.iter().map(weight).sum();
-        places.iter().map(|place| place * weight(place)).sum::<DVec3>() / sum
+        let weight =
+            |position: &DVec3| (1.0 - (position - at).norm_squared() / (radius * radius)).max(0.0).powi(3);
+        let sum: f64 = positions.iter().map(weight).sum();
+        positions.iter().map(|position| position * weight(position)).sum::<DVec3>() / sum
     };
     // The derivative by differences.
     let step = 1e-5 * spacing;
@@ -105,20 +106,20 @@ pub fn plain_phi(places: &[DVec3], spacing: f64, at: DVec3) -> f64 {
     let most = ((rate + rate.transpose()) * 0.5).symmetric_eigenvalues().max();
     let g = ((3.5 - most) / 3.1).clamp(0.0, 1.0);
     let share = if most < 0.4 { 1.0 } else { g.powi(3) - 3.0 * g * g + 3.0 * g };
-    let (offset, away) = plain_offset(places, spacing, at, mean(at) - at);
+    let (offset, away) = plain_offset(positions, spacing, at, mean(at) - at);
     away - offset.min(spacing * share)
 }
 
-/// How far from the mean the surface of a thin liquid lies at a place, and how far that mean is if the way along a sheet counts less (m).
-fn plain_offset(places: &[DVec3], spacing: f64, at: DVec3, mean: DVec3) -> (f64, f64) {
+/// How far from the mean the surface of a thin liquid lies at a position, and how far that mean is if the way along a sheet counts less (m).
+fn plain_offset(positions: &[DVec3], spacing: f64, at: DVec3, mean: DVec3) -> (f64, f64) {
     // Farther than a cell from any surface.
     if mean.norm() > 1.5 * spacing {
         return (spacing, mean.norm());
     }
     let square = (SUPPORT * spacing).powi(2);
-    let near: Vec<(f64, DVec3)> = places
+    let near: Vec<(f64, DVec3)> = positions
         .iter()
-        .map(|place| place - at)
+        .map(|position| position - at)
         .filter(|d| d.norm_squared() < square)
         .map(|d| ((1.0 - d.norm_squared() / square).powi(2), d))
         .collect();
@@ -155,21 +156,21 @@ fn plain_offset(places: &[DVec3], spacing: f64, at: DVec3, mean: DVec3) -> (f64,
     (least, least * (across + along.powf(spacing / least)).sqrt())
 }
 
-/// Two clouds of trembling particles with a gap between them, where the mean of the places around moves fast.
+/// Two clouds of trembling particles with a gap between them, where the mean of the positions around moves fast.
 pub fn two_clouds(spacing: f64) -> Vec<DVec3> {
-    let mut places = filled(spacing, 0.3, 5.0 * spacing, |place| place.norm() < 4.5 * spacing);
-    let other = filled(spacing, 0.3, 5.0 * spacing, |place| place.norm() < 3.0 * spacing);
-    places.extend(other.iter().map(|at| at + DVec3::new(9.5, 1.0, 0.0) * spacing));
-    places
+    let mut positions = filled(spacing, 0.3, 5.0 * spacing, |position| position.norm() < 4.5 * spacing);
+    let other = filled(spacing, 0.3, 5.0 * spacing, |position| position.norm() < 3.0 * spacing);
+    positions.extend(other.iter().map(|at| at + DVec3::new(9.5, 1.0, 0.0) * spacing));
+    positions
 }
 
 /// Writes a ball's cache, NAME.0001.bgeo and so on, in which it travels, and its mesh as NAME.ply.
 pub fn write_cache(folder: &Path, name: &str, ball: &Ball, frames: i32) {
     for frame in 1..=frames {
         let by = DVec3::new(0.002, -0.001, 0.0) * f64::from(frame - 1);
-        let places: Vec<DVec3> = ball.places.iter().map(|place| place + by).collect();
-        let mut points = Points::at(1.0, &places).expect("points");
-        let ids = Values::Long(Column::Each((0..places.len() as i64).collect()));
+        let positions: Vec<DVec3> = ball.positions.iter().map(|position| position + by).collect();
+        let mut points = Points::at(1.0, &positions).expect("points");
+        let ids = Values::Long(Column::Each((0..positions.len() as i64).collect()));
         points.attributes.push(Attribute { name: "id".into(), values: ids });
         particles::write(&folder.join(format!("{name}.{frame:04}.bgeo")), &points, false).expect("a file");
     }
@@ -185,7 +186,7 @@ pub struct Errors {
     pub flagged: usize,
 }
 
-/// Lets a mesh follow particles for some frames; `motion` says where a place of the first frame is in another.
+/// Lets a mesh follow particles for some frames; `motion` says where a position of the first frame is in another.
 pub fn follow(
     ctx: &Context,
     ball: &Ball,
@@ -193,7 +194,8 @@ pub fn follow(
     frames: usize,
     motion: impl Fn(DVec3, usize) -> DVec3,
 ) -> (Tracker, Errors) {
-    let at = |frame: usize| numbered(ball.places.iter().map(|place| motion(*place, frame)).collect());
+    let at =
+        |frame: usize| numbered(ball.positions.iter().map(|position| motion(*position, frame)).collect());
     let mut tracker = Tracker::new(ctx, params, &ball.mesh, &at(0)).expect("a tracker");
     let mut flagged = 0;
     for frame in 0..frames {
@@ -216,15 +218,15 @@ pub fn follow(
     (tracker, errors)
 }
 
-/// Turns a place about an axis through the origin by an angle (rad), and moves it.
-pub fn turned(place: DVec3, angle: f64, by: DVec3) -> DVec3 {
+/// Turns a position about an axis through the origin by an angle (rad), and moves it.
+pub fn turned(position: DVec3, angle: f64, by: DVec3) -> DVec3 {
     let axis = DVec3::new(1.0, 2.0, 0.5).normalize();
     let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
-    place * cosine + axis.cross(&place) * sine + axis * (axis.dot(&place) * (1.0 - cosine)) + by
+    position * cosine + axis.cross(&position) * sine + axis * (axis.dot(&position) * (1.0 - cosine)) + by
 }
 
-/// Where a place is after some of 100 frames in which all turns once and travels.
-pub fn once_around(place: DVec3, frame: usize) -> DVec3 {
+/// Where a position is after some of 100 frames in which all turns once and travels.
+pub fn once_around(position: DVec3, frame: usize) -> DVec3 {
     let share = frame as f64 / 100.0;
-    turned(place, std::f64::consts::TAU * share, DVec3::new(0.4, -0.3, 0.2) * share)
+    turned(position, std::f64::consts::TAU * share, DVec3::new(0.4, -0.3, 0.2) * share)
 }

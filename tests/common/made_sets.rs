@@ -7,11 +7,11 @@ use frazil::geometry::{DVec3, TriMesh};
 use super::liquids::filled;
 use super::shapes::sphere;
 
-/// A liquid that changes its topology: its name, its particles at the first frame, and where a place of that frame is at
-/// another (frames; all places in spacings).
+/// A liquid that changes its topology: its name, its particles at the first frame, and where a position of that frame is at
+/// another (frames; all positions in spacings).
 pub struct Set {
     pub name: &'static str,
-    pub places: Vec<DVec3>,
+    pub positions: Vec<DVec3>,
     pub motion: fn(DVec3, f64) -> DVec3,
 }
 
@@ -22,12 +22,12 @@ pub fn sets() -> [Set; 4] {
     [
         Set {
             name: "two balls meet",
-            places: within(13.0, &|p| ball(-7.0)(p) || ball(7.0)(p)),
+            positions: within(13.0, &|p| ball(-7.0)(p) || ball(7.0)(p)),
             motion: |p, t| p - DVec3::new(0.15 * t * p.x.signum(), 0.0, 0.0),
         },
         Set {
             name: "a dumbbell pinches",
-            places: within(14.0, &|p| {
+            positions: within(14.0, &|p| {
                 ball(-8.0)(p) || ball(8.0)(p) || p.x.abs() < 8.0 && p.yz().norm() < 2.5
             }),
             // Drawn out between the balls, which keep their shape.
@@ -41,7 +41,7 @@ pub fn sets() -> [Set; 4] {
         },
         Set {
             name: "a sheet tears",
-            places: within(14.0, &|p| p.y.abs() < 1.6),
+            positions: within(14.0, &|p| p.y.abs() < 1.6),
             motion: |p, t| {
                 let wide = libm::exp(0.03 * t);
                 DVec3::new(p.x * wide, p.y / (wide * wide), p.z * wide)
@@ -49,7 +49,7 @@ pub fn sets() -> [Set; 4] {
         },
         Set {
             name: "a bubble closes",
-            places: within(12.0, &|p| (5.5..12.0).contains(&p.norm())),
+            positions: within(12.0, &|p| (5.5..12.0).contains(&p.norm())),
             motion: |p, t| {
                 let cube = p.norm().powi(3);
                 p * ((cube - (4.0 * t).min(cube)) / cube).max(0.0).cbrt()
@@ -64,7 +64,7 @@ pub struct Vortex {
     /// Initial distance between particles (m).
     pub spacing: f64,
     /// Particles at time 0 (m).
-    pub places: Vec<DVec3>,
+    pub positions: Vec<DVec3>,
     /// The ball's surface at time 0 (m).
     pub mesh: TriMesh,
 }
@@ -82,16 +82,16 @@ impl Vortex {
         let centre = DVec3::repeat(Self::CENTRE);
         let volume = 4.0 / 3.0 * PI * Self::RADIUS * Self::RADIUS * Self::RADIUS;
         let spacing = libm::cbrt(volume / particles as f64);
-        let ball = filled(spacing, 0.1, Self::RADIUS, |place| place.norm() <= Self::RADIUS);
-        let places = ball.iter().map(|place| place + centre).collect();
+        let ball = filled(spacing, 0.1, Self::RADIUS, |position| position.norm() <= Self::RADIUS);
+        let positions = ball.iter().map(|position| position + centre).collect();
         let mut mesh = sphere(Self::RADIUS as f32, n);
-        mesh.positions.iter_mut().for_each(|place| *place = (place.cast::<f64>() + centre).cast());
-        Self { spacing, places, mesh }
+        mesh.positions.iter_mut().for_each(|position| *position = (position.cast::<f64>() + centre).cast());
+        Self { spacing, positions, mesh }
     }
 
-    /// How fast the liquid moves (m/s) at a place (m) and a time (s).
-    pub fn velocity(place: DVec3, time: f64) -> DVec3 {
-        let (sine, cosine) = (place.map(|x| libm::sin(PI * x)), place.map(|x| libm::cos(PI * x)));
+    /// How fast the liquid moves (m/s) at a position (m) and a time (s).
+    pub fn velocity(position: DVec3, time: f64) -> DVec3 {
+        let (sine, cosine) = (position.map(|x| libm::sin(PI * x)), position.map(|x| libm::cos(PI * x)));
         let (once, twice) = (sine.component_mul(&sine), 2.0 * sine.component_mul(&cosine));
         let x = 2.0 * once.x * twice.y * twice.z;
         let y = -twice.x * once.y * twice.z;
@@ -99,18 +99,18 @@ impl Vortex {
         DVec3::new(x, y, z) * libm::cos(PI * time / Self::PERIOD)
     }
 
-    /// Moves places (m) on from one time to another (s), in so many steps of Runge and Kutta's fourth order: four in 1/24 s leave
+    /// Moves positions (m) on from one time to another (s), in so many steps of Runge and Kutta's fourth order: four in 1/24 s leave
     /// them off by less than 1e-6 m.
-    pub fn carry(places: &mut [DVec3], [from, to]: [f64; 2], steps: u32) {
+    pub fn carry(positions: &mut [DVec3], [from, to]: [f64; 2], steps: u32) {
         let dt = (to - from) / f64::from(steps);
-        for place in places {
+        for position in positions {
             for step in 0..steps {
-                let (at, begin) = (*place, from + dt * f64::from(step));
+                let (at, begin) = (*position, from + dt * f64::from(step));
                 let a = Self::velocity(at, begin);
                 let b = Self::velocity(at + a * (0.5 * dt), begin + 0.5 * dt);
                 let c = Self::velocity(at + b * (0.5 * dt), begin + 0.5 * dt);
                 let d = Self::velocity(at + c * dt, begin + dt);
-                *place = at + (a + (b + c) * 2.0 + d) * (dt / 6.0);
+                *position = at + (a + (b + c) * 2.0 + d) * (dt / 6.0);
             }
         }
     }

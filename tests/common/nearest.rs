@@ -4,16 +4,16 @@ use frazil::geometry::spatial::bvh::Bvh;
 use frazil::geometry::{DVec3, TriMesh, Vec3};
 use rayon::prelude::*;
 
-/// Distance (m) of each place from a surface. The search begins within `reach` (m), about as far as most places are.
-pub fn distances(surface: &TriMesh, places: &[Vec3], reach: f64) -> Vec<f64> {
+/// Distance (m) of each position from a surface. The search begins within `reach` (m), about as far as most positions are.
+pub fn distances(surface: &TriMesh, positions: &[Vec3], reach: f64) -> Vec<f64> {
     let tree = Bvh::new(surface);
-    let one = |place: &Vec3| {
-        let at: DVec3 = place.cast();
+    let one = |position: &Vec3| {
+        let at: DVec3 = position.cast();
         let mut within = reach;
         loop {
             let mut least = f64::INFINITY;
             let by = Vec3::repeat(within as f32);
-            tree.in_box(place - by, place + by, |triangle| {
+            tree.in_box(position - by, position + by, |triangle| {
                 least = least.min((at - closest(at, surface.corners(triangle))).norm());
             });
             if least <= within || within > 1e4 * reach {
@@ -22,10 +22,10 @@ pub fn distances(surface: &TriMesh, places: &[Vec3], reach: f64) -> Vec<f64> {
             within *= 2.0;
         }
     };
-    places.par_iter().map(one).collect()
+    positions.par_iter().map(one).collect()
 }
 
-/// The place of a triangle that is nearest to a point: its own if that is above it, else the nearest one of its edges.
+/// The position of a triangle that is nearest to a point: its own if that is above it, else the nearest one of its edges.
 fn closest(p: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
     let normal = (b - a).cross(&(c - a));
     let is_inside = [(a, b), (b, c), (c, a)].iter().all(|(u, v)| normal.cross(&(v - u)).dot(&(p - u)) >= 0.0);

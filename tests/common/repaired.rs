@@ -24,7 +24,7 @@ pub const NOTHING: &str = "nothing in the mesh encloses a volume";
 const LONGEST: Duration = Duration::from_secs(120);
 /// Least altitude of a triangle that was made (its longest edge).
 const FLATTEST: f64 = 1e-4;
-/// Places along each side of the lattice on which solids are compared, and how far it reaches beyond what is meant (cells).
+/// Positions along each side of the lattice on which solids are compared, and how far it reaches beyond what is meant (cells).
 const SIDE: usize = 20;
 const MARGIN: f64 = 2.0;
 /// What 32-bit distances may be off by (cells).
@@ -96,7 +96,7 @@ pub fn faults(broken: &Broken, repaired: &Repaired) -> Option<String> {
 /// What keeps a mesh from being a closed surface that is turned outward.
 fn unsound(mesh: &TriMesh) -> Option<String> {
     let topology = Topology::of(mesh.positions.len(), &mesh.triangles);
-    if let Some(vertex) = mesh.positions.iter().position(|place| !place.iter().all(|x| x.is_finite())) {
+    if let Some(vertex) = mesh.positions.iter().position(|position| !position.iter().all(|x| x.is_finite())) {
         return Some(format!("vertex {vertex} is not finite"));
     }
     if !topology.is_watertight() {
@@ -155,9 +155,9 @@ struct Solid {
     cell: f64,
     /// What counts as within a cell (cells).
     reach: f64,
-    /// From one place of the lattice to the next, about (cells).
+    /// From one position of the lattice to the next, about (cells).
     step: DVec3,
-    /// Places of the lattice's columns (cells), and of the lattice along each of them.
+    /// Positions of the lattice's columns (cells), and of the lattice along each of them.
     columns: Vec<[f64; 2]>,
     heights: Vec<f64>,
 }
@@ -171,7 +171,7 @@ impl Solid {
         let corner = low.cast::<f64>() - DVec3::repeat(MARGIN * cell);
         let size = (high.cast::<f64>() - corner) / cell + DVec3::repeat(MARGIN);
         let farthest = f64::from(low.amax().max(high.amax()));
-        let in_cells = |place: DVec3| -> [f32; 3] { ((place - corner) / cell).cast::<f32>().into() };
+        let in_cells = |position: DVec3| -> [f32; 3] { ((position - corner) / cell).cast::<f32>().into() };
         let triangle = |triangle: usize| Triangle::of_cells(mesh.corners(triangle).map(in_cells));
         let triangles = (0..mesh.triangles.len()).map(triangle).collect();
         let step = size / SIDE as f64;
@@ -194,22 +194,22 @@ impl Solid {
         }
     }
 
-    fn in_cells(&self, place: DVec3) -> DVec3 {
-        (place - self.corner) / self.cell
+    fn in_cells(&self, position: DVec3) -> DVec3 {
+        (position - self.corner) / self.cell
     }
 
-    /// A place of the lattice (m).
-    fn place(&self, n: usize) -> DVec3 {
+    /// A position of the lattice (m).
+    fn position(&self, n: usize) -> DVec3 {
         let [x, y] = self.columns[n / SIDE];
         self.corner + DVec3::new(x, y, self.heights[n]) * self.cell
     }
 
-    /// Whether the surface of a part is within a cell of a place (m).
-    fn is_near(&self, place: DVec3) -> bool {
-        let at = self.in_cells(place);
+    /// Whether the surface of a part is within a cell of a position (m).
+    fn is_near(&self, position: DVec3) -> bool {
+        let at = self.in_cells(position);
         let by = DVec3::repeat(self.reach * self.cell);
         let mut is_near = false;
-        self.tree.in_box((place - by).cast(), (place + by).cast(), |triangle| {
+        self.tree.in_box((position - by).cast(), (position + by).cast(), |triangle| {
             let nearest =
                 || DVec3::from(self.triangles[triangle].closest(at.cast::<f32>().into()).map(f64::from));
             is_near = is_near || (nearest() - at).norm() <= self.reach;
@@ -217,11 +217,11 @@ impl Solid {
         is_near
     }
 
-    /// How often a closed mesh surrounds each place of the lattice: signed crossings of the lines above them.
+    /// How often a closed mesh surrounds each position of the lattice: signed crossings of the lines above them.
     fn windings(&self, mesh: &TriMesh) -> Vec<i32> {
         let mut lines: Vec<Vec<(f64, i32)>> = vec![Vec::new(); self.columns.len()];
         for triangle in 0..mesh.triangles.len() {
-            let corners = mesh.corners(triangle).map(|place| self.in_cells(place));
+            let corners = mesh.corners(triangle).map(|position| self.in_cells(position));
             let [a, b, c] = corners;
             let (low, high) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
             let range = |axis: usize| {
@@ -245,46 +245,47 @@ impl Solid {
     /// Whether it is deeper than a cell anywhere on the lattice.
     fn is_deep(&self) -> bool {
         let windings = self.windings(&self.mesh);
-        windings.iter().enumerate().any(|(n, winding)| *winding > 0 && !self.is_near(self.place(n)))
+        windings.iter().enumerate().any(|(n, winding)| *winding > 0 && !self.is_near(self.position(n)))
     }
 
     /// The first vertex that was made farther than a cell from all that is meant.
     fn strayed(&self, broken: &Broken, repaired: &Repaired) -> Option<String> {
         let made = repaired.vertices.iter().enumerate().filter(|(_, from)| from.is_none());
         made.map(|(vertex, _)| vertex).find_map(|vertex| {
-            let place: DVec3 = repaired.mesh.positions[vertex].cast();
-            let is_astray = !self.is_near(place) && !broken.is_unclear(place);
-            is_astray
-                .then(|| format!("vertex {vertex} lies over a cell from the surface, at {} m", text(place)))
+            let position: DVec3 = repaired.mesh.positions[vertex].cast();
+            let is_astray = !self.is_near(position) && !broken.is_unclear(position);
+            is_astray.then(|| {
+                format!("vertex {vertex} lies over a cell from the surface, at {} m", text(position))
+            })
         })
     }
 
-    /// The first place, over a cell from all surfaces that are meant, where a mesh is not the solid that is.
+    /// The first position, over a cell from all surfaces that are meant, where a mesh is not the solid that is.
     fn differs(&self, broken: &Broken, mesh: &TriMesh) -> Option<String> {
         let (meant, found) = (self.windings(&self.mesh), self.windings(mesh));
         let is_wrong = |n: &usize| found[*n] != i32::from(meant[*n] > 0);
         let mut tree = None;
         (0..found.len()).filter(is_wrong).find_map(|n| {
-            let place = self.place(n);
-            if broken.is_unclear(place) || self.is_near(place) {
+            let position = self.position(n);
+            if broken.is_unclear(position) || self.is_near(position) {
                 return None;
             }
             // Rounding may let a line pass by a thin triangle, but not in all directions.
             let tree = tree.get_or_insert_with(|| Bvh::new(mesh));
             let is_right = |way: &DVec3| {
-                tree.surrounding(place, *way) == i32::from(self.tree.surrounding(place, *way) > 0)
+                tree.surrounding(position, *way) == i32::from(self.tree.surrounding(position, *way) > 0)
             };
             if ASLANT.iter().any(is_right) {
                 return None;
             }
             let side = if meant[n] > 0 { "inside" } else { "outside" };
-            Some(format!("the winding number is {} at {} m, over a cell {side}", found[n], text(place)))
+            Some(format!("the winding number is {} at {} m, over a cell {side}", found[n], text(position)))
         })
     }
 }
 
-fn text(place: DVec3) -> String {
-    format!("({:e}, {:e}, {:e})", place.x, place.y, place.z)
+fn text(position: DVec3) -> String {
+    format!("({:e}, {:e}, {:e})", position.x, position.y, position.z)
 }
 
 /// How often a triangle runs around a column, seen from above: 1 counter-clockwise, -1 clockwise. Neighbours agree about an edge that

@@ -152,8 +152,8 @@ fn march(
                         }
                         _ => continue,
                     };
-                    let place = |vertex: u32| positions[vertex as usize];
-                    let [p, q, r] = [0, 1, 2].map(|n| place(around[n]));
+                    let position = |vertex: u32| positions[vertex as usize];
+                    let [p, q, r] = [0, 1, 2].map(|n| position(around[n]));
                     let [u, v] = [q, r].map(|to| [0, 1, 2].map(|n| to[n] - p[n]));
                     let along =
                         [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];

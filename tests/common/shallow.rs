@@ -1,5 +1,5 @@
 //! Terrains and liquids for shallow's tests and gates, made by code, and the symmetries of the ground. Lengths are powers of two where a
-//! scene is to be turned: centres of cells are then exact, and so are their turned places.
+//! scene is to be turned: centres of cells are then exact, and so are their turned positions.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -46,8 +46,8 @@ impl Turn {
         if self.quarters.is_multiple_of(2) { [nx, nz] } else { [nz, nx] }
     }
 
-    /// Where a place of a domain goes, in cells from its corner.
-    pub fn place(self, [x, z]: [f64; 2], size: [usize; 2]) -> [f64; 2] {
+    /// Where a position of a domain goes, in cells from its corner.
+    pub fn position(self, [x, z]: [f64; 2], size: [usize; 2]) -> [f64; 2] {
         let mut size = size.map(|count| count as f64);
         let mut at = if self.mirrored { [size[0] - x, z] } else { [x, z] };
         for _ in 0..self.quarters {
@@ -59,12 +59,12 @@ impl Turn {
 
     /// Where a cell of a domain goes.
     pub fn cell(self, cell: [usize; 2], size: [usize; 2]) -> [usize; 2] {
-        self.place(cell.map(|at| at as f64 + 0.5), size).map(|at| at as usize)
+        self.position(cell.map(|at| at as f64 + 0.5), size).map(|at| at as usize)
     }
 
     /// Where a direction goes.
     pub fn direction(self, direction: [f64; 2]) -> [f64; 2] {
-        self.place(direction, [0; 2])
+        self.position(direction, [0; 2])
     }
 }
 
@@ -86,7 +86,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Dry terrain: `solids` gives those of a cell at a place (m) from the middle of the domain, in any order, as heights (m); the first
+    /// Dry terrain: `solids` gives those of a cell at a position (m) from the middle of the domain, in any order, as heights (m); the first
     /// is the ground, which reaches down for ever.
     pub fn new(
         size: [usize; 2],
@@ -97,9 +97,9 @@ impl Plan {
         let heights = Heights::between(low, high).expect("a range");
         let mut column = |index: usize| {
             let at = [index % size[0], index / size[0]];
-            let place = [0, 1].map(|axis| (at[axis] as f64 + 0.5 - 0.5 * size[axis] as f64) * cell);
+            let position = [0, 1].map(|axis| (at[axis] as f64 + 0.5 - 0.5 * size[axis] as f64) * cell);
             let mut out: Vec<Solid> =
-                solids(place).iter().map(|solid| solid.map(|h| heights.round(h))).collect();
+                solids(position).iter().map(|solid| solid.map(|h| heights.round(h))).collect();
             if let Some(ground) = out.first_mut() {
                 ground[0] = BOTTOMLESS;
             }
@@ -138,7 +138,7 @@ impl Plan {
             }
         }
         let point = |point: &FlowPoint| {
-            let [x, z] = turn.place([point.at[0], point.at[2]], self.size);
+            let [x, z] = turn.position([point.at[0], point.at[2]], self.size);
             let [left, back] = solids.grid.origin;
             let at = [left + x * self.cell, point.at[1], back + z * self.cell];
             FlowPoint { at, radius: point.radius * self.cell, ..point.clone() }
@@ -200,12 +200,12 @@ pub fn violations(liquid: &Shallow) -> usize {
     (0..columns.len()).filter(is_off).count() + not_finite.count()
 }
 
-/// A source of a rate (m3/s); place and radius in cells.
+/// A source of a rate (m3/s); position and radius in cells.
 pub fn source(at: [f64; 3], radius: f64, rate: f64) -> FlowPoint {
     FlowPoint { kind: Kind::Source, at, radius, rate, pulse: None }
 }
 
-/// Ground of a height (m) at each place (m) from the middle of the domain.
+/// Ground of a height (m) at each position (m) from the middle of the domain.
 pub fn ground(
     size: [usize; 2],
     cell: f64,
@@ -215,7 +215,7 @@ pub fn ground(
     floors(size, cell, [low, high], 1, |at, _| Some([low, height(at)]))
 }
 
-/// So many floors: bottom and top (m) of each at a place (m) from the middle of the domain, if it is there. The lowest reaches down for
+/// So many floors: bottom and top (m) of each at a position (m) from the middle of the domain, if it is there. The lowest reaches down for
 /// ever.
 pub fn floors(
     size: [usize; 2],
@@ -243,7 +243,7 @@ pub fn waves([x, z]: [f64; 2], cell: f64) -> f64 {
     0.5 * (libm::sin(0.1 * x / cell) + libm::cos(0.13 * z / cell))
 }
 
-/// A liquid of a depth (m) in each column, given by its cell's place (m) and layer.
+/// A liquid of a depth (m) in each column, given by its cell's position (m) and layer.
 pub fn covered(
     ctx: &Context,
     solids: &Solids,
@@ -280,7 +280,7 @@ pub fn busy(size: [usize; 2]) -> Plan {
         }
         out
     });
-    // Places are halves of cells, so that they can be turned.
+    // Positions are halves of cells, so that they can be turned.
     let on = |[x, z]: [f64; 2], layer: usize| {
         let cell = [(x * size[0] as f64) as usize, (z * size[1] as f64) as usize];
         let solids = &plan.solids[cell[1] * size[0] + cell[0]];

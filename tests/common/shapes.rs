@@ -65,9 +65,9 @@ fn exact(value: f32, index: usize, n: usize) -> f32 {
     }
 }
 
-/// A mesh in which vertices at one place are the same: closed by index where its faces share their rims.
+/// A mesh in which vertices at one position are the same: closed by index where its faces share their rims.
 pub fn welded(mesh: &TriMesh) -> TriMesh {
-    let same = coincident(mesh.positions.iter().map(|place| place.cast()));
+    let same = coincident(mesh.positions.iter().map(|position| position.cast()));
     let triangles =
         mesh.triangles.iter().map(|corners| corners.map(|corner| same[corner as usize])).collect();
     TriMesh { positions: mesh.positions.clone(), triangles }.without_unused()

@@ -32,14 +32,14 @@ pub fn sleigh() -> TriMesh {
 }
 
 fn moved(mesh: &TriMesh, by: [f32; 3]) -> TriMesh {
-    let positions = mesh.positions.iter().map(|place| place + Vec3::from(by)).collect();
+    let positions = mesh.positions.iter().map(|position| position + Vec3::from(by)).collect();
     TriMesh { positions, triangles: mesh.triangles.clone() }
 }
 
 /// A plank that runs straight along z and curls up by three quarters of a half circle.
 fn runner() -> TriMesh {
     let bend = |piece: usize| 0.75 * std::f32::consts::PI * piece as f32 / PIECES as f32;
-    // Places on the underside, with the direction to the upper side.
+    // Positions on the underside, with the direction to the upper side.
     let curl = (0..=PIECES).map(|piece| {
         let (sine, cosine) = bend(piece).sin_cos();
         ([HALF[0] + CURL * sine, CURL * (1.0 - cosine)], [-sine, cosine])

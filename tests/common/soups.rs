@@ -10,7 +10,7 @@ use super::shapes;
 /// A closed body in 64 bits, its size about 1.
 pub struct Solid {
     pub name: &'static str,
-    pub places: Vec<DVec3>,
+    pub positions: Vec<DVec3>,
     pub triangles: Vec<[u32; 3]>,
     /// Volume of these triangles, by a formula where there is one.
     pub volume: f64,
@@ -18,36 +18,37 @@ pub struct Solid {
 
 impl Solid {
     fn of(name: &'static str, mesh: &TriMesh) -> Self {
-        let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
-        let mut solid = Self { name, places, triangles: mesh.triangles.clone(), volume: 0.0 };
+        let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
+        let mut solid = Self { name, positions, triangles: mesh.triangles.clone(), volume: 0.0 };
         solid.volume = solid.by_divergence();
         solid
     }
 
     fn cuboid(name: &'static str, size: [f64; 3]) -> Self {
         let cube = TriMesh::cuboid([-0.5; 3], [0.5; 3]);
-        let places = cube.positions.iter().map(|place| place.cast().component_mul(&DVec3::from(size)));
+        let positions =
+            cube.positions.iter().map(|position| position.cast().component_mul(&DVec3::from(size)));
         let volume = size.iter().product();
-        Self { name, places: places.collect(), triangles: cube.triangles, volume }
+        Self { name, positions: positions.collect(), triangles: cube.triangles, volume }
     }
 
     /// Volume by the divergence theorem about its own first corner.
     fn by_divergence(&self) -> f64 {
         let six = |triangle: &[u32; 3]| {
-            let [a, b, c] = triangle.map(|vertex| self.places[vertex as usize] - self.places[0]);
+            let [a, b, c] = triangle.map(|vertex| self.positions[vertex as usize] - self.positions[0]);
             a.dot(&b.cross(&c))
         };
         self.triangles.iter().map(six).sum::<f64>() / 6.0
     }
 
     fn moved(mut self, by: DVec3) -> Self {
-        self.places.iter_mut().for_each(|place| *place += by);
+        self.positions.iter_mut().for_each(|position| *position += by);
         self
     }
 
     fn with(mut self, other: &Self) -> Self {
-        let first = self.places.len() as u32;
-        self.places.extend(&other.places);
+        let first = self.positions.len() as u32;
+        self.positions.extend(&other.positions);
         self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|vertex| vertex + first)));
         self.volume += other.volume;
         self
@@ -56,7 +57,7 @@ impl Solid {
     /// Turned about an axis aslant.
     fn turned(mut self) -> Self {
         let turn = nalgebra::Rotation3::from_euler_angles(0.4, 0.9, -0.7);
-        self.places.iter_mut().for_each(|place| *place = turn * *place);
+        self.positions.iter_mut().for_each(|position| *position = turn * *position);
         self
     }
 
@@ -64,7 +65,7 @@ impl Solid {
     /// in the same direction.
     pub fn soup(&self, size: f64, at: DVec3, steps: usize, dice: &mut Dice) -> TriMesh {
         let corners =
-            self.triangles.as_flattened().iter().map(|&vertex| self.places[vertex as usize] * size + at);
+            self.triangles.as_flattened().iter().map(|&vertex| self.positions[vertex as usize] * size + at);
         let noisy =
             |value: f32, dice: &mut Dice| (0..dice.below(steps + 1)).fold(value, |value, _| value.next_up());
         let positions: Vec<Vec3> = corners
@@ -87,7 +88,7 @@ pub fn solids(dice: &mut Dice) -> Vec<Solid> {
     let mut lump = shell("lump");
     // A convex body without any symmetry.
     let squeeze = DVec3::new(dice.between(0.3, 0.5), dice.between(0.3, 0.5), dice.between(0.3, 0.5));
-    lump.places.iter_mut().for_each(|place| *place = place.component_mul(&squeeze));
+    lump.positions.iter_mut().for_each(|position| *position = position.component_mul(&squeeze));
     lump.volume = lump.by_divergence();
     vec![
         Solid::cuboid("cube", [1.0; 3]),

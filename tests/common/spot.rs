@@ -26,11 +26,11 @@ pub fn particles_at(file: &Path, frame: i32) -> Particles {
     let path = file.with_file_name(format!("spot.{frame:04}.bgeo"));
     let cloud = particles::read(&path).expect("particles");
     let ids = match cloud.attribute("id") {
-        Some(Values::Long(column)) => (0..cloud.places.len()).map(|n| column.get(n)).collect(),
-        Some(Values::Int(column)) => (0..cloud.places.len()).map(|n| column.get(n).into()).collect(),
+        Some(Values::Long(column)) => (0..cloud.positions.len()).map(|n| column.get(n)).collect(),
+        Some(Values::Int(column)) => (0..cloud.positions.len()).map(|n| column.get(n).into()).collect(),
         _ => panic!("the particles have no ids"),
     };
-    Particles { ids, places: cloud.places, velocities: Vec::new() }
+    Particles { ids, positions: cloud.positions, velocities: Vec::new() }
 }
 
 /// The sculpted mesh, by the file of any frame.

@@ -67,7 +67,7 @@ fn stance(side: f64, stride: f64, phase: f64, depth: f64) -> (DVec3, f64) {
     (rest + yaw * (DVec3::z() * along - turned), pitch)
 }
 
-/// The sole's point that touches the ground at a pitch (boot space, m), and its place on the ground: as far
+/// The sole's point that touches the ground at a pitch (boot space, m), and its position on the ground: as far
 /// along it as along the sole, for nothing slides.
 fn contact(pitch: f64) -> (DVec3, f64) {
     let (begin, end, steepness) = match pitch >= 0.0 {

@@ -24,7 +24,7 @@ const INPUTS: usize = 10_000;
 const VDB_INPUTS: usize = 2_000;
 /// Inputs that one process tries.
 const BATCH: usize = 500;
-/// Places where each file is cut.
+/// Positions where each file is cut.
 const CUTS: usize = 2_000;
 /// Limits of an input: seconds, bytes.
 const LONGEST: Duration = Duration::from_secs(10);
@@ -143,10 +143,10 @@ fn intact(kind: &str, folder: &Path) -> Vec<Vec<u8>> {
                         3 0 1 2\n7\n";
             let strips = "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
                           property float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n";
-            let places =
+            let positions =
                 [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].into_iter().flat_map(f32::to_be_bytes);
             let strip = [4, 0, 1, 2, -1].into_iter().flat_map(i32::to_be_bytes);
-            let strips = strips.bytes().chain(places).chain(strip).collect();
+            let strips = strips.bytes().chain(positions).chain(strip).collect();
             vec![written(&shapes::sphere(1.0, 4)), text.into(), strips]
         }
         "stl" => {

@@ -41,11 +41,11 @@ impl Axis {
     }
 
     /// Where a number lies along the axis.
-    fn place(&self, value: f64) -> f64 {
+    fn position(&self, value: f64) -> f64 {
         if self.is_log { value.log10() } else { value }
     }
 
-    /// The numbers that are marked between two places, and their texts.
+    /// The numbers that are marked between two positions, and their texts.
     fn ticks(&self, [low, high]: [f64; 2]) -> Vec<(f64, String)> {
         if !self.is_log {
             let step = nice((high - low) / 6.0);
@@ -60,8 +60,8 @@ impl Axis {
         let multiples: &[f64] = if high - low < 2.2 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         for decade in low.floor() as i32..=high.ceil() as i32 {
             for multiple in multiples {
-                let place = f64::from(decade) + multiple.log10();
-                if place >= low - 1e-9 && place <= high + 1e-9 {
+                let position = f64::from(decade) + multiple.log10();
+                if position >= low - 1e-9 && position <= high + 1e-9 {
                     let value = multiple * 10f64.powi(decade);
                     let is_plain = (-2..=3).contains(&decade);
                     let text = match *multiple {
@@ -69,7 +69,7 @@ impl Axis {
                         1.0 => format!("10^{decade}"),
                         multiple => format!("{multiple:.0} 10^{decade}"),
                     };
-                    ticks.push((place, text));
+                    ticks.push((position, text));
                 }
             }
         }
@@ -125,8 +125,8 @@ impl Plot {
         colour: [f32; 3],
         points: impl IntoIterator<Item = [f64; 2]>,
     ) {
-        let place = |[x, y]: [f64; 2]| [self.axes[0].place(x), self.axes[1].place(y)];
-        let points = points.into_iter().map(place).filter(|at| at.iter().all(|x| x.is_finite())).collect();
+        let position = |[x, y]: [f64; 2]| [self.axes[0].position(x), self.axes[1].position(y)];
+        let points = points.into_iter().map(position).filter(|at| at.iter().all(|x| x.is_finite())).collect();
         self.series.push(Series { name: name.into(), is_line, colour, points });
     }
 
@@ -180,10 +180,10 @@ impl Plot {
         canvas.finish()
     }
 
-    /// Least and greatest place along an axis, with some room at both ends.
+    /// Least and greatest position along an axis, with some room at both ends.
     fn range(&self, axis: usize) -> [f64; 2] {
-        let places = self.series.iter().flat_map(|series| &series.points).map(|at| at[axis]);
-        let (low, high) = places.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));
+        let positions = self.series.iter().flat_map(|series| &series.points).map(|at| at[axis]);
+        let (low, high) = positions.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));
         let room = (0.05 * (high - low)).max(1e-12 + 1e-6 * high.abs());
         [low - room, high + room]
     }
@@ -224,7 +224,7 @@ impl Plot {
     }
 }
 
-/// Where a place on an axis lies in the picture (pixels).
+/// Where a position on an axis lies in the picture (pixels).
 fn along(ranges: [[f64; 2]; 2], axis: usize, at: f64) -> f64 {
     let [left, top, right, bottom] = FRAME;
     let ([low, high], [from, to]) = (ranges[axis], [[left, right], [bottom, top]][axis]);
@@ -276,11 +276,11 @@ impl Canvas {
         }
     }
 
-    /// Writes a text whose foot is at a place, with a share of its width before it.
+    /// Writes a text whose foot is at a position, with a share of its width before it.
     fn text(&mut self, text: &str, [x, y]: [f64; 2], before: f64, size: f64) {
         let (strokes, width) = font::strokes(text);
-        let place = |at: [f64; 2]| [x + size * (at[0] - before * width), y - size * (at[1] - 2.0)];
-        strokes.into_iter().for_each(|ends| self.stroke(ends.map(place), 0.85 * size, BLACK));
+        let position = |at: [f64; 2]| [x + size * (at[0] - before * width), y - size * (at[1] - 2.0)];
+        strokes.into_iter().for_each(|ends| self.stroke(ends.map(position), 0.85 * size, BLACK));
     }
 
     fn finish(self) -> Picture {

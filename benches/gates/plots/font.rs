@@ -36,7 +36,7 @@ pub fn strokes(text: &str) -> (Vec<Stroke>, f64) {
                     (at, scale, rise) = (at + SPACE, 1.0, 0.0);
                     continue;
                 };
-                let place = |[x, y]: [f64; 2]| [at + scale * x, rise + scale * y];
+                let position = |[x, y]: [f64; 2]| [at + scale * x, rise + scale * y];
                 let mut width = 0.0f64;
                 for row in drawn.split(' ') {
                     let points: Vec<[f64; 2]> = row
@@ -47,7 +47,7 @@ pub fn strokes(text: &str) -> (Vec<Stroke>, f64) {
                     width = points.iter().fold(width, |width, point| width.max(point[0]));
                     let last = points.len() - 1;
                     out.extend(
-                        (0..last.max(1)).map(|i| [place(points[i]), place(points[(i + 1).min(last)])]),
+                        (0..last.max(1)).map(|i| [position(points[i]), position(points[(i + 1).min(last)])]),
                     );
                 }
                 at += scale * (width + GAP);

@@ -77,12 +77,13 @@ fn write(folder: &Path, number: usize, frame: Frame) {
     let from = speed * (number as f64 / 24.0);
     let lattice =
         (0..6 * 6 * 6).map(|n| DVec3::new(f64::from(n / 36), f64::from(n / 6 % 6), f64::from(n % 6)) * 0.1);
-    let places: Vec<DVec3> = lattice.map(|place| place + from).filter(|_| frame == Frame::Full).collect();
-    let mut points = Points::at(0.1, &places).expect("places");
-    points.set("id", Values::Long(Column::Each((0..places.len() as i64).collect())));
-    points.set("v", Values::Vector(Column::Each(vec![speed.cast::<f32>().into(); places.len()])));
+    let positions: Vec<DVec3> =
+        lattice.map(|position| position + from).filter(|_| frame == Frame::Full).collect();
+    let mut points = Points::at(0.1, &positions).expect("places");
+    points.set("id", Values::Long(Column::Each((0..positions.len() as i64).collect())));
+    points.set("v", Values::Vector(Column::Each(vec![speed.cast::<f32>().into(); positions.len()])));
     particles::write(&folder.join(format!("p.{number:04}.bgeo")), &points, false).expect("a file");
-    let [low, high] = [from, from.add_scalar(0.5)].map(|place| place.cast::<f32>().into());
+    let [low, high] = [from, from.add_scalar(0.5)].map(|position| position.cast::<f32>().into());
     let solid = if frame == Frame::Full { TriMesh::cuboid(low, high) } else { TriMesh::default() };
     mesh::write(&folder.join(format!("m.{number:04}.ply")), &solid).expect("a file");
 }

@@ -40,12 +40,12 @@ pub fn run(h: &mut Harness) {
     let mut tally = Tally::default();
     for (at, size) in AT {
         for (number, solid) in bodies.iter().enumerate() {
-            let place = if number == 0 { DVec3::new(at, 0.0, 0.0) } else { dice.direction() * at };
+            let position = if number == 0 { DVec3::new(at, 0.0, 0.0) } else { dice.direction() * at };
             let steps = 1 + number % 4;
-            let soup = solid.soup(size, place, steps, &mut dice);
+            let soup = solid.soup(size, position, steps, &mut dice);
             let name = format!("{} of {size} m at {at} m, {steps} steps", solid.name);
             let format = ["ply", "stl", "obj"][number % 3];
-            Case { folder: folder.path(), name, solid, soup, size, place, format }.run(&mut tally);
+            Case { folder: folder.path(), name, solid, soup, size, position, format }.run(&mut tally);
         }
     }
     let note = format!("{} runs, {:.0} s", tally.runs, start.elapsed().as_secs_f64());
@@ -66,7 +66,7 @@ struct Case<'a> {
     solid: &'a Solid,
     soup: TriMesh,
     size: f64,
-    place: DVec3,
+    position: DVec3,
     format: &'static str,
 }
 
@@ -82,7 +82,12 @@ impl Case<'_> {
         let soup = format!("soup.{}", self.format);
         let exact = format!("exact.{}", self.format);
         let shared = TriMesh {
-            positions: self.solid.places.iter().map(|at| (at * self.size + self.place).cast()).collect(),
+            positions: self
+                .solid
+                .positions
+                .iter()
+                .map(|at| (at * self.size + self.position).cast())
+                .collect(),
             triangles: self.solid.triangles.clone(),
         };
         mesh::write(&self.folder.join(&soup), &self.soup).expect("a mesh");
@@ -94,7 +99,7 @@ impl Case<'_> {
             self.judge(door, &said, found, volume, tally);
         }
         for door in ["moving", "static", "ground", "object", "terrain", "surface"] {
-            if door == "surface" && self.place.norm() > self.size {
+            if door == "surface" && self.position.norm() > self.size {
                 // Particles have 32 bits, too.
                 continue;
             }
@@ -152,10 +157,10 @@ impl Case<'_> {
         if door == "surface" {
             return self.surface(file);
         }
-        let Self { size, place, .. } = self;
+        let Self { size, position, .. } = self;
         let cell = size / SHOT_CELLS;
         let mut text = String::from("[shot]\nframes = \"1-2\"\n");
-        let (low, high) = (place.add_scalar(-HALF_AREA * size), place.add_scalar(HALF_AREA * size));
+        let (low, high) = (position.add_scalar(-HALF_AREA * size), position.add_scalar(HALF_AREA * size));
         let (system, report) = if ["object", "terrain"].contains(&door) {
             let ground = TriMesh::cuboid(
                 [low.x as f32, (low.y - 0.5 * size) as f32, low.z as f32],
@@ -164,7 +169,7 @@ impl Case<'_> {
             mesh::write(&self.folder.join("slab.ply"), &ground).expect("a mesh");
             // Over the whole terrain, around an object.
             let level = if door == "terrain" { 0.7 } else { 0.1 };
-            let (bottom, top, fill) = (low.y - size, high.y + size, place.y + level * size);
+            let (bottom, top, fill) = (low.y - size, high.y + size, position.y + level * size);
             let terrain = if door == "terrain" { file } else { "slab.ply" };
             _ = write!(
                 text,
@@ -204,7 +209,7 @@ impl Case<'_> {
         let mut count = 0;
         for at in 0..13 * 13 * 13 {
             let index = [at % 13, at / 13 % 13, at / 169].map(|index| f64::from(index) - 6.0);
-            let at = self.place + DVec3::from(index) * spacing;
+            let at = self.position + DVec3::from(index) * spacing;
             _ = writeln!(text, "{} {} {} 0 0 0 {count}", at.x, at.y, at.z);
             count += 1;
         }

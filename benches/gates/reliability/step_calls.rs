@@ -273,7 +273,7 @@ pub fn grain_params(tried: &mut Tried, radius: f64) -> frz_grains_params {
     params
 }
 
-/// Places (m) in a box, and velocities (m/s).
+/// Positions (m) in a box, and velocities (m/s).
 pub fn points(tried: &mut Tried, count: usize, side: f64, fastest: f64) -> [Vec<[f32; 3]>; 2] {
     let mut triples = |low: f64, high: f64| {
         (0..count).map(|_| [0; 3].map(|_| tried.between(low, high) as f32)).collect::<Vec<[f32; 3]>>()
@@ -298,8 +298,8 @@ fn grains(tried: &mut Tried) {
         for frame in 1..=8 {
             let (count, side, fastest) =
                 (tried.any(1.0, 200.0) as usize, radius * tried.any(1.0, 60.0), tried.any(1e-3, 100.0));
-            let [places, speeds] = points(tried, count, side, fastest);
-            frz_grains_emit(tried.ctx(), grains, view(&places), view(&speeds), frame, null_mut());
+            let [positions, speeds] = points(tried, count, side, fastest);
+            frz_grains_emit(tried.ctx(), grains, view(&positions), view(&speeds), frame, null_mut());
             let params = grain_params(tried, radius);
             frz_grains_set_params(grains, &params);
             for _ in 0..4 {
@@ -340,18 +340,18 @@ fn mist(tried: &mut Tried) {
         for frame in 0..8 {
             let (count, side, fastest) =
                 (tried.any(1.0, 50.0) as usize, cell * tried.any(0.1, 8.0), tried.any(0.1, 50.0));
-            let [places, speeds] = points(tried, count, side, fastest);
-            let places: Vec<[f64; 3]> = places.iter().map(|place| place.map(f64::from)).collect();
+            let [positions, speeds] = points(tried, count, side, fastest);
+            let positions: Vec<[f64; 3]> = positions.iter().map(|position| position.map(f64::from)).collect();
             let params = mist_params(tried, cell);
             frz_mist_set_params(mist, &params);
             let dt = step_length(tried);
             let (radius, time) = (cell * tried.any(0.05, 2.0), f64::from(frame));
             tried.step(|ctx| {
-                let [places, speeds] = [view(&places), view(&speeds)];
+                let [positions, speeds] = [view(&positions), view(&speeds)];
                 frz_mist_step_points(
                     ctx,
                     mist,
-                    places,
+                    positions,
                     speeds,
                     radius,
                     null(),

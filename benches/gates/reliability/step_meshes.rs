@@ -163,14 +163,14 @@ const PARTICLES: usize = SIDE * SIDE * SIDE;
 
 /// Particles at a moment.
 struct Particles {
-    places: Vec<[f64; 3]>,
+    positions: Vec<[f64; 3]>,
     ids: Vec<i64>,
 }
 
 impl Particles {
     fn new() -> Self {
-        let place = |at: usize| [at % SIDE, at / SIDE % SIDE, at / SIDE / SIDE].map(|at| at as f64 - 3.5);
-        Self { places: (0..PARTICLES).map(place).collect(), ids: (0..PARTICLES as i64).collect() }
+        let position = |at: usize| [at % SIDE, at / SIDE % SIDE, at / SIDE / SIDE].map(|at| at as f64 - 3.5);
+        Self { positions: (0..PARTICLES).map(position).collect(), ids: (0..PARTICLES as i64).collect() }
     }
 
     /// These a moment later: they turn, stretch, part and jitter.
@@ -179,17 +179,17 @@ impl Particles {
         (0..3).for_each(|axis| map[axis][axis] += 1.0);
         let [part, jitter] = [tried.any(1e-3, 4.0), tried.any(1e-4, 0.5)];
         let parts = tried.chance(0.3);
-        let place = |place: &[f64; 3]| {
-            let away = if parts && place[0] > 0.0 { part } else { 0.0 };
-            let along = |axis: usize| (0..3).map(|from| map[axis][from] * place[from]).sum::<f64>();
+        let position = |position: &[f64; 3]| {
+            let away = if parts && position[0] > 0.0 { part } else { 0.0 };
+            let along = |axis: usize| (0..3).map(|from| map[axis][from] * position[from]).sum::<f64>();
             [along(0) + away, along(1), along(2)].map(|at| at + jitter * tried.between(-1.0, 1.0))
         };
-        Self { places: self.places.iter().map(place).collect(), ids: self.ids.clone() }
+        Self { positions: self.positions.iter().map(position).collect(), ids: self.ids.clone() }
     }
 
     fn given(&self) -> frz_particles {
         let mut particles: frz_particles = sized();
-        (particles.positions, particles.ids) = (view(&self.places), view(&self.ids));
+        (particles.positions, particles.ids) = (view(&self.positions), view(&self.ids));
         particles
     }
 }

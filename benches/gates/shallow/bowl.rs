@@ -42,17 +42,17 @@ pub fn run(h: &mut Harness) {
     };
     let period = std::f64::consts::TAU * RADIUS / (2.0 * G * DEEP).sqrt();
     let dt = period / FRAMES as f64;
-    let mut places = vec![[0.0, middle(&shallow)]];
+    let mut positions = vec![[0.0, middle(&shallow)]];
     for frame in 1..=PERIODS * FRAMES {
         shallow.step(&ctx, dt).expect("a frame");
-        places.push([frame as f64 * dt, middle(&shallow)]);
+        positions.push([frame as f64 * dt, middle(&shallow)]);
     }
-    let falls = places.windows(2).filter(|ends| ends[0][1] > 0.0 && ends[1][1] <= 0.0);
+    let falls = positions.windows(2).filter(|ends| ends[0][1] > 0.0 && ends[1][1] <= 0.0);
     let zeros: Vec<f64> =
         falls.map(|ends| ends[0][0] + dt * ends[0][1] / (ends[0][1] - ends[1][1])).collect();
     let own = (zeros[zeros.len() - 1] - zeros[0]) / (zeros.len() - 1) as f64;
-    let last = places[(PERIODS - 1) * FRAMES..].iter().map(|place| place[1]).fold(0.0, f64::max);
-    let first = places[0][1];
+    let last = positions[(PERIODS - 1) * FRAMES..].iter().map(|position| position[1]).fold(0.0, f64::max);
+    let first = positions[0][1];
     let note = format!("the last swing is {:.3} of the first", last / first);
     h.gate("shallow.bowl_period", 100.0 * (own / period - 1.0).abs(), &note);
     let theory =
@@ -63,6 +63,6 @@ pub fn run(h: &mut Harness) {
         Axis::linear("centre of mass (mm)"),
     )
     .line("theory", theory)
-    .points("pipes", places.iter().step_by(FRAMES / 10).map(|[time, x]| [time / period, 1e3 * x]))
+    .points("pipes", positions.iter().step_by(FRAMES / 10).map(|[time, x]| [time / period, 1e3 * x]))
     .write("shallow_bowl");
 }

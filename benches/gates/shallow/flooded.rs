@@ -123,7 +123,7 @@ fn period(h: &mut Harness) {
             falls.map(|ends| ends[0][0] + dt * ends[0][1] / (ends[0][1] - ends[1][1])).collect();
         let own = (zeros[zeros.len() - 1] - zeros[0]) / (zeros.len() - 1) as f64;
         let off = 100.0 * (own / period - 1.0);
-        let last = swing[(PERIODS - 1) * FRAMES..].iter().map(|place| place[1]).fold(0.0, f64::max);
+        let last = swing[(PERIODS - 1) * FRAMES..].iter().map(|position| position[1]).fold(0.0, f64::max);
         worst = worst.max(off.abs());
         notes.push(format!("{name}: {off:+.3} %, the last swing is {:.3} of the first", last / apart));
         // Points beside those of the other tubes.

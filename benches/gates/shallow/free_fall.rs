@@ -57,7 +57,7 @@ fn path(h: &mut Harness) {
     h.gate("shallow.fall_path", worst, &note);
 }
 
-/// How far packets over a fall of a height (m), and the first liquid on the ground below, are off (% of it), and the count of places that were compared.
+/// How far packets over a fall of a height (m), and the first liquid on the ground below, are off (% of it), and the count of positions that were compared.
 fn off(ctx: &Context, height: f64, params: Params, rate: f64) -> [f64; 3] {
     let (low, size) = (0.05, [260, 12]);
     // From a table a tenth of a metre deep.
@@ -95,11 +95,11 @@ fn off(ctx: &Context, height: f64, params: Params, rate: f64) -> [f64; 3] {
         }
     }
     let share = 100.0 / height;
-    // A column stands for the places of its cell.
+    // A column stands for the positions of its cell.
     [off * share, (landing - 0.5 * CELL).max(0.0) * share, count]
 }
 
-/// The middle of the liquid beyond a place along x (m).
+/// The middle of the liquid beyond a position along x (m).
 fn middle_below(liquid: &Shallow, edge: f64) -> Option<f64> {
     let columns = liquid.columns();
     let (mut sum, mut moment) = (0.0, 0.0);

@@ -35,7 +35,7 @@ pub fn dry(ctx: &Context, solids: &Solids, params: Params) -> Shallow {
     Shallow::new(ctx, solids, params).expect("a terrain")
 }
 
-/// Pours a depth (m) that depends on the place (m) into every column of the lowest layer.
+/// Pours a depth (m) that depends on the position (m) into every column of the lowest layer.
 pub fn pour(shallow: &mut Shallow, depth: impl Fn([f64; 2]) -> f64) {
     let [nx, nz] = shallow.columns().grid.size;
     for cell in (0..nx * nz).map(|index| [index % nx, index / nx]) {

@@ -11,11 +11,11 @@ use crate::shallow::ground::{G, between, depth, dry, ground, power, run_until, v
 /// Slope, and kinematic viscosity (m2/s).
 const SLOPE: f64 = 0.5;
 const VISCOSITY: f64 = 1.0e-3;
-/// A (m2), and the first and last place of the front that is measured (m).
+/// A (m2), and the first and last position of the front that is measured (m).
 const AREA: f64 = 1.0e-4;
 const FIRST: f64 = 0.2;
 const LAST: f64 = 0.4;
-/// Places of the front that are measured.
+/// Positions of the front that are measured.
 const COUNT: usize = 13;
 
 pub fn run(h: &mut Harness) {
@@ -56,7 +56,7 @@ fn front_at(time: f64) -> f64 {
     (9.0 * AREA * AREA * G * SLOPE * time / (4.0 * slowed())).cbrt()
 }
 
-/// Theory: when the front is at a place (m).
+/// Theory: when the front is at a position (m).
 fn time_at(front: f64) -> f64 {
     front.powi(3) * 4.0 * slowed() / (9.0 * AREA * AREA * G * SLOPE)
 }
@@ -73,14 +73,14 @@ fn slowed() -> f64 {
 
 /// A current that has run.
 struct Current {
-    /// Times (s) and places of the front (m).
+    /// Times (s) and positions of the front (m).
     fronts: Vec<[f64; 2]>,
-    /// Depths (mm) over places (m), at the end.
+    /// Depths (mm) over positions (m), at the end.
     shape: Vec<[f64; 2]>,
 }
 
 impl Current {
-    /// Runs on cells of so many depths of the front at its last place.
+    /// Runs on cells of so many depths of the front at its last position.
     fn run(ctx: &Context, edge: f64) -> Self {
         let cell = edge * 1.5 * AREA / LAST;
         let count = (1.1 * LAST / cell) as usize;

@@ -12,13 +12,13 @@ use crate::shallow::ground::{G, between, depth, dry, ground, run_until, viscous}
 /// The incline's slope, and viscosities (m2/s).
 const SLOPE: f64 = 0.35;
 const VISCOSITIES: [f64; 3] = [1.0e-3, 4.0e-3, 2.0e-2];
-/// 1 ml over 16 mm, the width of what is poured (m2), and the first and last place of the front (m): so far that its nose, which theory does not know, is short.
+/// 1 ml over 16 mm, the width of what is poured (m2), and the first and last position of the front (m): so far that its nose, which theory does not know, is short.
 const AREA: f64 = 1.0e-6 / 0.016;
 const FIRST: f64 = 0.1;
 const LAST: f64 = 0.2;
 /// Rows of cells: walls do not reach the middle.
 const WIDE: usize = 81;
-/// Places of the front that are measured.
+/// Positions of the front that are measured.
 const COUNT: usize = 7;
 
 /// All gates.
@@ -38,7 +38,7 @@ fn slowed(viscosity: f64) -> f64 {
     viscosity * (1.0 + SLOPE * SLOPE).powi(2)
 }
 
-/// Theory: when the front is at a place (s).
+/// Theory: when the front is at a position (s).
 fn time_at(front: f64, viscosity: f64) -> f64 {
     front.powi(3) * 4.0 * slowed(viscosity) / (9.0 * AREA * AREA * G * SLOPE)
 }
@@ -73,10 +73,10 @@ fn front_off(ctx: &Context, viscosity: f64, friction: Friction) -> f64 {
         liquid.pour(column, AREA / (first * cell));
     }
     let off = |i: usize| {
-        let place = FIRST * (LAST / FIRST).powf(i as f64 / (COUNT - 1) as f64);
-        let time = time_at(place, viscosity);
+        let position = FIRST * (LAST / FIRST).powf(i as f64 / (COUNT - 1) as f64);
+        let time = time_at(position, viscosity);
         run_until(&mut liquid, ctx, time, time_at(LAST, viscosity) / 200.0);
-        100.0 * (front(&liquid, place) / place - 1.0).abs()
+        100.0 * (front(&liquid, position) / position - 1.0).abs()
     };
     (0..COUNT).map(off).fold(0.0, f64::max)
 }

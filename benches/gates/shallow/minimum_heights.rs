@@ -33,9 +33,9 @@ pub fn run(h: &mut Harness) {
     }
 }
 
-/// A surface: heights and columns of its vertices, places in cells from the centre of cell (0, 0), and triangles.
+/// A surface: heights and columns of its vertices, positions in cells from the centre of cell (0, 0), and triangles.
 struct Mesh {
-    places: Vec<[f64; 3]>,
+    positions: Vec<[f64; 3]>,
     columns: Vec<u32>,
     triangles: Vec<[u32; 3]>,
 }
@@ -51,12 +51,12 @@ struct Ground {
 }
 
 /// Cells from the centre of cell (0, 0), and height.
-fn place(columns: &Columns, [x, y, z]: [f32; 3]) -> [f64; 3] {
+fn position(columns: &Columns, [x, y, z]: [f32; 3]) -> [f64; 3] {
     let at = |length: f32, axis: usize| (f64::from(length) - columns.grid.centre([0, 0])[axis]) / CELL;
     [at(x, 0), f64::from(y) / CELL, at(z, 1)]
 }
 
-/// Parts of the corners of a triangle, seen from above, if a place is over it.
+/// Parts of the corners of a triangle, seen from above, if a position is over it.
 fn parts(corners: [[f64; 3]; 3], [x, z]: [f64; 2]) -> Option<[f64; 3]> {
     let [a, b, c] = corners;
     let area = |p: [f64; 3], q: [f64; 3]| (p[0] - x) * (q[2] - z) - (p[2] - z) * (q[0] - x);
@@ -79,7 +79,8 @@ impl Ground {
             .expect("minimum heights");
         let mut facets: HashMap<[i64; 2], Vec<_>> = HashMap::new();
         for face in &rough.faces {
-            let corners = face.map(|corner| place(&rough.columns, rough.positions[corner as usize].into()));
+            let corners =
+                face.map(|corner| position(&rough.columns, rough.positions[corner as usize].into()));
             let range = |axis: usize| {
                 let of = corners.map(|corner| corner[axis]);
                 let low = of.into_iter().fold(f64::INFINITY, f64::min).floor() as i64;
@@ -111,7 +112,10 @@ impl Ground {
         let layout = Layout { least_depth: 0.05 * CELL, fade_depth: fade * CELL, ..Layout::default() };
         let counts = self.surface.build(columns, &depths, &layout, &mut target).expect("a surface");
         Mesh {
-            places: positions.as_chunks().0[..counts.vertices].iter().map(|at| place(columns, *at)).collect(),
+            positions: positions.as_chunks().0[..counts.vertices]
+                .iter()
+                .map(|at| position(columns, *at))
+                .collect(),
             columns: of[..counts.vertices].to_vec(),
             triangles: indices[..counts.indices].as_chunks().0.to_vec(),
         }
@@ -137,7 +141,7 @@ impl Ground {
         depth
     }
 
-    /// How far a place is over the ground below it (cells); 0 within the ground.
+    /// How far a position is over the ground below it (cells); 0 within the ground.
     fn gap(&self, [x, y, z]: [f64; 3]) -> f64 {
         let near = self.facets.get(&[x.floor() as i64, z.floor() as i64]);
         let mut winding = 0.0;
@@ -162,7 +166,7 @@ impl Mesh {
         let mut out: HashMap<_, Vec<_>> = HashMap::new();
         for triangle in &self.triangles {
             let least = |axis: usize| {
-                let of = triangle.map(|vertex| self.places[vertex as usize][axis]);
+                let of = triangle.map(|vertex| self.positions[vertex as usize][axis]);
                 of.into_iter().fold(f64::INFINITY, f64::min).round() as i64
             };
             out.entry([least(0), least(2)]).or_default().push(*triangle);
@@ -197,7 +201,7 @@ impl Above {
             if bare.binary_search(&(vertex as u32)).is_ok() {
                 continue;
             }
-            let [x, y, z] = place(columns, (*at).into());
+            let [x, y, z] = position(columns, (*at).into());
             let height = (f64::from(at.y) - columns.heights.low) / columns.heights.unit;
             for triangle in triangles.get(&[x.floor() as i64, z.floor() as i64]).into_iter().flatten() {
                 let of = triangle.map(|corner| mesh.columns[corner as usize]);
@@ -207,7 +211,7 @@ impl Above {
                         f64::from(room.start) <= height && height < f64::from(room.end)
                     }
                 };
-                let corners = triangle.map(|corner| mesh.places[corner as usize]);
+                let corners = triangle.map(|corner| mesh.positions[corner as usize]);
                 let Some(surface) = height_at(corners, [x, z]).filter(|_| of.iter().all(|&of| is_own(of)))
                 else {
                     continue;
@@ -288,7 +292,7 @@ impl Rims {
         }
         let last = ground.rough.columns.grid.size[0] as f64 - 1.0;
         for ends in sides.into_iter().filter(|(_, count)| *count == 1).map(|(edge, _)| edge) {
-            let [a, b] = ends.map(|vertex| mesh.places[vertex as usize]);
+            let [a, b] = ends.map(|vertex| mesh.positions[vertex as usize]);
             let on_border = |axis: usize| {
                 let of = [a[axis], b[axis]];
                 of.iter().all(|at| *at < 1e-3) || of.iter().all(|at| *at > last - 1e-3)
@@ -415,9 +419,11 @@ impl Ground {
         let mesh = self.build(depth, true, fade);
         let columns = &self.rough.columns;
         let mut out = vec![0.0; depth.len()];
-        for (&column, place) in mesh.columns.iter().zip(&mesh.places).filter(|(column, _)| **column != NONE) {
+        for (&column, position) in
+            mesh.columns.iter().zip(&mesh.positions).filter(|(column, _)| **column != NONE)
+        {
             let base = columns.heights.metres(columns.bases()[column as usize]) / CELL;
-            out[column as usize] = (place[1] - base).max(0.0);
+            out[column as usize] = (position[1] - base).max(0.0);
         }
         out
     }

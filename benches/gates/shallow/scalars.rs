@@ -59,12 +59,12 @@ fn four() -> [Scalar; 4] {
 fn stains(liquid: &Shallow, plan: &Plan) -> (Stains, Vec<Vec3>) {
     let grid = liquid.columns().grid;
     let [nx, nz] = plan.size.map(|count| count as u32);
-    let place = |cell: usize| {
+    let position = |cell: usize| {
         let [x, z] = grid.centre([cell % plan.size[0], cell / plan.size[0]]);
         let top = plan.solids[cell].first().map_or(0.0, |solid| plan.heights.metres(solid[1]));
         Vec3::new(x as f32, top as f32, z as f32)
     };
-    let positions: Vec<Vec3> = (0..grid.cells()).map(place).collect();
+    let positions: Vec<Vec3> = (0..grid.cells()).map(position).collect();
     let quads = (0..nz - 1).flat_map(|z| (0..nx - 1).map(move |x| z * nx + x));
     let triangles: Vec<[u32; 3]> =
         quads.flat_map(|at| [[at, at + nx, at + 1], [at + 1, at + nx, at + nx + 1]]).collect();
@@ -146,9 +146,9 @@ fn change(liquid: &mut Shallow, dice: &mut Dice) {
     params.gravity = [dice.between(-3.0, 3.0), -9.81, dice.between(-3.0, 3.0)];
     liquid.set_params(params).expect("parameters");
     // A ball dips in, and a pillar that leaves no room where it stands.
-    let mut place =
+    let mut position =
         || DVec3::new(dice.between(-0.04, 0.04), dice.between(0.0, 0.03), dice.between(-0.025, 0.025));
-    let (ball, pillar) = (place(), place());
+    let (ball, pillar) = (position(), position());
     let axes = [DVec3::x(), DVec3::y(), DVec3::z()];
     let bodies = [
         Shape::Sphere { centre: ball, radius: 0.007 },

@@ -92,7 +92,9 @@ fn terrains() -> [(&'static str, TriMesh); 3] {
     for _ in 0..50 {
         let middle = dice.vector(0.7 * f64::from(half)).cast::<f32>();
         let mut one = shapes::globe(0.3 * half, 20, 26);
-        one.positions.iter_mut().for_each(|place| *place += Vec3::new(middle.x, 0.5 * middle.y, middle.z));
+        one.positions
+            .iter_mut()
+            .for_each(|position| *position += Vec3::new(middle.x, 0.5 * middle.y, middle.z));
         spheres.append(&one);
     }
     [("an even sheet", sheet(half)), ("a sphere", sphere), ("50 spheres", spheres)]

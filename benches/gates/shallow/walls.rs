@@ -147,7 +147,7 @@ impl Passage {
         plates * (1.0 - 192.0 * width / (PI.powi(5) * height) * sum)
     }
 
-    /// Theory's mean over the height (m/s) at a place across (m) from the middle.
+    /// Theory's mean over the height (m/s) at a position across (m) from the middle.
     fn profile(self, y: f64) -> f64 {
         let (width, height) =
             (ACROSS as f64 * CELL, if self.is_closed { self.depth } else { 2.0 * self.depth });
@@ -210,8 +210,8 @@ fn plot(ctx: &Context) {
         let all = own.run(ctx, 600);
         let wide = 0.5 * ACROSS as f64 * CELL;
         let curve = (-40..=40).map(|i| wide * f64::from(i) / 40.0).map(|y| [1e3 * y, 1e3 * own.profile(y)]);
-        let place = |z: usize| 1e3 * CELL * (z as f64 + 0.5 - 0.5 * ACROSS as f64);
-        let points = all[599].iter().enumerate().map(|(z, u)| [place(z), 1e3 * u]);
+        let position = |z: usize| 1e3 * CELL * (z as f64 + 0.5 - 0.5 * ACROSS as f64);
+        let points = all[599].iter().enumerate().map(|(z, u)| [position(z), 1e3 * u]);
         plot = plot.line(&format!("theory, {name}"), curve).points(&format!("pipes, {name}"), points);
     }
     plot.write("shallow_walls");

@@ -107,7 +107,7 @@ impl Shot {
     }
 
     /// Puts the folder back to what it was when it was made, but for one bit of one file.
-    fn flip(&self, file: f64, place: f64) -> String {
+    fn flip(&self, file: f64, position: f64) -> String {
         fs::remove_dir_all(self.out()).expect("removed");
         let chosen = self.made.keys().nth((file * self.made.len() as f64) as usize).expect("a file");
         for (name, bytes) in &self.made {
@@ -115,7 +115,7 @@ impl Shot {
             fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
             let mut bytes = bytes.clone();
             if name == chosen {
-                let bit = (place * (8 * bytes.len()) as f64) as usize;
+                let bit = (position * (8 * bytes.len()) as f64) as usize;
                 bytes[bit / 8] ^= 1 << (bit % 8);
             }
             fs::write(path, bytes).expect("a file");

@@ -12,7 +12,7 @@ use crate::harness::Harness;
 use crate::scenes::{self, WALK_CELL, context};
 
 /// Cells that the scene is moved by: 1.2 km and 60 km.
-const PLACES: [i32; 2] = [160_000, 8_000_000];
+const POSITIONS: [i32; 2] = [160_000, 8_000_000];
 const FRAMES: i32 = 48;
 /// Half the square of snow (m).
 const HALF: f64 = 3.6;
@@ -43,8 +43,8 @@ fn worst(params: Params) -> (f64, f64, f64) {
     let near = volumes(0, params);
     let (mut snow, mut removed, mut walk) = (0.0f64, 0.0f64, 0.0f64);
     let sum = |volumes: &[(f64, f64)]| volumes.iter().map(|(_, removed)| removed).sum::<f64>();
-    for place in PLACES {
-        let far = volumes(place, params);
+    for position in POSITIONS {
+        let far = volumes(position, params);
         for (near, far) in near.iter().zip(&far) {
             snow = snow.max((far.0 / near.0 - 1.0).abs());
             if near.1 > 1e-3 {

@@ -86,14 +86,16 @@ fn packed() -> Vec<DVec3> {
     let number = |from: f64, to: f64, step: f64| ((to - from - 1.5 * d) / step) as i32;
     let (layers, rows, along) =
         (number(0.0, DEPTH, up), number(low[1], high[1], wide), number(low[0], high[0], d));
-    let mut places = Vec::new();
+    let mut positions = Vec::new();
     for (y, z) in (0..layers).flat_map(|y| (0..rows).map(move |z| (y, z))) {
         let shift = f64::from((z + y) % 2) * 0.5 * d;
         let row = f64::from(z) * wide + f64::from(y % 2) * wide / 3.0;
-        let place = |x: i32| DVec3::new(f64::from(x) * d + shift, f64::from(y) * up, row);
-        places.extend((0..along).map(|x| place(x) + DVec3::new(low[0] + 0.5 * d, 0.5 * d, low[1] + 0.5 * d)));
+        let position = |x: i32| DVec3::new(f64::from(x) * d + shift, f64::from(y) * up, row);
+        positions.extend(
+            (0..along).map(|x| position(x) + DVec3::new(low[0] + 0.5 * d, 0.5 * d, low[1] + 0.5 * d)),
+        );
     }
-    places
+    positions
 }
 
 /// CesiumMan as in examples/scenes/grains_walk.toml, starting outside the snow.

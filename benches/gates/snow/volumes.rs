@@ -37,7 +37,7 @@ pub fn run(h: &mut Harness) {
 
 /// Volume of full density against that of the union of spheres: of a heap whose spheres overlap, and of grains at rest.
 fn density(h: &mut Harness, ctx: &Context, grains: &Grains) {
-    let real: Vec<DVec3> = grains.places().collect();
+    let real: Vec<DVec3> = grains.positions().collect();
     let off = |centres: &[DVec3], radius: f64, what: &str| {
         let grid = fog::grains(ctx, centres, radius, fog::VOXEL * radius).expect("a grid");
         assert!(grid.voxel_size() <= 0.5 * radius * (1.0 + 1.0e-9));
@@ -97,18 +97,18 @@ fn union(centres: &[DVec3], radius: f64) -> f64 {
     cells.iter().map(|(cell, centres)| inside(cell, centres)).sum::<usize>() as f64 * step.powi(3)
 }
 
-/// Holes between the base and resting grains in their united surface: places without snow that are a voxel long on the way from
+/// Holes between the base and resting grains in their united surface: positions without snow that are a voxel long on the way from
 /// a grain that touches the base to it, and balls of a cell of the base that have base below and a grain above them.
 fn seam(h: &mut Harness, ctx: &Context, base: &BaseLayer, grains: &Grains) {
     let radius = grains.params().radius;
-    let there = grains.places().zip(grains.awake());
-    let resting: Vec<DVec3> = there.filter(|(_, awake)| !awake).map(|(place, _)| place).collect();
+    let there = grains.positions().zip(grains.awake());
+    let resting: Vec<DVec3> = there.filter(|(_, awake)| !awake).map(|(position, _)| position).collect();
     let grid = united::unite(ctx, base.surface(), &resting, radius).expect("a grid");
     let (touching, gaps) = gaps(ctx, base.surface(), &grid, &resting, radius);
-    let (places, balls) = balls(ctx, base.surface(), &grid);
+    let (positions, balls) = balls(ctx, base.surface(), &grid);
     assert!(touching > 100, "only {touching} grains touch the base");
     let note = format!(
-        "{} resting, {touching} touch the base, {gaps} of them apart from it; {balls} balls of {places} places",
+        "{} resting, {touching} touch the base, {gaps} of them apart from it; {balls} balls of {positions} places",
         resting.len()
     );
     h.gate(NAMES[1], (gaps + balls) as f64, &note);
@@ -116,9 +116,9 @@ fn seam(h: &mut Harness, ctx: &Context, base: &BaseLayer, grains: &Grains) {
 
 /// Count of grains within a tenth of their diameter of the base, and of those from which no unbroken snow leads to it.
 fn gaps(ctx: &Context, base: &FloatGrid, snow: &FloatGrid, centres: &[DVec3], radius: f64) -> (usize, usize) {
-    let sampled = |grid: &FloatGrid, places: &[DVec3]| {
+    let sampled = |grid: &FloatGrid, positions: &[DVec3]| {
         let mut out = Vec::new();
-        grid.sample_linear(ctx, places, &mut out).expect("samples");
+        grid.sample_linear(ctx, positions, &mut out).expect("samples");
         out
     };
     let distances = sampled(base, centres);
@@ -146,13 +146,13 @@ fn balls(ctx: &Context, base: &FloatGrid, snow: &FloatGrid) -> (usize, usize) {
     let (cell, voxel) = (base.voxel_size(), snow.voxel_size());
     let half = (0.5 * cell) as f32;
     assert!(half < snow.background(), "the band is too narrow for balls");
-    let mut places = Vec::new();
+    let mut positions = Vec::new();
     for leaf in snow.leaves().expect("leaves") {
         for index in
             (0..512).filter(|index| leaf.values[*index] >= half && leaf.values[*index] < snow.background())
         {
             let at = [index >> 6, index >> 3 & 7, index & 7];
-            places.push([0, 1, 2].map(|axis| leaf.origin[axis] + at[axis] as i32));
+            positions.push([0, 1, 2].map(|axis| leaf.origin[axis] + at[axis] as i32));
         }
     }
     // Up to six cells away.
@@ -169,5 +169,5 @@ fn balls(ctx: &Context, base: &FloatGrid, snow: &FloatGrid) -> (usize, usize) {
     let is_between = |at: &&[i32; 3]| {
         hit(**at, 1).is_some_and(|above| !is_base(above)) && hit(**at, -1).is_some_and(is_base)
     };
-    (places.len(), places.iter().filter(is_between).count())
+    (positions.len(), positions.iter().filter(is_between).count())
 }

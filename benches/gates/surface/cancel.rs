@@ -39,7 +39,7 @@ struct Host {
     /// The tracker's state before a step.
     first: Vec<u8>,
     /// Before a step and after it (m).
-    places: [Vec<[f64; 3]>; 2],
+    positions: [Vec<[f64; 3]>; 2],
     ids: Vec<i64>,
 }
 
@@ -61,7 +61,7 @@ impl Host {
             tracker: Cell::new(null_mut()),
             first: Vec::new(),
             ids: (0..places[0].len() as i64).collect(),
-            places: places.map(|places| places.iter().map(|place| (*place).into()).collect()),
+            positions: places.map(|places| places.iter().map(|place| (*place).into()).collect()),
         };
         let corners: Vec<[f32; 3]> = mesh.positions.iter().map(|place| (*place).into()).collect();
         let desc = frz_mesh_desc {
@@ -97,7 +97,7 @@ impl Host {
         frz_particles {
             struct_size: size_of::<frz_particles>() as u32,
             flags: 0,
-            positions: view(&self.places[frame]),
+            positions: view(&self.positions[frame]),
             velocities: NO_VIEW,
             ids: view(&self.ids),
         }
@@ -217,7 +217,9 @@ fn following(h: &mut Harness) {
         return;
     }
     let ball = ball(26.0, 100, 0.25);
-    let at = |angle: f64| ball.places.iter().map(|place| turned(*place, angle, Default::default())).collect();
+    let at = |angle: f64| {
+        ball.positions.iter().map(|position| turned(*position, angle, Default::default())).collect()
+    };
     let host = Host::new([at(0.0), at(0.02)], &ball.mesh, false);
     let what = format!("{} particles", host.ids.len());
     measure(h, name, &host, &mut Random(42), &what);
@@ -230,15 +232,15 @@ fn rebuilding(h: &mut Harness) {
         return;
     }
     let half = 0.5 * EDGE * SPACING;
-    let block = filled(SPACING, 0.1, half, |place| place.amax() < half);
+    let block = filled(SPACING, 0.1, half, |position| position.amax() < half);
     let at = |gap: f64| -> Vec<DVec3> {
         // Particles lie half a spacing below a block's faces.
         let by = DVec3::new(half + 0.5 * (gap - 1.0) * SPACING, 0.0, 0.0);
-        block.iter().map(|place| place - by).chain(block.iter().map(|place| place + by)).collect()
+        block.iter().map(|position| position - by).chain(block.iter().map(|position| position + by)).collect()
     };
-    let places = GAPS.map(at);
-    let mesh = own_surface(&context(2), &places[0], SPACING);
-    let host = Host::new(places, &mesh, true);
+    let positions = GAPS.map(at);
+    let mesh = own_surface(&context(2), &positions[0], SPACING);
+    let host = Host::new(positions, &mesh, true);
     // SAFETY: it is made of numbers.
     let mut report: frz_tracker_report = unsafe { std::mem::zeroed() };
     report.struct_size = size_of::<frz_tracker_report>() as u32;

@@ -46,8 +46,8 @@ pub fn run(h: &mut Harness) {
         }
     }
     if wanted[2] || wanted[3] {
-        let Ball { spacing, places, mesh } = ball(8.0, 40, 0.25);
-        let at = |frame| numbered(places.iter().map(|place| once_around(*place, frame)).collect());
+        let Ball { spacing, positions, mesh } = ball(8.0, 40, 0.25);
+        let at = |frame| numbered(positions.iter().map(|position| once_around(*position, frame)).collect());
         let frames: Vec<Particles> = (0..=TURN).map(at).collect();
         report(h, [NAMES[2], NAMES[3]], &kept(&ctx, &welded(&mesh), &frames, spacing, 1.0 / 24.0));
     }
@@ -88,7 +88,7 @@ fn by_id(particles: Particles) -> Particles {
     let mut order: Vec<usize> = (0..particles.ids.len()).collect();
     order.sort_unstable_by_key(|at| particles.ids[*at]);
     Particles {
-        places: order.iter().map(|at| particles.places[*at]).collect(),
+        positions: order.iter().map(|at| particles.positions[*at]).collect(),
         ids: order.iter().map(|at| particles.ids[*at]).collect(),
         velocities: Vec::new(),
     }
@@ -98,30 +98,30 @@ fn by_id(particles: Particles) -> Particles {
 fn kept(ctx: &Context, mesh: &TriMesh, frames: &[Particles], spacing: f64, dt: f64) -> Vec<Left> {
     let first = &frames[0];
     assert!(frames.iter().all(|frame| frame.ids == first.ids), "particles are born or die");
-    let bins = Bins::new(&first.places, NEAR * spacing);
-    let mut neighbours_of = vec![Vec::new(); first.places.len()];
-    for (own, place) in neighbours_of.iter_mut().zip(&first.places) {
-        bins.near(place, |other| own.push((other, (first.places[other] - place).norm())));
+    let bins = Bins::new(&first.positions, NEAR * spacing);
+    let mut neighbours_of = vec![Vec::new(); first.positions.len()];
+    for (own, position) in neighbours_of.iter_mut().zip(&first.positions) {
+        bins.near(position, |other| own.push((other, (first.positions[other] - position).norm())));
         own.retain(|(_, far)| *far > 0.0);
     }
     let mut around = vec![Vec::new(); mesh.positions.len()];
-    let of_vertices = Bins::new(&first.places, AROUND * spacing);
-    for (own, place) in around.iter_mut().zip(&mesh.positions) {
-        of_vertices.near(&place.cast(), |particle| own.push(particle));
+    let of_vertices = Bins::new(&first.positions, AROUND * spacing);
+    for (own, position) in around.iter_mut().zip(&mesh.positions) {
+        of_vertices.near(&position.cast(), |particle| own.push(particle));
     }
     let params = Params { rebuild: true, min_drop: MIN_DROP, ..Params::for_spacing(spacing) };
     let mut tracker = Tracker::new(ctx, params, mesh, first).expect("a tracker");
     let before = detail(mesh, &neighbours(mesh));
     // The vertex of the first frame that each one is, and whether particles have been among the same ones all along.
     let mut origins: Vec<Option<u32>> = (0..mesh.positions.len() as u32).map(Some).collect();
-    let mut is_calm = vec![true; first.places.len()];
+    let mut is_calm = vec![true; first.positions.len()];
     let mut out = Vec::new();
     for pair in frames.windows(2) {
         let report = tracker.step(ctx, &pair[0], &pair[1], dt).expect("a step");
         if let Some(change) = report.change {
             origins = change.origins.iter().map(|at| at.and_then(|at| origins[at as usize])).collect();
         }
-        shaken(&pair[1].places, &neighbours_of, &first.places, spacing, &mut is_calm);
+        shaken(&pair[1].positions, &neighbours_of, &first.positions, spacing, &mut is_calm);
         let is_whole = |own: &Vec<usize>| !own.is_empty() && own.iter().all(|particle| is_calm[*particle]);
         let mesh = tracker.mesh();
         let now = detail(&mesh, &neighbours(&mesh));
@@ -167,29 +167,29 @@ fn shaken(
     }
 }
 
-/// Places in cubes of an edge (m).
+/// Positions in cubes of an edge (m).
 struct Bins<'a> {
     edge: f64,
-    places: &'a [DVec3],
+    positions: &'a [DVec3],
     bins: HashMap<[i64; 3], Vec<usize>>,
 }
 
 impl<'a> Bins<'a> {
-    fn new(places: &'a [DVec3], edge: f64) -> Self {
+    fn new(positions: &'a [DVec3], edge: f64) -> Self {
         let mut bins: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
-        for (at, place) in places.iter().enumerate() {
-            bins.entry(bin(place, edge)).or_default().push(at);
+        for (at, position) in positions.iter().enumerate() {
+            bins.entry(bin(position, edge)).or_default().push(at);
         }
-        Self { edge, places, bins }
+        Self { edge, positions, bins }
     }
 
-    /// Calls `see` with those within an edge of a place, in a fixed order.
-    fn near(&self, place: &DVec3, mut see: impl FnMut(usize)) {
-        let [x, y, z] = bin(place, self.edge);
+    /// Calls `see` with those within an edge of a position, in a fixed order.
+    fn near(&self, position: &DVec3, mut see: impl FnMut(usize)) {
+        let [x, y, z] = bin(position, self.edge);
         for n in 0..27 {
             let at = [x + n / 9 - 1, y + n / 3 % 3 - 1, z + n % 3 - 1];
             for other in self.bins.get(&at).into_iter().flatten() {
-                if (self.places[*other] - place).norm() <= self.edge {
+                if (self.positions[*other] - position).norm() <= self.edge {
                     see(*other);
                 }
             }
@@ -197,6 +197,6 @@ impl<'a> Bins<'a> {
     }
 }
 
-fn bin(place: &DVec3, edge: f64) -> [i64; 3] {
-    [0, 1, 2].map(|axis| (place[axis] / edge).floor() as i64)
+fn bin(position: &DVec3, edge: f64) -> [i64; 3] {
+    [0, 1, 2].map(|axis| (position[axis] / edge).floor() as i64)
 }

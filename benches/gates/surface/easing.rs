@@ -31,7 +31,7 @@ struct Jumps {
 /// What was found of frames as they are shown.
 #[derive(Default)]
 struct Shown {
-    /// Deepest place that the mesh surrounds neither once nor never (cells), and the share of the volume that such places have.
+    /// Deepest position that the mesh surrounds neither once nor never (cells), and the share of the volume that such positions have.
     depth: Worst,
     volume: Worst,
     frames: usize,

@@ -38,24 +38,26 @@ pub fn run(h: &mut Harness) {
     h.gate(name, worst, &format!("balls, dumbbell, sheet, bubble: {lags:?}"));
 }
 
-fn surface(ctx: &Context, places: &[DVec3]) -> TriMesh {
-    let phi = Implicit::new(ctx, places, SPACING, 0.5 * SPACING).expect("a surface");
+fn surface(ctx: &Context, positions: &[DVec3]) -> TriMesh {
+    let phi = Implicit::new(ctx, positions, SPACING, 0.5 * SPACING).expect("a surface");
     Isosurface::new(&phi).mesh(&phi)
 }
 
 /// The first frame at which the particles' own surface has other parts or handles, and the first at which a step tells of it.
 fn frames(ctx: &Context, set: &Set) -> (Option<usize>, Option<usize>) {
     let at = |frame: usize| {
-        numbered(set.places.iter().map(|place| (set.motion)(*place, frame as f64) * SPACING).collect())
+        numbered(
+            set.positions.iter().map(|position| (set.motion)(*position, frame as f64) * SPACING).collect(),
+        )
     };
     let kind = |surface: &TriMesh| (parts(surface), surface.euler_characteristic());
-    let first = surface(ctx, &at(0).places);
+    let first = surface(ctx, &at(0).positions);
     let begin = kind(&first);
     let mut tracker = Tracker::new(ctx, Params::for_spacing(SPACING), &first, &at(0)).expect("a tracker");
     let (mut change, mut flag) = (None, None);
     for frame in 1..FRAMES {
         let (from, to) = (at(frame - 1), at(frame));
-        if change.is_none() && kind(&surface(ctx, &to.places)) != begin {
+        if change.is_none() && kind(&surface(ctx, &to.positions)) != begin {
             change = Some(frame);
         }
         let report = tracker.step(ctx, &from, &to, FRAME).expect("a step");

@@ -25,13 +25,14 @@ pub fn run(h: &mut Harness) {
 /// Rigid motion, stretch and shear: where vertices are, against where they should be.
 fn known_motions(h: &mut Harness) {
     let ctx = context(2);
-    let stretch = |place: DVec3, frame: usize| {
+    let stretch = |position: DVec3, frame: usize| {
         // 1.5 times as long in 20 frames, with the same volume.
         let by = libm::exp(libm::log(1.5) / 20.0 * frame as f64);
-        DVec3::new(place.x * by, place.y / by.sqrt(), place.z / by.sqrt())
+        DVec3::new(position.x * by, position.y / by.sqrt(), position.z / by.sqrt())
     };
-    let shear =
-        |place: DVec3, frame: usize| DVec3::new(place.x + 0.025 * frame as f64 * place.y, place.y, place.z);
+    let shear = |position: DVec3, frame: usize| {
+        DVec3::new(position.x + 0.025 * frame as f64 * position.y, position.y, position.z)
+    };
     let mut flagged = None;
     let mut measure =
         |h: &mut Harness, name: &str, detail: f64, frames: usize, motion: &dyn Fn(DVec3, usize) -> DVec3| {
@@ -45,7 +46,7 @@ fn known_motions(h: &mut Harness) {
             *flagged.get_or_insert(0) += count;
             for (name, value) in names.iter().zip([mean, p95, most]) {
                 if h.wants(name) {
-                    h.gate(name, value, &format!("{frames} frames, {} particles", ball.places.len()));
+                    h.gate(name, value, &format!("{frames} frames, {} particles", ball.positions.len()));
                 }
             }
         };
@@ -58,7 +59,7 @@ fn known_motions(h: &mut Harness) {
 }
 
 fn moved(ball: &Ball, angle: f64, by: DVec3) -> Particles {
-    numbered(ball.places.iter().map(|place| turned(*place, angle, by)).collect())
+    numbered(ball.positions.iter().map(|position| turned(*position, angle, by)).collect())
 }
 
 /// Nothing moves; particles in another order; one and two threads.
@@ -81,16 +82,16 @@ fn still(h: &mut Harness) {
     if h.wants("surface.still") {
         let [first, _] = &frames;
         let rested = walk(2, &[first.clone(), first.clone(), first.clone()]);
-        let begun: Vec<DVec3> = ball.mesh.positions.iter().map(|place| place.cast()).collect();
+        let begun: Vec<DVec3> = ball.mesh.positions.iter().map(|position| position.cast()).collect();
         h.holds("surface.still", rested == begun, "two frames of the same particles");
     }
     let two = walk(2, &frames);
     if h.wants("surface.order") {
         let turned = frames.each_ref().map(|frame| {
             let mut frame = frame.clone();
-            frame.places.reverse();
+            frame.positions.reverse();
             frame.ids.reverse();
-            frame.places.rotate_left(11);
+            frame.positions.rotate_left(11);
             frame.ids.rotate_left(11);
             frame
         });
@@ -114,11 +115,12 @@ fn far(h: &mut Harness) {
     let by = DVec3::new(1000.0, 0.0, -1000.0);
     let run = |by: DVec3| {
         let at = |frame: f64| {
-            let place = |place: &DVec3| {
-                let place = turned(*place * scale, 0.05 * frame, DVec3::new(0.03, 0.02, 0.0) * frame) + by;
-                place.map(|x| f64::from(x as f32))
+            let position = |position: &DVec3| {
+                let position =
+                    turned(*position * scale, 0.05 * frame, DVec3::new(0.03, 0.02, 0.0) * frame) + by;
+                position.map(|x| f64::from(x as f32))
             };
-            numbered(near.places.iter().map(place).collect())
+            numbered(near.positions.iter().map(position).collect())
         };
         let mut mesh = near.mesh.clone();
         mesh.positions.iter_mut().for_each(|p| *p = (p.cast::<f64>() * scale + by).cast());
@@ -143,13 +145,13 @@ fn pool(h: &mut Harness) {
     let ball = ball(8.0, 30, 0.25);
     let mut random = Random(5);
     let mut tremble = || {
-        let one = |place: &DVec3| loop {
+        let one = |position: &DVec3| loop {
             let by = random.vector(1.0);
             if by.norm() <= 1.0 {
-                return place + by * (0.02 * ball.spacing);
+                return position + by * (0.02 * ball.spacing);
             }
         };
-        numbered(ball.places.iter().map(one).collect())
+        numbered(ball.positions.iter().map(one).collect())
     };
     let mut from = tremble();
     let mut tracker =
@@ -174,8 +176,8 @@ fn half_space(h: &mut Harness) {
         return;
     }
     let ctx = context(2);
-    let places = filled(1.0, 0.0, 12.0, |place| place.y < 0.0);
-    let phi = Implicit::new(&ctx, &places, 1.0, 0.5).expect("phi");
+    let positions = filled(1.0, 0.0, 12.0, |position| position.y < 0.0);
+    let phi = Implicit::new(&ctx, &positions, 1.0, 0.5).expect("phi");
     let mesh = Isosurface::new(&phi).mesh(&phi);
     let middle = mesh.positions.iter().filter(|p| p.x.abs() < 4.0 && p.z.abs() < 4.0 && p.y > -5.0);
     let most = middle.map(|p| f64::from((p.y + 0.5 - 0.48).abs())).fold(0.0, f64::max);

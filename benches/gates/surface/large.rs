@@ -20,14 +20,14 @@ fn sums(h: &mut Harness) {
         return;
     }
     let (ctx, spacing) = (context(2), 0.1);
-    let places = two_clouds(spacing);
-    let phi = Implicit::new(&ctx, &places, spacing, 0.5 * spacing).expect("a surface");
+    let positions = two_clouds(spacing);
+    let phi = Implicit::new(&ctx, &positions, spacing, 0.5 * spacing).expect("a surface");
     let (mut most, mut count) = (0.0f64, 0);
     for (index, patch) in phi.patches().iter().enumerate() {
         for node in 0..64 {
             let at = [node >> 4, node >> 2 & 3, node & 3];
             let at = DVec3::from([0, 1, 2].map(|axis| f64::from(4 * patch[axis] + at[axis]))) * phi.cell();
-            let expected = plain_phi(&places, spacing, at);
+            let expected = plain_phi(&positions, spacing, at);
             if expected.is_finite() && expected < 2.0 * spacing {
                 let value = f64::from(phi.values(index)[node as usize]) * phi.cell();
                 most = most.max((value - expected).abs() / spacing);
@@ -67,7 +67,8 @@ fn million(h: &mut Harness) {
     let frame = read("out/report/surface.0003.json");
     let phases = frame["phases"].as_array().expect("phases");
     let seconds: f64 = phases.iter().map(|phase| phase["seconds"].as_f64().expect("seconds")).sum();
-    let note = format!("{} particles, {} triangles; threads=1", ball.places.len(), ball.mesh.triangles.len());
+    let note =
+        format!("{} particles, {} triangles; threads=1", ball.positions.len(), ball.mesh.triangles.len());
     let cpu = frazil::numeric::cpu::cpu_level();
     h.gate(time, seconds, &format!("{note} cpu={cpu:?}; all phases of a frame"));
     let peak = read("run.json")["peak_memory_bytes"].as_f64().expect("a peak") / 1e9;

@@ -59,8 +59,8 @@ fn share(gamma: f32) -> f64 {
 /// Nodes around two balls with a radius of 8 and 1.5 between them. For phi they lie `shift` farther along y, and a neck has grown
 /// between them; flagged within 7 of the gap.
 fn balls(shift: f64) -> Vec<Node> {
-    let node = |place: [i32; 3]| {
-        let at = DVec3::from(place.map(f64::from));
+    let node = |position: [i32; 3]| {
+        let at = DVec3::from(position.map(f64::from));
         let ball = |side: f64, shift: f64| (at - DVec3::new(side * 8.75, shift, 0.0)).norm() - 8.0;
         let (a, b) = (ball(-1.0, shift), ball(1.0, shift));
         // Smooth minimum.
@@ -68,7 +68,7 @@ fn balls(shift: f64) -> Vec<Node> {
         let phi = a.min(b) - near * near * 1.5;
         let gamma = ball(-1.0, 0.0).min(ball(1.0, 0.0));
         let is_flagged = at.norm() <= 7.0;
-        Node { place, gamma: gamma.clamp(-4.0, 4.0) as f32, phi: phi.clamp(-5.0, 5.0) as f32, is_flagged }
+        Node { position, gamma: gamma.clamp(-4.0, 4.0) as f32, phi: phi.clamp(-5.0, 5.0) as f32, is_flagged }
     };
     let on = |axis: usize| -HALF[axis]..=HALF[axis];
     on(0).flat_map(|x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z]))).map(node).collect()

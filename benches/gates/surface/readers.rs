@@ -12,7 +12,7 @@ use frazil::vdb::points::to_bytes;
 use frazil::vdb::reading::guard::Guard;
 use rayon::prelude::*;
 
-use crate::common::caches::{IDS, PLACES, VELOCITIES, samples};
+use crate::common::caches::{IDS, POSITIONS, VELOCITIES, samples};
 use crate::common::{character, clients};
 use crate::files::damage;
 use crate::harness::Harness;
@@ -38,7 +38,7 @@ const WRITTEN: [&str; 4] = ["vdb", "bgeo", "ply", "xyz"];
 const VOXEL: &str = "0.01";
 /// Bytes of a particle in what the other programs write: its identity, and x, y and z.
 const RECORD: usize = 32;
-/// How far places of .vdb files may be apart (m), each a sum and a product in 64 bits; those of the others are the same bits.
+/// How far positions of .vdb files may be apart (m), each a sum and a product in 64 bits; those of the others are the same bits.
 const ROUNDING: f64 = 1.0e-12;
 
 /// What the kinds of damaged particles begin with, before the file's extension.
@@ -56,7 +56,7 @@ pub fn run(h: &mut Harness) {
     }
 }
 
-/// A particle: identity and place (m).
+/// A particle: identity and position (m).
 type Particle = (i64, DVec3);
 
 fn same(h: &mut Harness) {
@@ -123,7 +123,7 @@ fn ours(path: &Path) -> Vec<Particle> {
 fn numbered(cloud: &Cloud) -> Vec<Particle> {
     let ids = cloud.attribute("id").or(cloud.attribute("index"));
     let id = |n: usize| ids.map_or(n as i64, |ids| ids.number(n) as i64);
-    cloud.places.iter().enumerate().map(|(n, place)| (id(n), *place)).collect()
+    cloud.positions.iter().enumerate().map(|(n, position)| (id(n), *position)).collect()
 }
 
 /// The particles that another program wrote down; none without a file.
@@ -131,8 +131,8 @@ fn recorded(path: &Path) -> Vec<Particle> {
     let word =
         |bytes: &[u8], at: usize| -> [u8; 8] { bytes[8 * at..8 * at + 8].try_into().expect("8 bytes") };
     let one = |record: &[u8]| {
-        let place = [1, 2, 3].map(|at| f64::from_le_bytes(word(record, at)));
-        (i64::from_le_bytes(word(record, 0)), DVec3::from(place))
+        let position = [1, 2, 3].map(|at| f64::from_le_bytes(word(record, at)));
+        (i64::from_le_bytes(word(record, 0)), DVec3::from(position))
     };
     std::fs::read(path).unwrap_or_default().chunks_exact(RECORD).map(one).collect()
 }
@@ -194,8 +194,8 @@ pub fn intact(ending: &str, folder: &Path) -> Vec<Vec<u8>> {
 
 /// The particles of the made caches, as points.
 fn four() -> Points {
-    let places = PLACES.map(|place| DVec3::from(place.map(f64::from)));
-    let mut out = Points::at(0.5, &places).expect("points");
+    let positions = POSITIONS.map(|position| DVec3::from(position.map(f64::from)));
+    let mut out = Points::at(0.5, &positions).expect("points");
     out.set("id", Values::Long(Column::Each(IDS.map(i64::from).to_vec())));
     out.set("velocity", Values::Vector(Column::Each(VELOCITIES.to_vec())));
     out.set("pscale", Values::Float(Column::Uniform(0.1)));

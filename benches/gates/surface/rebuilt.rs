@@ -118,7 +118,7 @@ struct Tally {
     frames: usize,
     /// Frames at fault.
     failures: usize,
-    /// How deep places are that the mesh surrounds neither once nor never (cells), and their share of its volume.
+    /// How deep positions are that the mesh surrounds neither once nor never (cells), and their share of its volume.
     depth: Worst,
     astray: Worst,
     /// Particles that must be inside of the mesh, and those that are.
@@ -148,10 +148,10 @@ impl Tally {
     fn follow(&mut self, ctx: &Context, sequence: &Sequence, look: &Look) {
         self.names.push(sequence.name);
         let mut history = History::new(sequence.mesh.positions.len(), &sequence.mesh.triangles);
-        let over_phi = |mesh: &TriMesh, places: &[DVec3]| {
-            mesh.volume() / own_surface(ctx, places, sequence.spacing).volume()
+        let over_phi = |mesh: &TriMesh, positions: &[DVec3]| {
+            mesh.volume() / own_surface(ctx, positions, sequence.spacing).volume()
         };
-        let begin = if look.volumes { over_phi(&sequence.mesh, &sequence.at(0).places) } else { 1.0 };
+        let begin = if look.volumes { over_phi(&sequence.mesh, &sequence.at(0).positions) } else { 1.0 };
         let ended = walk(ctx, sequence, |frame| {
             self.frames += 1;
             let title = || sequence.title(frame.index);
@@ -174,7 +174,7 @@ impl Tally {
                 println!("# {}: {fault}", title());
             }
             if look.volumes {
-                let drift = 100.0 * (over_phi(&mesh, &frame.particles.places) / begin - 1.0).abs();
+                let drift = 100.0 * (over_phi(&mesh, &frame.particles.positions) / begin - 1.0).abs();
                 self.drift.see(drift, title);
             }
             // Windings mean nothing where it is not closed.
@@ -182,7 +182,7 @@ impl Tally {
                 self.lattice(&mesh, sequence.cell(), title);
             }
             if is_sound && is_due(look.inside, frame.index) {
-                self.inside(ctx, &mesh, &frame.particles.places, sequence.spacing, title);
+                self.inside(ctx, &mesh, &frame.particles.positions, sequence.spacing, title);
             }
         });
         if let Some(error) = ended {
@@ -204,7 +204,7 @@ impl Tally {
         }
     }
 
-    /// Looks for places of a lattice that the mesh surrounds neither once nor never.
+    /// Looks for positions of a lattice that the mesh surrounds neither once nor never.
     fn lattice(&mut self, mesh: &TriMesh, cell: f64, title: impl Fn() -> String) {
         let [depth, share] = depth_and_share(mesh, cell);
         self.depth.see(depth, &title);
@@ -216,18 +216,18 @@ impl Tally {
         &mut self,
         ctx: &Context,
         mesh: &TriMesh,
-        places: &[DVec3],
+        positions: &[DVec3],
         spacing: f64,
         title: impl Fn() -> String,
     ) {
-        let deep = deep(ctx, places, spacing);
+        let deep = deep(ctx, positions, spacing);
         let kept = inside(mesh, &deep);
         self.deep[0] += deep.len();
         self.deep[1] += kept;
         let outside = deep.len() - kept;
         self.outside.see(outside as f64, title);
         self.clusters += usize::from(outside >= CLUSTER);
-        self.empty += empty_parts(mesh, places);
+        self.empty += empty_parts(mesh, positions);
         self.looked += 1;
     }
 
@@ -334,7 +334,7 @@ fn created(sources: &[Source]) -> impl Iterator<Item = (usize, &Source)> {
 
 /// What keeps a mesh from being a closed surface that is turned outward.
 pub fn unsound(mesh: &TriMesh) -> Option<String> {
-    if let Some(vertex) = mesh.positions.iter().position(|place| !place.iter().all(|x| x.is_finite())) {
+    if let Some(vertex) = mesh.positions.iter().position(|position| !position.iter().all(|x| x.is_finite())) {
         return Some(format!("vertex {vertex} is not finite"));
     }
     let topology = Topology::of(mesh.positions.len(), &mesh.triangles);
@@ -383,31 +383,31 @@ fn jump(frame: &Frame<'_>, change: &Change) -> f64 {
 }
 
 /// What triangles with corners at some places (m) enclose (m3).
-fn volume(places: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
-    let Some(origin) = places.first() else { return 0.0 };
+fn volume(positions: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
+    let Some(origin) = positions.first() else { return 0.0 };
     let six = |triangle: &[u32; 3]| {
-        let [a, b, c] = triangle.map(|corner| places[corner as usize] - origin);
+        let [a, b, c] = triangle.map(|corner| positions[corner as usize] - origin);
         a.dot(&b.cross(&c))
     };
     triangles.iter().map(six).sum::<f64>() / 6.0
 }
 
-/// The places (m) of particles that lie deeper than [`DEEP`] below their own surface.
-fn deep(ctx: &Context, places: &[DVec3], spacing: f64) -> Vec<DVec3> {
-    let phi = Implicit::new(ctx, places, spacing, CELL * spacing).expect("a surface");
+/// The positions (m) of particles that lie deeper than [`DEEP`] below their own surface.
+fn deep(ctx: &Context, positions: &[DVec3], spacing: f64) -> Vec<DVec3> {
+    let phi = Implicit::new(ctx, positions, spacing, CELL * spacing).expect("a surface");
     let known = Distances::new(ctx, &phi, &Isosurface::new(&phi), REACH).expect("distances");
     let mut sampler = Sampler::new(&known);
-    let is_deep = |place: &&DVec3| {
-        let at = **place / phi.cell();
+    let is_deep = |position: &&DVec3| {
+        let at = **position / phi.cell();
         match sampler.at(at) {
             Some((distance, _)) => f64::from(distance) < -DEEP / CELL,
             None => is_inside(&phi, at),
         }
     };
-    places.iter().filter(is_deep).copied().collect()
+    positions.iter().filter(is_deep).copied().collect()
 }
 
-/// Whether the node nearest to a place (cells), far from the surface, is inside.
+/// Whether the node nearest to a position (cells), far from the surface, is inside.
 fn is_inside(phi: &Implicit, at: DVec3) -> bool {
     let node = [0, 1, 2].map(|axis| at[axis].round() as i32);
     // Patches have 4 nodes along an edge.

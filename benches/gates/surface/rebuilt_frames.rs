@@ -63,7 +63,7 @@ const LOWER: f64 = 0.01;
 /// Gaps between splashes and the body at the first frame, of those that fly in and of those that fly away: least and greatest (spacings).
 /// Where it is over about 2 they are apart.
 const GAPS: [[f64; 2]; 2] = [[2.8, 4.4], [0.4, 1.6]];
-/// The angle between places that lie evenly on a sphere from pole to pole (rad).
+/// The angle between positions that lie evenly on a sphere from pole to pole (rad).
 const GOLDEN: f64 = 2.399_963_229_728_653;
 
 /// Particles at a frame, counted from 0.
@@ -175,7 +175,7 @@ impl Scene {
             middle(&counted, |step| step.matching),
             middle(&counted, |step| step.rebuild),
             middle(&counted, |step| step.improve),
-            (self.motion)(0).places.len(),
+            (self.motion)(0).positions.len(),
             self.mesh.triangles.len(),
             frazil::numeric::cpu::cpu_level()
         );
@@ -183,20 +183,20 @@ impl Scene {
     }
 }
 
-/// The surface of particles at places (m) as a mesh of about so many triangles, with detail of its own.
-fn detailed(ctx: &Context, places: &[DVec3], triangles: usize) -> TriMesh {
+/// The surface of particles at positions (m) as a mesh of about so many triangles, with detail of its own.
+fn detailed(ctx: &Context, positions: &[DVec3], triangles: usize) -> TriMesh {
     let on = |cell: f64| {
-        let phi = Implicit::new(ctx, places, SPACING, cell * SPACING).expect("a surface");
+        let phi = Implicit::new(ctx, positions, SPACING, cell * SPACING).expect("a surface");
         Isosurface::new(&phi).mesh(&phi)
     };
     // A surface has so many triangles as its area has faces of cells, nearly.
     let share = (on(CELL).triangles.len() as f64 / triangles as f64).sqrt();
     let mut mesh = on((CELL * share).clamp(0.15, 1.0));
     let normals = mesh.normals();
-    for (place, normal) in mesh.positions.iter_mut().zip(normals) {
-        let at: DVec3 = place.cast::<f64>() / (LONG * SPACING);
+    for (position, normal) in mesh.positions.iter_mut().zip(normals) {
+        let at: DVec3 = position.cast::<f64>() / (LONG * SPACING);
         let wave = libm::sin(at.x) * libm::sin(at.y) * libm::sin(at.z);
-        *place += normal * (DETAIL * SPACING * wave) as f32;
+        *position += normal * (DETAIL * SPACING * wave) as f32;
     }
     mesh
 }
@@ -207,23 +207,23 @@ fn bunny(ctx: &Context) -> Scene {
     // A ball without its lowest quarter. Layers become thinner as they lie deeper, and as much wider as keeps their volume.
     let (radius, base) = (19.92, -9.96);
     let high = radius - base;
-    let places = filled(1.0, JITTER, radius, |place| place.norm() <= radius && place.y >= base);
+    let positions = filled(1.0, JITTER, radius, |position| position.norm() <= radius && position.y >= base);
     let motion = move |frame: usize| {
         let melt = MELT * (frame + 1) as f64;
-        let one = |place: &DVec3| {
-            let deep = (radius - place.y) / high;
+        let one = |position: &DVec3| {
+            let deep = (radius - position.y) / high;
             let wide = libm::exp(0.5 * melt * deep);
             let y = base + high / melt * (libm::exp(-melt * deep) - libm::exp(-melt));
-            DVec3::new(place.x * wide, y, place.z * wide) * SPACING
+            DVec3::new(position.x * wide, y, position.z * wide) * SPACING
         };
-        numbered(places.iter().map(one).collect())
+        numbered(positions.iter().map(one).collect())
     };
-    let mesh = detailed(ctx, &motion(0).places, 66_862);
+    let mesh = detailed(ctx, &motion(0).positions, 66_862);
     Scene { mesh, motion: Box::new(motion), steps: MELTING, is_matched: false }
 }
 
 /// The splitting gazelle (Fig. 2.13): an object that is torn apart. The thesis matched it in 83 % of its frames. Here two lobes part,
-/// and the strands between them tear one after the other, in several places each.
+/// and the strands between them tear one after the other, in several positions each.
 fn gazelle(ctx: &Context) -> Scene {
     let row = Row { lobes: 2, radius: 13.55, strands: 5, thick: 2.5, around: 6.5 };
     torn(ctx, row, 0.0, 242_932)
@@ -238,12 +238,12 @@ fn gears(ctx: &Context) -> Scene {
 
 /// A row that is torn at all of its joints, with `turn` rad in each frame.
 fn torn(ctx: &Context, row: Row, turn: f64, triangles: usize) -> Scene {
-    let places = row.places();
+    let positions = row.positions();
     let motion = move |frame: usize| {
         let (apart, turn) = (APART + AWAY * frame as f64, turn * frame as f64);
-        numbered(places.iter().map(|place| row.torn(*place, apart, turn) * SPACING).collect())
+        numbered(positions.iter().map(|position| row.torn(*position, apart, turn) * SPACING).collect())
     };
-    let mesh = detailed(ctx, &motion(0).places, triangles);
+    let mesh = detailed(ctx, &motion(0).positions, triangles);
     Scene { mesh, motion: Box::new(motion), steps: TEARING, is_matched: true }
 }
 
@@ -272,7 +272,7 @@ impl Row {
         self.lobe(index) + self.radius + 0.5 * GAP
     }
 
-    /// A place on the axis of a strand.
+    /// A position on the axis of a strand.
     fn strand(&self, index: usize) -> DVec3 {
         let angle = TAU * index as f64 / self.strands as f64;
         DVec3::new(0.0, libm::cos(angle), libm::sin(angle)) * self.around
@@ -284,36 +284,36 @@ impl Row {
         HALVES[0] + share * (HALVES[1] - HALVES[0])
     }
 
-    /// How far a place is from the axis of a strand.
-    fn beside(&self, place: DVec3, strand: usize) -> f64 {
-        (place - self.strand(strand)).yz().norm()
+    /// How far a position is from the axis of a strand.
+    fn beside(&self, position: DVec3, strand: usize) -> f64 {
+        (position - self.strand(strand)).yz().norm()
     }
 
     /// The particles, before anything is drawn out.
-    fn places(&self) -> Vec<DVec3> {
-        let is_in_lobe = |place: DVec3| {
-            (0..self.lobes).any(|lobe| (place - DVec3::x() * self.lobe(lobe)).norm() <= self.radius)
+    fn positions(&self) -> Vec<DVec3> {
+        let is_in_lobe = |position: DVec3| {
+            (0..self.lobes).any(|lobe| (position - DVec3::x() * self.lobe(lobe)).norm() <= self.radius)
         };
         // Strands end in the lobes.
         let reach = 0.5 * (GAP + self.radius);
-        let is_in_strand = |place: DVec3| {
-            (0..self.lobes - 1).any(|joint| (place.x - self.joint(joint)).abs() < reach)
-                && (0..self.strands).any(|strand| self.beside(place, strand) < self.thick)
+        let is_in_strand = |position: DVec3| {
+            (0..self.lobes - 1).any(|joint| (position.x - self.joint(joint)).abs() < reach)
+                && (0..self.strands).any(|strand| self.beside(position, strand) < self.thick)
         };
         let size = self.lobe(self.lobes - 1) + self.radius;
-        filled(1.0, JITTER, size, |place| is_in_lobe(place) || is_in_strand(place))
+        filled(1.0, JITTER, size, |position| is_in_lobe(position) || is_in_strand(position))
     }
 
-    /// Where a place is when the halves of each joint have come `apart` spacings farther from its middle, and lobes have turned by
+    /// Where a position is when the halves of each joint have come `apart` spacings farther from its middle, and lobes have turned by
     /// `turn` rad to the one side and to the other in turn. Strands become as thin as keeps their volume.
-    fn torn(&self, place: DVec3, apart: f64, turn: f64) -> DVec3 {
-        let strands = (0..self.strands).map(|strand| (self.beside(place, strand), strand));
+    fn torn(&self, position: DVec3, apart: f64, turn: f64) -> DVec3 {
+        let strands = (0..self.strands).map(|strand| (self.beside(position, strand), strand));
         let nearest = strands.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0, |(_, strand)| strand);
         let (axis, half) = (self.strand(nearest), self.half(nearest));
         let thin = 1.0 / (1.0 + apart / half).sqrt();
-        let (mut to, mut angle) = (place, turn);
+        let (mut to, mut angle) = (position, turn);
         for joint in 0..self.lobes - 1 {
-            let from = place.x - self.joint(joint);
+            let from = position.x - self.joint(joint);
             // Lobes are farther from it than `half` and THIN, so that they keep their shape.
             let side = (from / half).clamp(-1.0, 1.0);
             to.x += apart * side;
@@ -329,7 +329,7 @@ impl Row {
 }
 
 /// The liquid armadillo (Fig. 2.14): a detailed body of a liquid without viscosity that collapses, with splashes, so that it merges and
-/// splits in many places at once. The thesis matched it in 94 % of its frames. Here a ball becomes flat, half of its splashes fly away
+/// splits in many positions at once. The thesis matched it in 94 % of its frames. Here a ball becomes flat, half of its splashes fly away
 /// from it, and half fall into it, at different times.
 fn armadillo(ctx: &Context) -> Scene {
     let splash = |index: usize| {
@@ -344,7 +344,7 @@ fn armadillo(ctx: &Context) -> Scene {
     let body = Lump { radius: BODY, centre: DVec3::zeros(), way: DVec3::zeros() };
     let lumps: Vec<Lump> = std::iter::once(body).chain((0..SPLASHES).map(splash)).collect();
     let motion = flying(&lumps, LOWER);
-    let mesh = detailed(ctx, &motion(0).places, 100_870);
+    let mesh = detailed(ctx, &motion(0).positions, 100_870);
     Scene { mesh, motion, steps: FLYING, is_matched: true }
 }
 
@@ -361,14 +361,14 @@ pub struct Lump {
 pub fn flying(lumps: &[Lump], lower: f64) -> Motion {
     let mut particles: Vec<(DVec3, DVec3)> = Vec::new();
     for Lump { radius, centre, way } in lumps {
-        let places = filled(1.0, JITTER, *radius, |place| place.norm() <= *radius);
-        particles.extend(places.iter().map(|place| (place + centre, *way)));
+        let positions = filled(1.0, JITTER, *radius, |position| position.norm() <= *radius);
+        particles.extend(positions.iter().map(|position| (position + centre, *way)));
     }
     Box::new(move |frame: usize| {
         let high = 1.0 - lower * frame as f64;
         let wide = 1.0 / high.sqrt();
-        let one = |(place, way): &(DVec3, DVec3)| {
-            let low = DVec3::new(place.x * wide, place.y * high, place.z * wide);
+        let one = |(position, way): &(DVec3, DVec3)| {
+            let low = DVec3::new(position.x * wide, position.y * high, position.z * wide);
             (low + way * frame as f64) * SPACING
         };
         numbered(particles.iter().map(one).collect())

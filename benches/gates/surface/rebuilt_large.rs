@@ -97,7 +97,7 @@ fn merging(lumps: &[Lump], squares: usize, steps: usize) -> Scene {
     for lump in lumps {
         let mut own = ball(lump.radius, squares, DETAIL).mesh;
         let by = lump.centre * SPACING;
-        own.positions.iter_mut().for_each(|place| *place = (place.cast::<f64>() + by).cast());
+        own.positions.iter_mut().for_each(|position| *position = (position.cast::<f64>() + by).cast());
         mesh.append(&own);
     }
     Scene { mesh: welded(&mesh), motion: flying(lumps, 0.0), steps, is_matched: true }

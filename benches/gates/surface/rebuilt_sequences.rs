@@ -95,7 +95,7 @@ pub fn dambreak(ctx: &Context) -> Option<Sequence> {
         spacing: DAM_SPACING,
         dt: 1.0 / DAM_FPS,
         frames: DAM_FRAMES,
-        mesh: own_surface(ctx, &at(0).places, DAM_SPACING),
+        mesh: own_surface(ctx, &at(0).positions, DAM_SPACING),
         every: false,
         particles: Box::new(at),
     })
@@ -104,11 +104,11 @@ pub fn dambreak(ctx: &Context) -> Option<Sequence> {
 /// The made sets, with their particles' own surface at the first frame: two balls, a dumbbell, a sheet, a bubble.
 pub fn made(ctx: &Context) -> Vec<Sequence> {
     let one = |(set, frames): (Set, usize)| {
-        let Set { name, places, motion } = set;
+        let Set { name, positions, motion } = set;
         let at = move |frame: usize| {
-            numbered(places.iter().map(|place| motion(*place, frame as f64) * SPACING).collect())
+            numbered(positions.iter().map(|position| motion(*position, frame as f64) * SPACING).collect())
         };
-        let mesh = own_surface(ctx, &at(0).places, SPACING);
+        let mesh = own_surface(ctx, &at(0).positions, SPACING);
         Sequence {
             name,
             first: 0,
@@ -125,12 +125,12 @@ pub fn made(ctx: &Context) -> Vec<Sequence> {
 
 /// The two balls of the made sets, which stay where they are when their particles have met: from then on they are one liquid.
 pub fn joined(ctx: &Context) -> Sequence {
-    let [Set { places, motion, .. }, ..] = sets();
+    let [Set { positions, motion, .. }, ..] = sets();
     let at = move |frame: usize| {
         let passed = frame.min(MET) as f64;
-        numbered(places.iter().map(|place| motion(*place, passed) * SPACING).collect())
+        numbered(positions.iter().map(|position| motion(*position, passed) * SPACING).collect())
     };
-    let mesh = own_surface(ctx, &at(0).places, SPACING);
+    let mesh = own_surface(ctx, &at(0).positions, SPACING);
     Sequence {
         name: "two balls join",
         first: 0,
@@ -146,11 +146,11 @@ pub fn joined(ctx: &Context) -> Sequence {
 fn cached(path: &Path) -> Particles {
     let cloud = particles::read(path).expect("particles");
     let ids = match cloud.attribute("id") {
-        Some(Values::Long(column)) => (0..cloud.places.len()).map(|n| column.get(n)).collect(),
-        Some(Values::Int(column)) => (0..cloud.places.len()).map(|n| column.get(n).into()).collect(),
+        Some(Values::Long(column)) => (0..cloud.positions.len()).map(|n| column.get(n)).collect(),
+        Some(Values::Int(column)) => (0..cloud.positions.len()).map(|n| column.get(n).into()).collect(),
         _ => panic!("the particles have no ids"),
     };
-    Particles { ids, places: cloud.places, velocities: Vec::new() }
+    Particles { ids, positions: cloud.positions, velocities: Vec::new() }
 }
 
 /// A frame of a mesh that follows a liquid.

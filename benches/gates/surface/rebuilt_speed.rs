@@ -40,8 +40,8 @@ pub fn run(h: &mut Harness) {
 
 /// A ball whose mesh is closed by index.
 fn closed_ball((radius, n, detail): (f64, usize, f64)) -> Ball {
-    let Ball { spacing, places, mesh } = ball(radius, n, detail);
-    Ball { spacing, places, mesh: welded(&mesh) }
+    let Ball { spacing, positions, mesh } = ball(radius, n, detail);
+    Ball { spacing, positions, mesh: welded(&mesh) }
 }
 
 fn params(spacing: f64) -> Params {
@@ -119,22 +119,27 @@ fn of_phases(reports: &[StepReport]) -> String {
 /// The same step again and again: under a cap that is a share of a resting ball's surface a layer of its particles is gone, so that the
 /// surface there lies deeper than vertices may be moved.
 fn without_a_layer(ctx: &Context, ball: &Ball, share: f64) -> Vec<StepReport> {
-    let is_kept = |place: &DVec3| {
-        let far = place.norm();
-        far < (DRAGON.0 - LAYER) * ball.spacing || place.y < (1.0 - 2.0 * share) * far
+    let is_kept = |position: &DVec3| {
+        let far = position.norm();
+        far < (DRAGON.0 - LAYER) * ball.spacing || position.y < (1.0 - 2.0 * share) * far
     };
-    let from = numbered(ball.places.clone());
-    let (places, ids): (Vec<DVec3>, Vec<i64>) =
-        from.places.iter().copied().zip(from.ids.iter().copied()).filter(|(place, _)| is_kept(place)).unzip();
-    let to = Particles { places, ids, velocities: Vec::new() };
+    let from = numbered(ball.positions.clone());
+    let (positions, ids): (Vec<DVec3>, Vec<i64>) = from
+        .positions
+        .iter()
+        .copied()
+        .zip(from.ids.iter().copied())
+        .filter(|(position, _)| is_kept(position))
+        .unzip();
+    let to = Particles { positions, ids, velocities: Vec::new() };
     let tracker = Tracker::new(ctx, params(ball.spacing), &ball.mesh, &from).expect("a tracker");
     (0..STEPS).map(|_| tracker.clone().step(ctx, &from, &to, FRAME).expect("a step")).collect()
 }
 
 /// About how many cells of an edge (m) a mesh passes through: those of its vertices and of the middles of its triangles.
 fn cells(mesh: &TriMesh, edge: f64) -> usize {
-    let cell = |place: DVec3| [0, 1, 2].map(|axis| (place[axis] / edge).floor() as i32);
-    let of_vertices = mesh.positions.iter().map(|place| cell(place.cast()));
+    let cell = |position: DVec3| [0, 1, 2].map(|axis| (position[axis] / edge).floor() as i32);
+    let of_vertices = mesh.positions.iter().map(|position| cell(position.cast()));
     let of_triangles = (0..mesh.triangles.len()).map(|triangle| {
         let [a, b, c] = mesh.corners(triangle);
         cell((a + b + c) / 3.0)
@@ -155,11 +160,11 @@ fn merge(h: &mut Harness) {
     let spacing = dragon.spacing;
     let by = |frame: usize| DVec3::new(0.0, (BEGIN - WAY * frame as f64) * spacing, 0.0);
     let at = |frame: usize| {
-        let fallen = drop.places.iter().map(|place| place + by(frame));
-        numbered(dragon.places.iter().copied().chain(fallen).collect())
+        let fallen = drop.positions.iter().map(|position| position + by(frame));
+        numbered(dragon.positions.iter().copied().chain(fallen).collect())
     };
     let mut above = drop.mesh.clone();
-    above.positions.iter_mut().for_each(|place| *place = (place.cast::<f64>() + by(0)).cast());
+    above.positions.iter_mut().for_each(|position| *position = (position.cast::<f64>() + by(0)).cast());
     let mut mesh = dragon.mesh.clone();
     mesh.append(&above);
     let mut from = at(0);
@@ -186,7 +191,7 @@ fn merge(h: &mut Harness) {
         seconds.len(),
         flagged / seconds.len(),
         median(meshing),
-        from.places.len(),
+        from.positions.len(),
         mesh.triangles.len(),
         frazil::numeric::cpu::cpu_level()
     );

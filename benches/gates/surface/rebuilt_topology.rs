@@ -74,7 +74,7 @@ fn followed(h: &mut Harness) {
         let mut history = History::new(sequence.mesh.positions.len(), &sequence.mesh.triangles);
         let mut numbers = Numbers::of(&sequence.mesh);
         let ended = walk(&ctx, sequence, |frame| {
-            own.push(Kind::of(&own_surface(&ctx, &frame.particles.places, sequence.spacing)));
+            own.push(Kind::of(&own_surface(&ctx, &frame.particles.positions, sequence.spacing)));
             mesh.push(Kind::of(&frame.tracker.mesh()));
             if let Some(change) = &frame.report.change {
                 changes += 1;
@@ -148,7 +148,7 @@ impl Numbers {
 
     /// Goes on by the change of a frame.
     fn follow(&mut self, frame: &Frame<'_>, change: &Change) {
-        let positions = change.before.iter().map(|place| place.cast()).collect();
+        let positions = change.before.iter().map(|position| position.cast()).collect();
         self.0.mesh = TriMesh { positions, triangles: frame.before.to_vec() };
         self.0 = carry_attributes(&self.0, frame.tracker.mesh(), &change.origins, &change.sources, None);
     }

@@ -99,14 +99,14 @@ impl Calming {
         let mut random = Random(5);
         let mut tremble = |frame: usize| {
             let mut particles = (self.particles)(frame.min(self.moving));
-            for place in &mut particles.places {
+            for position in &mut particles.positions {
                 let by = loop {
                     let by = random.vector(1.0);
                     if by.norm() <= 1.0 {
                         break by;
                     }
                 };
-                *place += by * (TREMBLE * self.spacing);
+                *position += by * (TREMBLE * self.spacing);
             }
             particles
         };
@@ -128,19 +128,19 @@ impl Calming {
 
 /// A pool under its own surface, whose triangles are as uneven as those of marching cubes, with ripples.
 fn pool(ctx: &Context) -> Calming {
-    let places = filled(SPACING, 0.1, 12.0 * SPACING, |place| place.y.abs() < 4.0 * SPACING);
-    let mut mesh = own_surface(ctx, &places, SPACING);
-    for place in &mut mesh.positions {
-        let wave =
-            libm::sin(f64::from(place.x) / (0.8 * SPACING)) * libm::sin(f64::from(place.z) / (0.7 * SPACING));
-        place.y += (0.25 * SPACING * wave) as f32;
+    let positions = filled(SPACING, 0.1, 12.0 * SPACING, |position| position.y.abs() < 4.0 * SPACING);
+    let mut mesh = own_surface(ctx, &positions, SPACING);
+    for position in &mut mesh.positions {
+        let wave = libm::sin(f64::from(position.x) / (0.8 * SPACING))
+            * libm::sin(f64::from(position.z) / (0.7 * SPACING));
+        position.y += (0.25 * SPACING * wave) as f32;
     }
     Calming {
         name: "a pool",
         spacing: SPACING,
         mesh,
         moving: 0,
-        particles: Box::new(move |_| numbered(places.clone())),
+        particles: Box::new(move |_| numbered(positions.clone())),
     }
 }
 
@@ -150,29 +150,29 @@ fn uneven() -> Calming {
     let mut random = Random(9);
     ball.mesh = welded(&ball.mesh);
     let edge = 8.0 * SPACING * std::f64::consts::FRAC_PI_2 / 40.0;
-    for place in &mut ball.mesh.positions {
-        let long = place.norm();
+    for position in &mut ball.mesh.positions {
+        let long = position.norm();
         let by: DVec3 = random.vector(0.3 * edge);
-        *place = (*place + by.cast::<f32>()).normalize() * long;
+        *position = (*position + by.cast::<f32>()).normalize() * long;
     }
-    let places = ball.places;
+    let positions = ball.positions;
     Calming {
         name: "an uneven ball",
         spacing: ball.spacing,
         mesh: ball.mesh,
         moving: 0,
-        particles: Box::new(move |_| numbered(places.clone())),
+        particles: Box::new(move |_| numbered(positions.clone())),
     }
 }
 
 /// Liquids that were drawn out, tore or met before they come to rest.
 fn stopped(ctx: &Context) -> Vec<Calming> {
     let one = |(set, moving): (Set, usize)| {
-        let Set { name, places, motion } = set;
+        let Set { name, positions, motion } = set;
         let at = move |frame: usize| {
-            numbered(places.iter().map(|place| motion(*place, frame as f64) * SPACING).collect())
+            numbered(positions.iter().map(|position| motion(*position, frame as f64) * SPACING).collect())
         };
-        let mesh = own_surface(ctx, &at(0).places, SPACING);
+        let mesh = own_surface(ctx, &at(0).positions, SPACING);
         Calming { name, spacing: SPACING, mesh, moving, particles: Box::new(at) }
     };
     sets().into_iter().zip(MOVING).map(one).collect()

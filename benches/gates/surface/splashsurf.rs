@@ -72,14 +72,14 @@ fn frazil<'a>(command: &'a mut Command, file: &Path) -> &'a mut Command {
 /// A block of particles with a wavy surface, as a file.
 fn block(folder: &Path, edge: i32) -> PathBuf {
     let mut random = Random(1);
-    let mut places = Vec::with_capacity(edge.pow(3) as usize);
+    let mut positions = Vec::with_capacity(edge.pow(3) as usize);
     for n in 0..edge.pow(3) {
         let at =
             DVec3::new(f64::from(n / edge / edge), f64::from(n / edge % edge), f64::from(n % edge)) * SPACING;
         let wave = 0.8 * libm::sin(1.5 * at.x) * libm::cos(1.2 * at.z);
-        places.push(at + DVec3::new(0.0, wave, 0.0) + random.vector(0.2 * SPACING));
+        positions.push(at + DVec3::new(0.0, wave, 0.0) + random.vector(0.2 * SPACING));
     }
     let path = folder.join(format!("block{edge}.xyz"));
-    particles::write(&path, &Points::at(1.0, &places).expect("points"), false).expect("a file");
+    particles::write(&path, &Points::at(1.0, &positions).expect("points"), false).expect("a file");
     path
 }

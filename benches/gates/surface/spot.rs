@@ -73,7 +73,7 @@ impl Spot {
             values: (0..count).map(|n| (n * 7 % 251) as f64).collect(),
         };
         let uvs = Uvs {
-            places: (0..3 * faces).map(|n| [n as f32 * 1.3e-5, 1.0 / (1.0 + n as f32)]).collect(),
+            positions: (0..3 * faces).map(|n| [n as f32 * 1.3e-5, 1.0 / (1.0 + n as f32)]).collect(),
             corners: Some((0..3 * faces as u32).collect()),
             missing: 0,
         };
@@ -128,7 +128,7 @@ impl Spot {
     /// The particles' own surface at a frame, on cells of some share of the spacing.
     fn phi(&self, ctx: &Context, frame: i32, cell: f64) -> TriMesh {
         let phi =
-            Implicit::new(ctx, &self.particles(frame).places, SPACING, cell * SPACING).expect("a surface");
+            Implicit::new(ctx, &self.particles(frame).positions, SPACING, cell * SPACING).expect("a surface");
         Isosurface::new(&phi).mesh(&phi)
     }
 }
@@ -202,15 +202,15 @@ fn shape(h: &mut Harness, spot: &Spot, frames: &[DetailedMesh]) {
     h.gate(NAMES[5], drift, &format!("frames 2 to {first_flag}, before the first flag"));
 }
 
-/// Velocities against the next frame's places, and what the mesh carries.
+/// Velocities against the next frame's positions, and what the mesh carries.
 fn carried(h: &mut Harness, own: &DetailedMesh, frames: &[DetailedMesh]) {
     let mut most = 0.0f64;
     for pair in frames.windows(2) {
         let speed = ["vx", "vy", "vz"].map(|name| array(&pair[0], name));
-        for (vertex, place) in pair[0].mesh.positions.iter().enumerate() {
+        for (vertex, position) in pair[0].mesh.positions.iter().enumerate() {
             let by = DVec3::new(speed[0][vertex], speed[1][vertex], speed[2][vertex]) / FPS;
             let next: DVec3 = pair[1].mesh.positions[vertex].cast();
-            most = most.max((place.cast::<f64>() + by - next).norm() / SPACING);
+            most = most.max((position.cast::<f64>() + by - next).norm() / SPACING);
         }
     }
     h.gate(NAMES[6], most, "all vertices of all frames, places and velocities in 32 bits");

@@ -2,7 +2,7 @@
 //!
 //! Two balls meet and stay, each with a texture laid through it from the front. The particles' own texture is known by the set's motion: the
 //! exact way back of a particle near a face leads to where its corners were at the first frame; there they have the texture of the
-//! nearest place of the mesh then.
+//! nearest position of the mesh then.
 
 use frazil::geometry::check::deviation::NearestTree;
 use frazil::geometry::{DVec3, DetailedMesh, TriMesh, Uvs, Vec3};
@@ -28,14 +28,15 @@ pub fn run(h: &mut Harness) {
     let sequence = joined(&ctx);
     let first = sequence.at(0);
     let rest = Rest::of(&first).expect("ids");
-    let truth = Truth::of(&sequence, first.places);
+    let truth = Truth::of(&sequence, first.positions);
     let mut sheets = [false, true].map(|has_seam| Sheet::of(&sequence.mesh, has_seam));
     let ended = walk(&ctx, &sequence, |frame| {
         let Some(change) = &frame.report.change else { return };
-        let places = rest.of_change(&ctx, frame.particles, sequence.spacing, change).expect("first places");
+        let positions =
+            rest.of_change(&ctx, frame.particles, sequence.spacing, change).expect("first places");
         for sheet in &mut sheets {
-            sheet.follow(frame, change, &places, sequence.spacing);
-            sheet.see(&truth, &frame.particles.places, &change.sources);
+            sheet.follow(frame, change, &positions, sequence.spacing);
+            sheet.see(&truth, &frame.particles.positions, &change.sources);
         }
     });
     for sheet in &sheets {
@@ -109,7 +110,7 @@ fn frame_of(mesh: &TriMesh) -> (Vec3, f32) {
 
 /// What is known of the liquid.
 struct Truth {
-    /// Places at the first frame (m), by id.
+    /// Positions at the first frame (m), by id.
     first: Vec<DVec3>,
     tree: NearestTree,
     low: DVec3,
@@ -130,11 +131,11 @@ impl Truth {
         }
     }
 
-    /// The ways back to the first frame (m) of the particles near a place (m), which are at `now`: one for each ball.
-    fn ways(&self, now: &[DVec3], place: DVec3) -> Vec<DVec3> {
+    /// The ways back to the first frame (m) of the particles near a position (m), which are at `now`: one for each ball.
+    fn ways(&self, now: &[DVec3], position: DVec3) -> Vec<DVec3> {
         let nearest = |side: f64| {
             let all = now.iter().zip(&self.first).filter(|(_, first)| first.x * side > 0.0);
-            let far = all.map(|(now, first)| ((now - place).norm(), first - now));
+            let far = all.map(|(now, first)| ((now - position).norm(), first - now));
             far.min_by(|a, b| a.0.total_cmp(&b.0)).expect("a ball")
         };
         let both = [nearest(-1.0), nearest(1.0)];
@@ -145,8 +146,8 @@ impl Truth {
     /// The particles' own edges, in the texture, of a triangle whose corners' way back is known (m).
     fn edges(&self, corners: &[DVec3; 3], way: DVec3) -> [Pair; 3] {
         edges(corners.map(|corner| {
-            let place = self.tree.nearest(corner + way).expect("a mesh").place;
-            [(place.x - self.low.x) / self.size, (place.y - self.low.y) / self.size]
+            let position = self.tree.nearest(corner + way).expect("a mesh").position;
+            [(position.x - self.low.x) / self.size, (position.y - self.low.y) / self.size]
         }))
     }
 }
@@ -155,7 +156,7 @@ impl Truth {
 struct Sheet {
     name: &'static str,
     first: DetailedMesh,
-    /// As it is now: through the particles' first places, and from the mesh before alone.
+    /// As it is now: through the particles' first positions, and from the mesh before alone.
     traced: DetailedMesh,
     before: DetailedMesh,
     /// Over all frames in which the mesh changed: how many these are, faces that were rebuilt, and those of them that are marked.
@@ -172,19 +173,19 @@ struct Sheet {
 impl Sheet {
     fn of(mesh: &TriMesh, has_seam: bool) -> Self {
         let (low, size) = frame_of(mesh);
-        let place = |p: &Vec3| [(p.x - low.x) / size, (p.y - low.y) / size];
-        let places: Vec<[f32; 2]> = mesh.positions.iter().map(place).collect();
+        let position = |p: &Vec3| [(p.x - low.x) / size, (p.y - low.y) / size];
+        let positions: Vec<[f32; 2]> = mesh.positions.iter().map(position).collect();
         let uvs = if has_seam {
             // What is seen from behind lies on an island of its own.
-            let count = places.len() as u32;
-            let behind: Vec<[f32; 2]> = places.iter().map(|[u, v]| [u + ISLAND, *v]).collect();
+            let count = positions.len() as u32;
+            let behind: Vec<[f32; 2]> = positions.iter().map(|[u, v]| [u + ISLAND, *v]).collect();
             let corners = mesh.triangles.iter().flat_map(|names| {
                 let height: f32 = names.iter().map(|name| mesh.positions[*name as usize].z).sum();
                 names.map(|name| if height < 0.0 { name + count } else { name })
             });
-            Uvs { corners: Some(corners.collect()), places: [places, behind].concat(), missing: 0 }
+            Uvs { corners: Some(corners.collect()), positions: [positions, behind].concat(), missing: 0 }
         } else {
-            Uvs { places, corners: None, missing: 0 }
+            Uvs { positions, corners: None, missing: 0 }
         };
         let first = DetailedMesh { mesh: mesh.clone(), uvs: Some(uvs), arrays: Vec::new() };
         Self {
@@ -218,7 +219,7 @@ impl Sheet {
         let carried = |was: &DetailedMesh, traced: Option<&Traced<'_>>| {
             carry_attributes(&old(was), frame.tracker.mesh(), &change.origins, &change.sources, traced)
         };
-        let traced = Traced { first: &self.first, tree: None, places, spacing };
+        let traced = Traced { first: &self.first, tree: None, positions: places, spacing };
         let (through, alone) = (carried(&self.traced, Some(&traced)), carried(&self.before, None));
         (self.traced, self.before) = (through, alone);
     }
@@ -254,7 +255,7 @@ impl Sheet {
 fn texture(mesh: &DetailedMesh, face: usize) -> [Pair; 3] {
     let uvs = mesh.uvs.as_ref().expect("a texture");
     let indices = uvs.indices(&mesh.mesh.triangles, face);
-    edges(indices.map(|index| uvs.places[index as usize].map(f64::from)))
+    edges(indices.map(|index| uvs.positions[index as usize].map(f64::from)))
 }
 
 /// By how much edges differ from the particles' own: of several the nearest.

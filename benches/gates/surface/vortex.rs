@@ -19,7 +19,7 @@ const PARTICLES: usize = 16_000;
 const SQUARES: usize = 48;
 /// Frames of a period: 24 a second.
 const FRAMES: u32 = 72;
-/// Steps in which places are carried from frame to frame.
+/// Steps in which positions are carried from frame to frame.
 const STEPS: u32 = 4;
 /// Every so many frames a line is printed.
 const SHOWN: u32 = 6;
@@ -42,8 +42,8 @@ fn as_it_is(h: &mut Harness) {
     }
     let ctx = context(1);
     let start = Instant::now();
-    let Vortex { spacing, places, mesh } = Vortex::new(PARTICLES, SQUARES);
-    let mut from = numbered(places);
+    let Vortex { spacing, positions, mesh } = Vortex::new(PARTICLES, SQUARES);
+    let mut from = numbered(positions);
     let mut tracker = Tracker::new(&ctx, Params::for_spacing(spacing), &mesh, &from).expect("a tracker");
     let first = tracker.vertices().to_vec();
     let mut truth = first.clone();
@@ -70,7 +70,7 @@ fn as_it_is(h: &mut Harness) {
         "from where each vertex began, p95 {p95:.3} r, at most {most:.2}; off the ball by {round_mean:.3} r, p95 {round_p95:.3}, \
          at most {round_most:.2}; {last_flagged:.2} % flagged at the end, at most {most_flagged:.2} %; {} particles, {} triangles, \
          {:.0} s on one thread",
-        from.places.len(),
+        from.positions.len(),
         mesh.triangles.len(),
         start.elapsed().as_secs_f64()
     );
@@ -85,10 +85,10 @@ fn rebuilt(h: &mut Harness) {
     }
     let ctx = context(THREADS);
     let start = Instant::now();
-    let Vortex { spacing, places, mesh } = Vortex::new(PARTICLES, SQUARES);
+    let Vortex { spacing, positions, mesh } = Vortex::new(PARTICLES, SQUARES);
     let first = welded(&mesh);
     let params = Params { rebuild: true, ..Params::for_spacing(spacing) };
-    let mut from = moving(numbered(places), 0.0);
+    let mut from = moving(numbered(positions), 0.0);
     let mut tracker = Tracker::new(&ctx, params, &first, &from).expect("a tracker");
     let lost = |mesh: &TriMesh| 100.0 * (1.0 - mesh.volume() / first.volume());
     let (mut changes, mut most) = (0, 0);
@@ -125,7 +125,7 @@ fn rebuilt(h: &mut Harness) {
     let note = format!(
         "{} particles, {REBUILT_FRAMES} frames, {changes} of which changed cells; {} triangles at first, at most {most}, {} at the end \
          in {} bodies; {:.0} s on {THREADS} threads",
-        from.places.len(),
+        from.positions.len(),
         first.triangles.len(),
         last.triangles.len(),
         bodies(&last.triangles).len(),
@@ -150,26 +150,26 @@ fn span(frame: u32, of: u32) -> [f64; 2] {
 /// The particles at the end of a time (s), carried in so many steps.
 fn carried(particles: &Particles, span: [f64; 2], steps: u32) -> Particles {
     let mut out = particles.clone();
-    Vortex::carry(&mut out.places, span, steps);
+    Vortex::carry(&mut out.positions, span, steps);
     out
 }
 
 /// Particles with their velocities at a time (s): in few frames their ways are no lines.
 fn moving(mut particles: Particles, time: f64) -> Particles {
-    let speed = |place: &DVec3| Vortex::velocity(*place, time).cast::<f32>().into();
-    particles.velocities = particles.places.iter().map(speed).collect();
+    let speed = |position: &DVec3| Vortex::velocity(*position, time).cast::<f32>().into();
+    particles.velocities = particles.positions.iter().map(speed).collect();
     particles
 }
 
-/// How far places are from others, one by one: mean, 95th percentile and greatest (spacings).
-fn apart(places: &[DVec3], others: &[DVec3], spacing: f64) -> [f64; 3] {
-    spread(places.iter().zip(others).map(|(a, b)| (a - b).norm() / spacing).collect())
+/// How far positions are from others, one by one: mean, 95th percentile and greatest (spacings).
+fn apart(positions: &[DVec3], others: &[DVec3], spacing: f64) -> [f64; 3] {
+    spread(positions.iter().zip(others).map(|(a, b)| (a - b).norm() / spacing).collect())
 }
 
-/// How much farther from the ball's centre places are than others, or nearer.
-fn off_ball(places: &[DVec3], others: &[DVec3], spacing: f64) -> [f64; 3] {
-    let far = |place: &DVec3| (place - DVec3::repeat(Vortex::CENTRE)).norm();
-    spread(places.iter().zip(others).map(|(a, b)| (far(a) - far(b)).abs() / spacing).collect())
+/// How much farther from the ball's centre positions are than others, or nearer.
+fn off_ball(positions: &[DVec3], others: &[DVec3], spacing: f64) -> [f64; 3] {
+    let far = |position: &DVec3| (position - DVec3::repeat(Vortex::CENTRE)).norm();
+    spread(positions.iter().zip(others).map(|(a, b)| (far(a) - far(b)).abs() / spacing).collect())
 }
 
 fn spread(mut off: Vec<f64>) -> [f64; 3] {

@@ -1,4 +1,4 @@
-//! How often a closed mesh surrounds places: on a lattice by the crossings of its lines, and of particles by rays.
+//! How often a closed mesh surrounds positions: on a lattice by the crossings of its lines, and of particles by rays.
 
 use frazil::geometry::check::topology::bodies;
 use frazil::geometry::spatial::bvh::Bvh;
@@ -9,11 +9,11 @@ use crate::common::liquids::Random;
 use crate::common::nearest::distances;
 use crate::common::repaired::{height, turns};
 
-/// Places of the lattice along a cell.
-const PLACES: f64 = 4.0;
+/// Positions of the lattice along a cell.
+const POSITIONS: f64 = 4.0;
 /// Most lines of a lattice.
 const MOST: usize = 1 << 22;
-/// How far places of the lattice lie from the middles of their boxes at most (steps).
+/// How far positions of the lattice lie from the middles of their boxes at most (steps).
 const JITTER: f64 = 0.45;
 /// Directions along which no edges of made meshes run. Rounding may let a ray pass by a thin triangle, but not in all of them.
 const ASLANT: [DVec3; 3] = [
@@ -26,23 +26,23 @@ const ASLANT: [DVec3; 3] = [
 struct Line {
     /// Its x and y.
     at: [f64; 2],
-    /// The height of its first place; the others are one step apart.
+    /// The height of its first position; the others are one step apart.
     first: f64,
     /// Heights at which the mesh passes it, and by how much more often it surrounds what is below.
     crossings: Vec<(f64, i32)>,
 }
 
-/// How deep the places are that a closed mesh surrounds neither once nor never (cells, whose edge is `cell` m), and their share of its
+/// How deep the positions are that a closed mesh surrounds neither once nor never (cells, whose edge is `cell` m), and their share of its
 /// volume: on a lattice of [`PLACES`] along a cell. Infinite where the mesh reaches too far for one.
 pub fn depth_and_share(mesh: &TriMesh, cell: f64) -> [f64; 2] {
-    let step = cell / PLACES;
-    let Some(places) = astray(mesh, step) else { return [f64::INFINITY; 2] };
-    let depth = distances(mesh, &places, step).into_iter().fold(0.0, f64::max);
+    let step = cell / POSITIONS;
+    let Some(positions) = astray(mesh, step) else { return [f64::INFINITY; 2] };
+    let depth = distances(mesh, &positions, step).into_iter().fold(0.0, f64::max);
     // What is turned inside out has no volume: then the share keeps no bound.
-    [depth / cell, places.len() as f64 * step.powi(3) / mesh.volume().max(0.0)]
+    [depth / cell, positions.len() as f64 * step.powi(3) / mesh.volume().max(0.0)]
 }
 
-/// Places of a lattice (m), `step` (m) apart and out of line by chance, that a closed mesh surrounds neither once nor never. None where
+/// Positions of a lattice (m), `step` (m) apart and out of line by chance, that a closed mesh surrounds neither once nor never. None where
 /// it reaches too far for a lattice.
 fn astray(mesh: &TriMesh, step: f64) -> Option<Vec<Vec3>> {
     let (low, high) = mesh.bounds()?;
@@ -58,7 +58,7 @@ fn astray(mesh: &TriMesh, step: f64) -> Option<Vec<Vec3>> {
         .map(|n| Line { at: [within(n / deep), within(n % deep)], first: within(0), crossings: Vec::new() })
         .collect();
     for triangle in 0..mesh.triangles.len() {
-        let corners = mesh.corners(triangle).map(|place| (place - corner) / step);
+        let corners = mesh.corners(triangle).map(|position| (position - corner) / step);
         let [a, b, c] = corners;
         let (low, high) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
         let range = |axis: usize| {
@@ -73,7 +73,7 @@ fn astray(mesh: &TriMesh, step: f64) -> Option<Vec<Vec3>> {
             }
         }
     }
-    let mut places = Vec::new();
+    let mut positions = Vec::new();
     for line in &mut lines {
         line.crossings.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
         let mut winding = 0;
@@ -86,23 +86,23 @@ fn astray(mesh: &TriMesh, step: f64) -> Option<Vec<Vec3>> {
             let [from, to] = [below.ceil() as i64, above.floor() as i64];
             for n in from..=to {
                 let at = DVec3::new(line.at[0], line.at[1], line.first + n as f64);
-                places.push((corner + at * step).cast::<f32>());
+                positions.push((corner + at * step).cast::<f32>());
             }
         }
     }
-    Some(places)
+    Some(positions)
 }
 
 /// How many of some places (m) a closed mesh surrounds once.
-pub fn inside(mesh: &TriMesh, places: &[DVec3]) -> usize {
+pub fn inside(mesh: &TriMesh, positions: &[DVec3]) -> usize {
     let tree = Bvh::new(mesh);
-    let is_inside = |place: &&DVec3| ASLANT.iter().any(|way| tree.surrounding(**place, *way) == 1);
-    places.par_iter().filter(is_inside).count()
+    let is_inside = |position: &&DVec3| ASLANT.iter().any(|way| tree.surrounding(**position, *way) == 1);
+    positions.par_iter().filter(is_inside).count()
 }
 
 /// How many parts of a closed mesh with a volume over 0 surround none of some places (m).
-pub fn empty_parts(mesh: &TriMesh, places: &[DVec3]) -> usize {
-    let is_empty = |part: &&Vec<u32>| part_volume(mesh, part) > 0.0 && !surrounds(mesh, part, places);
+pub fn empty_parts(mesh: &TriMesh, positions: &[DVec3]) -> usize {
+    let is_empty = |part: &&Vec<u32>| part_volume(mesh, part) > 0.0 && !surrounds(mesh, part, positions);
     bodies(&mesh.triangles).par_iter().filter(is_empty).count()
 }
 
@@ -126,7 +126,7 @@ pub fn part_volume(mesh: &TriMesh, part: &[u32]) -> f64 {
     let Some(first) = part.first() else { return 0.0 };
     let origin = mesh.corners(*first as usize)[0];
     let six = |triangle: &u32| {
-        let [a, b, c] = mesh.corners(*triangle as usize).map(|place| place - origin);
+        let [a, b, c] = mesh.corners(*triangle as usize).map(|position| position - origin);
         a.dot(&b.cross(&c))
     };
     part.iter().map(six).sum::<f64>() / 6.0

@@ -28,7 +28,7 @@ const APART: f64 = 0.1;
 const MOST_POSES: usize = 2048;
 const MOST_SHAPES: usize = 192;
 const LEAST_POSES: usize = 48;
-/// Larger errors (cells) are printed with their place.
+/// Larger errors (cells) are printed with their position.
 const PRINTED: f64 = 0.1;
 /// Values of neighbours of opposite sign that differ by more (cells) jump.
 const JUMP: f64 = 1.3;
@@ -47,7 +47,7 @@ enum Kind {
     Figure(PathBuf),
 }
 
-/// How a body moves from time 0 to 1: by keys whose places count in radii, and a twist about y.
+/// How a body moves from time 0 to 1: by keys whose positions count in radii, and a twist about y.
 struct Course {
     name: String,
     keys: Vec<Key>,
@@ -105,9 +105,9 @@ fn course_of(shape: &Shape, course: &Course, found: &mut Found, in_snow: &mut Fo
         let body = [Body::new(motion(shape, course, DVec3::zeros()), 0.0).expect("a body")];
         let grid = sweep::chain(&ctx, &body, 0.0, 1.0, &Settings::new(cell)).expect("a sweep");
         let leaves = Leaves::of(&grid);
-        let place = format!("{} {} radius of {cells} cells", shape.name, course.name);
-        found.count_jumps(&leaves, &place);
-        let error = found.compare(&ctx, &leaves, &dense, &place);
+        let position = format!("{} {} radius of {cells} cells", shape.name, course.name);
+        found.count_jumps(&leaves, &position);
+        let error = found.compare(&ctx, &leaves, &dense, &position);
         text += &error;
         found.sweeps += 1;
         if cells == CELLS[1] {
@@ -115,7 +115,7 @@ fn course_of(shape: &Shape, course: &Course, found: &mut Found, in_snow: &mut Fo
             // In the middle of its own height: the layer's top crosses the body.
             let body = [Body::new(motion(shape, course, DVec3::y() * 0.3), 0.0).expect("a body")];
             base.step(&ctx, &body, 0.0, 1.0, 1).expect("a step");
-            in_snow.count_jumps(&Leaves::of(base.surface()), &place);
+            in_snow.count_jumps(&Leaves::of(base.surface()), &position);
         }
     }
     text
@@ -123,7 +123,7 @@ fn course_of(shape: &Shape, course: &Course, found: &mut Found, in_snow: &mut Fo
 
 impl Found {
     /// Counts neighbours of opposite sign, and those whose values jump.
-    fn count_jumps(&mut self, leaves: &Leaves, place: &str) {
+    fn count_jumps(&mut self, leaves: &Leaves, position: &str) {
         leaves.each_voxel(|at, value| {
             for axis in 0..3 {
                 let mut next = at;
@@ -136,14 +136,14 @@ impl Found {
                 let jump = (value - other).abs();
                 self.jumps += usize::from(jump > JUMP);
                 if jump > self.worst_jump.0 {
-                    self.worst_jump = (jump, format!("{jump:.2} at {at:?} of {place}"));
+                    self.worst_jump = (jump, format!("{jump:.2} at {at:?} of {position}"));
                 }
             }
         });
     }
 
     /// Compares values within a cell of the surface; returns the largest error (cells), and where a large one is.
-    fn compare(&mut self, ctx: &Context, leaves: &Leaves, dense: &Dense, place: &str) -> String {
+    fn compare(&mut self, ctx: &Context, leaves: &Leaves, dense: &Dense, position: &str) -> String {
         let mut near = Vec::new();
         leaves.each_voxel(|at, value| {
             if value.abs() < 1.0 {
@@ -168,7 +168,7 @@ impl Found {
         let Some((truth, error, at, value)) = worst else { return String::new() };
         let what = format!("{value:.3} for {truth:.3} at {at:?}");
         if error > self.worst.0 {
-            self.worst = (error, format!("{what} of {place}"));
+            self.worst = (error, format!("{what} of {position}"));
         }
         if error > PRINTED { format!("{error:.3} ({what}) ") } else { format!("{error:.3} ") }
     }
@@ -189,7 +189,7 @@ impl<'a> Leaves<'a> {
 
     /// Value (cells) at a voxel.
     fn value(&self, at: [i32; 3]) -> f64 {
-        let leaf = self.leaves.get(&at.map(|place| place & !7));
+        let leaf = self.leaves.get(&at.map(|position| position & !7));
         f64::from(leaf.map_or_else(|| self.grid.value(at), |leaf| leaf.values[index(at)])) / self.cell
     }
 
@@ -207,7 +207,7 @@ impl<'a> Leaves<'a> {
 }
 
 fn index(at: [i32; 3]) -> usize {
-    let [x, y, z] = at.map(|place| (place & 7) as usize);
+    let [x, y, z] = at.map(|position| (position & 7) as usize);
     x << 6 | y << 3 | z
 }
 
@@ -220,13 +220,13 @@ fn dense(shape: &Shape, course: &Course, finest: f64) -> Dense {
     let count = (way / finest / APART) as usize;
     let many = count.clamp(LEAST_POSES, MOST_POSES);
     let keys = keys(shape, course, DVec3::zeros());
-    let places = (0..many).map(|index| keys.at(index as f64 / (many - 1) as f64));
+    let positions = (0..many).map(|index| keys.at(index as f64 / (many - 1) as f64));
     match &shape.kind {
         _ if course.twist != 0.0 => {
             Dense::posed(&*motion(shape, course, DVec3::zeros()), count.clamp(LEAST_POSES, MOST_SHAPES))
         }
-        Kind::Mesh(mesh) => Dense::rigid(mesh, places),
-        Kind::Figure(path) => Dense::moved(&*walking(path), count.clamp(LEAST_POSES, MOST_SHAPES), places),
+        Kind::Mesh(mesh) => Dense::rigid(mesh, positions),
+        Kind::Figure(path) => Dense::moved(&*walking(path), count.clamp(LEAST_POSES, MOST_SHAPES), positions),
     }
 }
 
@@ -235,7 +235,7 @@ fn keys(shape: &Shape, course: &Course, from: DVec3) -> Keys {
     Keys::new(course.keys.iter().map(key).collect()).expect("keys")
 }
 
-/// A body's motion along a course that starts at a place (m).
+/// A body's motion along a course that starts at a position (m).
 fn motion(shape: &Shape, course: &Course, from: DVec3) -> Box<dyn Motion> {
     let keys = keys(shape, course, from);
     let inner: Box<dyn Motion> = match &shape.kind {
@@ -251,10 +251,10 @@ fn motion(shape: &Shape, course: &Course, from: DVec3) -> Box<dyn Motion> {
 fn walking(path: &Path) -> Box<dyn Motion> {
     // From its hips, a quarter of a round in the second.
     let space = Space { scale: 0.2, ..Space::OWN };
-    let place = Keys::new(vec![Key { time: 0.0, at: DVec3::y() * -0.18, turn: DVec3::zeros() }]);
+    let position = Keys::new(vec![Key { time: 0.0, at: DVec3::y() * -0.18, turn: DVec3::zeros() }]);
     let figure =
         Character::open(path, Play { clip: Some("walk".into()), ..Play::default() }).expect("the figure");
-    Box::new(Placed::new(Box::new(Slow(figure)), space, place.expect("a key")))
+    Box::new(Placed::new(Box::new(Slow(figure)), space, position.expect("a key")))
 }
 
 /// A figure that takes its time.

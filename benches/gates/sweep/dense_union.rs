@@ -44,7 +44,7 @@ struct Pose {
 }
 
 impl Dense {
-    /// One mesh at each of these rotations and places (m).
+    /// One mesh at each of these rotations and positions (m).
     pub fn rigid(mesh: &TriMesh, poses: impl Iterator<Item = (Rotation3<f64>, DVec3)>) -> Self {
         let poses = poses.map(|(rotation, at)| Pose { back: rotation.inverse(), at, shape: 0 });
         Self::of(vec![Shape::new(mesh)], poses.collect())
@@ -56,7 +56,7 @@ impl Dense {
         Self::moved(motion, count, still)
     }
 
-    /// A motion at `count` times from 0 to 1, carried to rotations and places (m) that follow each other evenly in time.
+    /// A motion at `count` times from 0 to 1, carried to rotations and positions (m) that follow each other evenly in time.
     pub fn moved(
         motion: &dyn Motion,
         count: usize,

@@ -7,14 +7,14 @@ use nalgebra::Rotation3;
 pub struct MovingBox {
     /// Half the edges (m).
     pub half: DVec3,
-    /// Place at 0 and at 1 (m).
+    /// Position at 0 and at 1 (m).
     pub at: [DVec3; 2],
     /// Angles about x, y, z at 0 and at 1 (radians).
     pub turn: [DVec3; 2],
 }
 
 impl MovingBox {
-    /// Inverse rotation and place at `poses` times.
+    /// Inverse rotation and position at `poses` times.
     pub fn poses(&self, poses: usize) -> Vec<(Rotation3<f64>, DVec3)> {
         let pose = |index: usize| {
             let t = index as f64 / (poses - 1) as f64;

@@ -88,18 +88,18 @@ impl Union {
         }
     }
 
-    /// Number of the point nearest to a place on each axis; none beyond the lattice.
+    /// Number of the point nearest to a position on each axis; none beyond the lattice.
     fn index(&self, p: DVec3) -> Option<[i64; 3]> {
         let index = [0, 1, 2].map(|axis| ((p[axis] - self.low[axis]) / self.step).round() as i64);
         (0..3).all(|axis| index[axis] >= 0 && index[axis] < self.size[axis] as i64).then_some(index)
     }
 
-    /// Whether all points within a number of steps of a place lie inside.
+    /// Whether all points within a number of steps of a position lie inside.
     pub fn is_deep(&self, p: DVec3, steps: i64) -> bool {
         self.around(p, steps).is_some_and(|mut around| around.all(|inside| inside))
     }
 
-    /// Whether no point within a number of steps of a place lies inside.
+    /// Whether no point within a number of steps of a position lies inside.
     pub fn is_far(&self, p: DVec3, steps: i64) -> bool {
         self.around(p, steps).is_none_or(|mut around| !around.any(|inside| inside))
     }

@@ -59,7 +59,7 @@ fn wall(h: &mut Harness) {
     }
 }
 
-/// Calls `see` with each voxel of a grid's leaves: place (m) and value (cells).
+/// Calls `see` with each voxel of a grid's leaves: position (m) and value (cells).
 pub fn each_voxel(grid: &FloatGrid, mut see: impl FnMut(DVec3, f64)) {
     let cell = grid.voxel_size();
     for leaf in grid.leaves().expect("leaves") {

@@ -1,5 +1,5 @@
 //! A drop that hangs from a ball by a neck: it falls, the neck is drawn out to a thread and tears, and the drop comes down on a pool
-//! and spreads. Where each place of it goes is a formula that keeps volumes, but where the thread tears. Lengths are in spacings, but
+//! and spreads. Where each position of it goes is a formula that keeps volumes, but where the thread tears. Lengths are in spacings, but
 //! for what is written.
 
 use std::f64::consts::{PI, TAU};
@@ -30,7 +30,7 @@ const HALF: f64 = 5.0;
 const FALL: f64 = 10.0;
 /// Acceleration of its fall (1/s2): 0.4 m/s2, in slow motion.
 const GRAVITY: f64 = 32.0;
-/// Radius and half of the height of the pool. Its highest place is the origin.
+/// Radius and half of the height of the pool. Its highest position is the origin.
 const POOL: [f64; 2] = [15.0, 4.0];
 /// Pieces of an outline.
 const PIECES: usize = 600;
@@ -41,9 +41,9 @@ const PIECES: usize = 600;
 /// What the operating system reports.
 pub fn write(folder: &Path) -> frazil::Result<()> {
     let (hanging, pool) = (Outline::hanging(), Outline::pool());
-    let places = places(&hanging);
+    let positions = positions(&hanging);
     for frame in 1..=FRAMES {
-        let now: Vec<DVec3> = places.iter().map(|place| moved(*place, frame) * SPACING).collect();
+        let now: Vec<DVec3> = positions.iter().map(|position| moved(*position, frame) * SPACING).collect();
         let mut points = Points::at(SPACING, &now)?;
         points.set("id", Values::Long(Column::Each((0..now.len() as i64).collect())));
         points.set("pscale", Values::Float(Column::Uniform((0.5 * SPACING) as f32)));
@@ -52,7 +52,7 @@ pub fn write(folder: &Path) -> frazil::Result<()> {
     let (mut body, flutes) = hanging.sculpted([96, 150], [8.0, 6.0], 0.45);
     let (rest, rings) = pool.sculpted([120, 90], [0.0, 14.0], 0.35);
     body.append(&rest);
-    body.positions.iter_mut().for_each(|place| *place *= SPACING as f32);
+    body.positions.iter_mut().for_each(|position| *position *= SPACING as f32);
     let painted = |middle: f64| move |wave: &f64| middle + 0.25 * wave;
     let values = flutes.iter().map(painted(0.75)).chain(rings.iter().map(painted(0.25))).collect();
     let paint = MeshArray { name: "paint".into(), on: On::Vertices, number: Number::F32, values };
@@ -66,17 +66,17 @@ pub fn write(folder: &Path) -> frazil::Result<()> {
 }
 
 /// The particles at the first frame.
-fn places(hanging: &Outline) -> Vec<DVec3> {
+fn positions(hanging: &Outline) -> Vec<DVec3> {
     // On a grid that is turned: the thread would tear along the planes of one that is not.
-    let set = |place: DVec3| turned(place, 0.7, DVec3::new(0.0, 20.0, 0.0));
+    let set = |position: DVec3| turned(position, 0.7, DVec3::new(0.0, 20.0, 0.0));
     // The surface of particles lies half a spacing above the outermost.
-    let is_inside = |place: DVec3| {
-        let place = set(place);
-        let across = libm::hypot(place.x, place.z);
-        if place.y > 0.0 {
-            return across + 0.5 < hanging.reach(place.y);
+    let is_inside = |position: DVec3| {
+        let position = set(position);
+        let across = libm::hypot(position.x, position.z);
+        if position.y > 0.0 {
+            return across + 0.5 < hanging.reach(position.y);
         }
-        let [x, y] = [across / (POOL[0] - 0.5), (place.y + POOL[1]) / (POOL[1] - 0.5)];
+        let [x, y] = [across / (POOL[0] - 0.5), (position.y + POOL[1]) / (POOL[1] - 0.5)];
         x * x + y * y < 1.0
     };
     filled(1.0, 0.1, 33.0, is_inside).into_iter().map(set).collect()
@@ -87,21 +87,21 @@ fn middle() -> f64 {
     FALL + 1.0 + DROP + (DROP * DROP - NECK * NECK).sqrt() + HALF
 }
 
-/// Where a place of the first frame is at another.
-fn moved(place: DVec3, frame: i32) -> DVec3 {
-    if place.y < 0.0 {
-        return place;
+/// Where a position of the first frame is at another.
+fn moved(position: DVec3, frame: i32) -> DVec3 {
+    if position.y < 0.0 {
+        return position;
     }
     let time = f64::from(frame - 1) / FPS;
     let contact = (2.0 * FALL / GRAVITY).sqrt();
     let fallen = 0.5 * GRAVITY * time.min(contact) * time.min(contact);
     // How much of the neck is drawn out, on both sides of its middle: all of it at first, then ever less, which becomes the thread.
     let drawn = HALF * (1.0 - 0.94 * smooth(time / (0.85 * contact)));
-    let along = ((drawn + middle() - place.y) / (2.0 * drawn)).clamp(0.0, 1.0);
+    let along = ((drawn + middle() - position.y) / (2.0 * drawn)).clamp(0.0, 1.0);
     let share = smooth(along);
     // As much thinner as it is longer.
     let thinner = 1.0 / (1.0 + fallen * 6.0 * along * (1.0 - along) / (2.0 * drawn)).sqrt();
-    let (x, y, z) = (place.x * thinner, place.y - fallen * share, place.z * thinner);
+    let (x, y, z) = (position.x * thinner, position.y - fallen * share, position.z * thinner);
     // What has come down with the drop spreads.
     let since = if share > 0.5 { (time - contact).max(0.0) } else { 0.0 };
     let lower = 1.0 - 0.45 * (1.0 - libm::exp(-5.0 * since));
@@ -143,9 +143,9 @@ impl Outline {
 
     /// The point at a share of its length.
     fn at(&self, share: f64) -> [f64; 2] {
-        let place = share * PIECES as f64;
-        let piece = (place as usize).min(PIECES - 1);
-        between(self.0[piece], self.0[piece + 1], place - piece as f64)
+        let position = share * PIECES as f64;
+        let piece = (position as usize).min(PIECES - 1);
+        between(self.0[piece], self.0[piece + 1], position - piece as f64)
     }
 
     /// Distance from the axis at a height; 0 beyond the ends.
@@ -168,7 +168,7 @@ impl Outline {
     ) -> (TriMesh, Vec<f64>) {
         let mut body = globe(1.0, columns, rings);
         let mut waves = Vec::with_capacity(body.positions.len());
-        for (vertex, place) in body.positions.iter_mut().enumerate() {
+        for (vertex, position) in body.positions.iter_mut().enumerate() {
             // The upper end and the lower one come last.
             let (share, turn) = match vertex.checked_sub(columns * (rings - 1)) {
                 Some(end) => (end as f64, 0.0),
@@ -178,12 +178,12 @@ impl Outline {
             };
             let [across, up] = self.at(share);
             let (sine, cosine) = libm::sincos(TAU * turn);
-            *place = DVec3::new(across * cosine, up, across * sine).cast();
+            *position = DVec3::new(across * cosine, up, across * sine).cast();
             waves.push(libm::sin(TAU * (around * turn + turns * share)) * (0.25 * across).min(1.0));
         }
         let normals = body.normals();
-        for ((place, normal), wave) in body.positions.iter_mut().zip(&normals).zip(&waves) {
-            *place += normal * (height * wave) as f32;
+        for ((position, normal), wave) in body.positions.iter_mut().zip(&normals).zip(&waves) {
+            *position += normal * (height * wave) as f32;
         }
         (body, waves)
     }

@@ -71,7 +71,7 @@ fn drifts() -> TriMesh {
         let ripples = 0.6 + 0.4 * (1.3 * x - 0.8 * z).sin();
         0.27 + 0.035 * (2.1 * bend + 0.8 * z).sin() + 0.008 * ripples * (13.0 * bend + 4.0 * z).sin()
     };
-    let place = |index: u32| {
+    let position = |index: u32| {
         let [x, z] = [(index % across, across), (index / across, along)]
             .map(|(at, count)| EDGE * (at as f32 - 0.5 * (count - 1) as f32));
         Vec3::new(x, height(x, z), z)
@@ -82,7 +82,7 @@ fn drifts() -> TriMesh {
     };
     let is_square = |index: &u32| index % across + 1 < across && index / across + 1 < along;
     let triangles = (0..across * along).filter(is_square).flat_map(square).collect();
-    TriMesh { positions: (0..across * along).map(place).collect(), triangles }
+    TriMesh { positions: (0..across * along).map(position).collect(), triangles }
 }
 
 /// A block of loose grains of a diameter of 6 mm, 0.18 x 0.18 x 0.18 m, that stands at a height of 0.1 m; they do not touch.
@@ -94,17 +94,17 @@ fn column() -> frazil::Result<Points> {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((state >> 40) as f64 / (1u64 << 24) as f64 - 0.5) * 0.02 * APART
     };
-    let mut places = Vec::new();
+    let mut positions = Vec::new();
     for layer in 0..40 {
         for (x, z) in (0..29).flat_map(|x| (0..29).map(move |z| (x, z))) {
             // Each layer lies in the hollows of the one below.
             let shift = 0.5 * f64::from(layer % 2) - 14.25;
             let at = [f64::from(x) + shift, f64::from(layer) * 0.5f64.sqrt() + 0.5, f64::from(z) + shift];
             let [x, y, z] = at.map(|at| at * APART + off());
-            places.push(DVec3::new(x, y + 0.1, z));
+            positions.push(DVec3::new(x, y + 0.1, z));
         }
     }
-    Points::at(APART, &places)
+    Points::at(APART, &positions)
 }
 
 fn head(frames: &str, area: [f64; 4], cell: f64) -> String {
@@ -164,7 +164,7 @@ fn sliding_box() -> String {
     text
 }
 
-/// A cube that turns in its place, half sunk.
+/// A cube that turns in its position, half sunk.
 fn turning_cube() -> String {
     let mut text = head("1-7", [-0.6, -0.6, 0.6, 0.6], 0.005);
     object(&mut text, "cube.obj", &two_keys(7, [0.0, 0.35, 0.0], [0.0, 0.35, 0.0], [30.0, 60.0, 90.0]));

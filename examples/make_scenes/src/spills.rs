@@ -15,7 +15,7 @@ pub fn write(folder: &Path) -> frazil::Result<()> {
 /// A sheet over a rectangle around the origin, of edges (m), of so many points along each.
 pub fn sheet(edges: [f32; 2], points: [u32; 2], height: impl Fn(f32, f32) -> f32) -> TriMesh {
     let [nx, nz] = points;
-    let place = |index: u32| {
+    let position = |index: u32| {
         let at = [index % nx, index / nx];
         let [x, z] = [0, 1].map(|n| edges[n] * (at[n] as f32 / (points[n] - 1) as f32 - 0.5));
         Vec3::new(x, height(x, z), z)
@@ -26,7 +26,7 @@ pub fn sheet(edges: [f32; 2], points: [u32; 2], height: impl Fn(f32, f32) -> f32
         [[a, b, c], [a, c, d]]
     };
     let triangles = (0..nx * nz).filter(is_square).flat_map(square).collect();
-    TriMesh { positions: (0..nx * nz).map(place).collect(), triangles }
+    TriMesh { positions: (0..nx * nz).map(position).collect(), triangles }
 }
 
 /// 10 x 10 cm that fall by 35 % along x, with low bumps that part the liquid.

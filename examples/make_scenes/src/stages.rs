@@ -70,7 +70,7 @@ fn bone() -> TriMesh {
         let hollow = 0.016 * (between(0.012, 0.040, z.abs()) + 0.6 * between(0.035, 0.058, x.abs()));
         let folds =
             sine(95.0 * x + 40.0 * z) * sine(120.0 * z - 1.0) + 0.5 * sine(210.0 * x - 130.0 * z + 2.0);
-        // It falls a little towards the place of the suction.
+        // It falls a little towards the position of the suction.
         hollow + 0.0006 * folds - 0.02 * x
     });
     let knob = |share: f32, at: f32, wide: f32| {
@@ -83,12 +83,12 @@ fn bone() -> TriMesh {
         [260, 140],
         |share| {
             let ends = (share * (1.0 - share) * 4.0).min(1.0);
-            let place = Vec3::new(
+            let position = Vec3::new(
                 0.102 * (share - 0.5),
                 0.021 + 0.002 * sine(5.0 * share),
                 0.003 * sine(4.0 * share),
             );
-            (place, radius(share) * libm::powf(ends.max(1e-4), 0.35))
+            (position, radius(share) * libm::powf(ends.max(1e-4), 0.35))
         },
         |share, angle| {
             let twist = angle + 2.0 * share;
@@ -132,9 +132,9 @@ fn grating() -> TriMesh {
                 if up > 0.8 { 0.8 / up } else { 1.0 }
             },
         );
-        for place in &mut tube.positions {
+        for position in &mut tube.positions {
             // Along z.
-            *place = Vec3::new(x - place.z, place.y, place.x);
+            *position = Vec3::new(x - position.z, position.y, position.x);
         }
         mesh.append(&tube);
     }

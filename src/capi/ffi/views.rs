@@ -1,4 +1,4 @@
-//! Arrays and structs that cross the border: the only place that follows a host's pointers.
+//! Arrays and structs that cross the border: the only position that follows a host's pointers.
 
 use std::ffi::{CStr, c_char, c_void};
 use std::ops::RangeInclusive;

@@ -71,12 +71,12 @@ unsafe impl Sized32 for frz_grid_desc {
     const NAME: &'static str = "frz_grid_desc";
 }
 
-/// Where leaves lie: at places of blocks, one at each.
+/// Where leaves lie: at positions of blocks, one at each.
 #[derive(Default)]
 struct Places(HashSet<Origin>);
 
 impl Places {
-    /// Checks the place of the next leaf, which is the one with this number.
+    /// Checks the position of the next leaf, which is the one with this number.
     fn add(&mut self, at: usize, origin: Origin) -> Outcome<Origin> {
         let named = |failure: Failure| Failure { text: format!("leaf {at}: {}", failure.text), ..failure };
         if !self.0.insert(check_origin(origin).map_err(named)?) {
@@ -115,10 +115,10 @@ unsafe fn blocks(desc: &frz_grid_desc, class: GridClass) -> Outcome<Vec<BlockEdi
     let view = frz_view { data: desc.leaves.cast(), count: desc.leaf_count, stride: 0 };
     // SAFETY: the caller's promise.
     let leaves = unsafe { view.elements::<frz_leaf>("leaves") }?;
-    let mut places = Places::default();
+    let mut positions = Places::default();
     let mut out = Vec::with_capacity(leaves.len());
     for (at, leaf) in leaves.iter().enumerate() {
-        let origin = places.add(at, leaf.origin)?;
+        let origin = positions.add(at, leaf.origin)?;
         if leaf.values.is_null() {
             check_values(at, &[leaf.tile])?;
             out.push(BlockEdit::Constant(origin, leaf.tile));
@@ -204,10 +204,10 @@ unsafe fn edits(desc: &frz_grid_desc) -> Outcome<Vec<VectorEdit>> {
     let view = frz_view { data: desc.vector_leaves.cast(), count: desc.leaf_count, stride: 0 };
     // SAFETY: the caller's promise.
     let leaves = unsafe { view.elements::<frz_vector_leaf>("vector_leaves") }?;
-    let mut places = Places::default();
+    let mut positions = Places::default();
     let mut out = Vec::with_capacity(leaves.len());
     for (at, leaf) in leaves.iter().enumerate() {
-        let origin = places.add(at, leaf.origin)?;
+        let origin = positions.add(at, leaf.origin)?;
         if leaf.values.is_null() {
             check_values(at, &leaf.tile)?;
             out.push(VectorEdit::Constant(origin, leaf.tile));

@@ -46,7 +46,7 @@ unsafe impl Plain for frz_vector_leaf {}
 /// Farthest voxel of a leaf from the origin.
 const FARTHEST: i32 = 1 << 30;
 
-/// Checks the place of a block.
+/// Checks the position of a block.
 pub(in crate::capi) fn check_origin(origin: Origin) -> Outcome<Origin> {
     if origin.iter().any(|&index| index & 7 != 0 || !(-FARTHEST..=FARTHEST).contains(&index)) {
         let text = format!("origin {origin:?} is not a block's: multiples of 8 within -2^30 to 2^30");
@@ -90,7 +90,7 @@ pub unsafe extern "C" fn frz_grid_leaves(
 
 /// Lends the leaves of a grid of floats at some origins, or the value of all 512 voxels there.
 ///
-/// origins: int32_t[3] for each place, multiples of 8, for instance those of frz_base_dirty.
+/// origins: int32_t[3] for each position, multiples of 8, for instance those of frz_base_dirty.
 /// dst: room for as many elements of frz_leaf, whose pointers stay as those of frz_grid_leaves do.
 ///
 /// Any number of threads may read a grid.
@@ -152,7 +152,7 @@ pub unsafe extern "C" fn frz_grid_vector_leaves(
 
 /// Lends the leaves of a grid of vectors at some origins, or the value of all 512 voxels there.
 ///
-/// origins: int32_t[3] for each place, multiples of 8.
+/// origins: int32_t[3] for each position, multiples of 8.
 /// dst: room for as many elements of frz_vector_leaf, whose pointers stay as those of frz_grid_vector_leaves do.
 ///
 /// Any number of threads may read a grid.

@@ -52,7 +52,7 @@ pub struct frz_body {
     /// With which it holds grains that touch it (weights of a grain), 0 to 1000; only grains read it.
     pub stick: f64,
     /// In place of frz_grains_params.compression, 0 to 1; only with FRZ_BODY_COMPRESSION, and only grains read it. Where several
-    /// bodies that differ in it took the snow, that of the one counts whose surface came nearest to the place.
+    /// bodies that differ in it took the snow, that of the one counts whose surface came nearest to the position.
     pub compression: f64,
 }
 

@@ -238,7 +238,7 @@ fn reachable(positions: &[[f32; 3]], radii: &[f32], voxel: f64) -> Outcome {
 ///
 /// operation: a frz_csg.
 /// inout: of the caller; becomes the result, and stays as it was after a failure.
-/// other: with voxels of the same size and place; it stays as it is.
+/// other: with voxels of the same size and position; it stays as it is.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]

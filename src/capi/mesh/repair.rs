@@ -75,7 +75,7 @@ impl frz_repair_report {
 ///
 /// The mesh is rebuilt in the cells of a grid where it is at fault, and within a cell of that solid; all its other triangles stay as
 /// they are. Vertices that are still there keep their order and their attributes; attributes of those that were made are what the
-/// mesh had at the nearest place. All faces of the result are triangles, each edge has two of them that agree about which side is
+/// mesh had at the nearest position. All faces of the result are triangles, each edge has two of them that agree about which side is
 /// out, and each vertex one fan of them.
 ///
 /// mesh: it stays as it is.

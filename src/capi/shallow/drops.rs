@@ -17,7 +17,7 @@ use crate::shallow::surface::{Counts, Indices, Layout};
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_drop {
-    /// Its place (m).
+    /// Its position (m).
     pub position: [f64; 3],
     /// Its velocity (m/s).
     pub velocity: [f64; 3],

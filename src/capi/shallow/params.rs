@@ -137,7 +137,7 @@ pub struct frz_shallow_params {
     /// Height (m) from which on liquid falls freely over an edge, 0 or more, an edge of a cell at least; 0.01 is usual. This and what follows,
     /// which cannot change, is for falls_most over 0 only.
     pub falls_height: f64,
-    /// Time between the drops that leave one place (s), 0.0001 to 1; 1/120 is usual.
+    /// Time between the drops that leave one position (s), 0.0001 to 1; 1/120 is usual.
     pub falls_interval: f64,
     /// Volume of a drop (m3), 0 or more; 6.5e-11, a ball of half a millimetre, is usual. Where it takes longer than 8 intervals liquid drips.
     pub falls_drop: f64,

@@ -37,7 +37,7 @@ const KINDS: [(u32, frz_shallow_flow_kind); 4] = [
     (FRZ_SHALLOW_ORIFICE as u32, FRZ_SHALLOW_ORIFICE),
 ];
 
-/// A place where liquid comes in or goes out. It begins zeroed, and then struct_size.
+/// A position where liquid comes in or goes out. It begins zeroed, and then struct_size.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_flow {
@@ -51,9 +51,9 @@ pub struct frz_shallow_flow {
     pub triangle: u32,
     /// With FRZ_SHALLOW_ON_TRIANGLE: shares of its three vertices in the place, finite, whose sum is 1; else they are not looked at.
     pub shares: [f64; 3],
-    /// Without: the place (m). It acts on the ground that is nearest above or below it.
+    /// Without: the position (m). It acts on the ground that is nearest above or below it.
     pub at: [f64; 3],
-    /// It acts on cells whose middles lie within so much of the place, seen from above (m), 0 or more; on the nearest one, if none
+    /// It acts on cells whose middles lie within so much of the position, seen from above (m), 0 or more; on the nearest one, if none
     /// does.
     pub radius: f64,
     /// Volume in a second (m3/s), 0 or more: 1 ml/s is 1e-6. Of an orifice the most that goes out.
@@ -200,10 +200,10 @@ pub unsafe extern "C" fn frz_shallow_flow_moved(
     })
 }
 
-/// Pours a volume at a place, shared by the columns that a flow point there would act on; each takes what it has room for, or gives what
+/// Pours a volume at a position, shared by the columns that a flow point there would act on; each takes what it has room for, or gives what
 /// it has.
 ///
-/// at: double[3], the place (m): FRZ_ERROR_ARGUMENT where it lies inside of solid or outside of the domain.
+/// at: double[3], the position (m): FRZ_ERROR_ARGUMENT where it lies inside of solid or outside of the domain.
 /// radius: as in frz_shallow_flow (m).
 /// volume: what to pour (m3); negative: what to take.
 /// poured: receives what came in (m3), or went out (negative); 0 after a failure. May be NULL.

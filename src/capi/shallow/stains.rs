@@ -149,7 +149,7 @@ pub unsafe extern "C" fn frz_shallow_stains_create(
     }
 }
 
-/// Bytes of a vertex: its stain, when it was wet, what it holds and may hold, and its place, twice while it is read.
+/// Bytes of a vertex: its stain, when it was wet, what it holds and may hold, and its position, twice while it is read.
 const BYTES: u64 = 52;
 
 /// Lets the liquid stain the ground, and the ground absorb it, for the time since the last call: once a frame, in real time (frz_shallow).

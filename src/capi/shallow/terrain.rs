@@ -94,15 +94,15 @@ impl Terrain {
     ) -> Outcome<(Self, Solids)> {
         let solids = ctx.phase("sample", || {
             let (voxel, between) = (level_set.voxel_size(), level_set.heights());
-            sampler::solids(grid, heights, voxel, between, |places, distances| {
+            sampler::solids(grid, heights, voxel, between, |positions, distances| {
                 ctx.check()?;
-                level_set.sample_linear(ctx, places, distances)
+                level_set.sample_linear(ctx, positions, distances)
             })
         })?;
         Ok((Self::LevelSet, solids))
     }
 
-    /// The place (m) on a triangle of which its corners have these shares.
+    /// The position (m) on a triangle of which its corners have these shares.
     pub(in crate::capi) fn position(&self, (triangle, shares): &(u32, [f64; 3])) -> Outcome<[f64; 3]> {
         let Self::Mesh(mesh) = self else {
             return Err(Failure::argument("the liquid was not made with a mesh: there is no triangle"));
@@ -143,7 +143,7 @@ pub(in crate::capi) unsafe fn cells_in(grid: &Grid, bounds: *const f64) -> Outco
     let range = |axis: usize, low: f64, high: f64| {
         let count = grid.size[axis] as f64;
         // In cells, from the middle of the first; rounding leaves none out.
-        let [low, high] = [low, high].map(|place| (place - grid.origin[axis]) / grid.cell - 0.5);
+        let [low, high] = [low, high].map(|position| (position - grid.origin[axis]) / grid.cell - 0.5);
         let first = (low - ROUNDING).ceil().clamp(0.0, count);
         let end = ((high + ROUNDING).floor() + 1.0).clamp(first, count);
         first as usize..end as usize
@@ -286,7 +286,7 @@ impl Moving {
         }
         self.coming.clear();
         self.coming.extend(given.map(Vec3::from));
-        let is_wild = |place: &Vec3| !place.iter().all(|number| number.is_finite());
+        let is_wild = |position: &Vec3| !position.iter().all(|number| number.is_finite());
         match self.coming.iter().position(is_wild) {
             None => Ok(()),
             Some(at) => Err(Failure::argument(format!("positions: element {at} is not finite"))),
@@ -350,7 +350,7 @@ pub(in crate::capi) unsafe fn read_heights(
         return Err(Failure::argument(format!("heights: element {at} is not finite")));
     }
     let is_within = |cell: usize| {
-        let [x, z] = grid.place(cell);
+        let [x, z] = grid.position(cell);
         across.contains(&x) && rows.contains(&z)
     };
     let own = tops.enumerate().filter(|(cell, _)| is_within(*cell));
@@ -365,7 +365,7 @@ pub(in crate::capi) unsafe fn read_heights(
 pub enum frz_shallow_shape {
     /// A sphere.
     FRZ_SHALLOW_SPHERE = 0,
-    /// All places within a distance of a line: a sphere on its way from end to end.
+    /// All positions within a distance of a line: a sphere on its way from end to end.
     FRZ_SHALLOW_CAPSULE = 1,
     /// A box in any orientation.
     FRZ_SHALLOW_BOX = 2,
@@ -455,7 +455,7 @@ pub(in crate::capi) unsafe fn read_bodies(
 /// Sets the solids that move over the ground, in place of those before, in real time (frz_shallow): the ground is made anew where one moves,
 /// and no triangle is looked at. The liquid makes way, and none of it is lost. After a failure all is as it was.
 ///
-/// A body moves from call to call: give it the same place in the list. What does not move costs nothing.
+/// A body moves from call to call: give it the same position in the list. What does not move costs nothing.
 ///
 /// bodies: count bodies; NULL with a count of 0: there is none. FRZ_ERROR_ARGUMENT names one that is out of range, counted from 0.
 /// count: number of bodies.

@@ -330,9 +330,9 @@ pub unsafe extern "C" fn frz_shallow_detail_flow_moved(
     })
 }
 
-/// Pours a volume at a place, as frz_shallow_pour does, into the cells of the size that it lies in.
+/// Pours a volume at a position, as frz_shallow_pour does, into the cells of the size that it lies in.
 ///
-/// at: double[3], the place (m).
+/// at: double[3], the position (m).
 /// radius: as in frz_shallow_flow (m).
 /// volume: what to pour (m3); negative: what to take.
 /// poured: receives what came in (m3), or went out (negative); 0 after a failure. May be NULL.

@@ -109,7 +109,7 @@ impl Layer {
         };
         for index in 0..LENT {
             let grid = NonNull::from(state.grids()[index]);
-            // SAFETY: the place is a pointer's.
+            // SAFETY: the position is a pointer's.
             unsafe { give(&raw mut state.lent[index], Grid::Lent(grid)) }?;
         }
         Ok(state)

@@ -50,7 +50,7 @@ pub struct frz_grains_report {
     pub trapped: u64,
     /// Snow that the base layer lost (m3).
     pub removed_volume: f64,
-    /// Grains that removed snow has paid for and that are not born yet: fractions, and what had no place.
+    /// Grains that removed snow has paid for and that are not born yet: fractions, and what had no position.
     pub owed: f64,
     /// Largest speed (m/s).
     pub fastest: f64,

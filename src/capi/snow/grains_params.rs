@@ -48,7 +48,7 @@ pub struct frz_grains_params {
     pub floor: f64,
     /// Grains below this height (m) are dropped at the end of a step; -1e6 is usual, and far below all that grains reach.
     pub lowest: f64,
-    /// Least and greatest place (m) of a box outside of which grains are dropped; only with FRZ_GRAINS_BOX. 0 is usual.
+    /// Least and greatest position (m) of a box outside of which grains are dropped; only with FRZ_GRAINS_BOX. 0 is usual.
     pub keep_low: [f64; 3],
     /// See keep_low.
     pub keep_high: [f64; 3],

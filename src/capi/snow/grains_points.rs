@@ -14,9 +14,9 @@ use crate::snow::grains::memory;
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_grains_attribute {
-    /// float[3]: its place (P, m).
+    /// float[3]: its position (P, m).
     FRZ_GRAINS_POSITION = 0,
-    /// double[3]: its place (m), as exactly as it is known: also far from the origin.
+    /// double[3]: its position (m), as exactly as it is known: also far from the origin.
     FRZ_GRAINS_POSITION_DOUBLE = 1,
     /// float[3]: its velocity (v, m/s).
     FRZ_GRAINS_VELOCITY = 2,
@@ -26,7 +26,7 @@ pub enum frz_grains_attribute {
     FRZ_GRAINS_RADIUS = 4,
     /// int32_t: the frame that frz_grains_step or frz_grains_emit was given when it was born (source_frame).
     FRZ_GRAINS_SOURCE_FRAME = 5,
-    /// float[3]: its place when it was born (rest, m).
+    /// float[3]: its position when it was born (rest, m).
     FRZ_GRAINS_REST = 6,
     /// int32_t: 1 where it is awake, 0 where it rests (active).
     FRZ_GRAINS_ACTIVE = 7,
@@ -130,12 +130,14 @@ pub unsafe extern "C" fn frz_grains_read(
             let grains = &heap.grains;
             match attribute {
                 FRZ_GRAINS_POSITION => {
-                    let places: Vec<[f32; 3]> =
-                        grains.places().map(|place| [0, 1, 2].map(|axis| place[axis] as f32)).collect();
-                    dst.fill("dst", &places)
+                    let positions: Vec<[f32; 3]> = grains
+                        .positions()
+                        .map(|position| [0, 1, 2].map(|axis| position[axis] as f32))
+                        .collect();
+                    dst.fill("dst", &positions)
                 }
                 FRZ_GRAINS_POSITION_DOUBLE => {
-                    dst.fill("dst", &grains.places().map(<[f64; 3]>::from).collect::<Vec<_>>())
+                    dst.fill("dst", &grains.positions().map(<[f64; 3]>::from).collect::<Vec<_>>())
                 }
                 FRZ_GRAINS_VELOCITY => dst.fill("dst", &grains.velocities().collect::<Vec<_>>()),
                 FRZ_GRAINS_ID => {

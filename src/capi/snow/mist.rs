@@ -121,9 +121,9 @@ impl Air {
             Surroundings { base: snow, bodies: &bodies, removing: &removing, floor: self.floor };
         let walls = surroundings.during([0.0, dt], self.mist.params().cell)?;
         let boundary = |tiles: &Tiles, cell: f32, share: f64| walls.faces(ctx, tiles, cell, share);
-        let sample = |ctx: &Context, places: &[DVec3]| match wind {
-            Some(wind) => wind.sample(ctx, places, true),
-            None => Ok(vec![[0.0; 3]; places.len()]),
+        let sample = |ctx: &Context, positions: &[DVec3]| match wind {
+            Some(wind) => wind.sample(ctx, positions, true),
+            None => Ok(vec![[0.0; 3]; positions.len()]),
         };
         let wind = wind.map(|_| Wind(&sample));
         let fastest = walls.fastest_near(&self.mist, sources);
@@ -254,11 +254,12 @@ pub unsafe extern "C" fn frz_mist_step(
             let sources = match &grains {
                 Some(heap) => {
                     let radius = heap.grains.params().radius;
-                    let grains = heap.grains.places().zip(heap.grains.velocities()).zip(heap.grains.starts());
-                    let start = |(place, velocity)| Start { place, velocity };
+                    let grains =
+                        heap.grains.positions().zip(heap.grains.velocities()).zip(heap.grains.starts());
+                    let start = |(position, velocity)| Start { position, velocity };
                     grains
-                        .map(|((place, velocity), from)| Source {
-                            place,
+                        .map(|((position, velocity), from)| Source {
+                            position,
                             velocity,
                             radius,
                             start: from.map(start),

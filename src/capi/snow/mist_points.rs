@@ -144,8 +144,10 @@ unsafe fn points(
         let text = format!("{of_velocities}: {velocities} elements, but there are {positions} {names}");
         return Err(Failure::argument(text));
     }
-    let point =
-        |(place, velocity): (&[f64; 3], &[f32; 3])| Start { place: (*place).into(), velocity: *velocity };
+    let point = |(position, velocity): (&[f64; 3], &[f32; 3])| Start {
+        position: (*position).into(),
+        velocity: *velocity,
+    };
     Ok(positions.iter().zip(&*velocities).map(point).collect())
 }
 
@@ -153,7 +155,7 @@ unsafe fn points(
 fn sources(ends: &[Start], starts: Option<&[Start]>, radius: f64) -> Outcome<Vec<Source>> {
     within("radius", radius, f64::MIN_POSITIVE..=f64::MAX, " m")?;
     let source = |(index, end): (usize, &Start)| Source {
-        place: end.place,
+        position: end.position,
         velocity: end.velocity,
         radius,
         start: starts.map(|starts| starts[index]),

@@ -10,7 +10,7 @@ use crate::surface::Particles;
 /// Most frames ahead.
 const MOST: usize = 100;
 
-/// Copies the places of the mesh's vertices as they are shown: in the steps before the liquid merges or splits, the vertices that will
+/// Copies the positions of the mesh's vertices as they are shown: in the steps before the liquid merges or splits, the vertices that will
 /// be taken away already go towards what will be made, so that it does not pop up. With frz_tracker_params.rebuild only; else, and
 /// far from all changes, they are those of frz_tracker_read.
 ///
@@ -60,12 +60,12 @@ pub unsafe extern "C" fn frz_tracker_read_eased(
             let coming: Vec<Particles> = frames(coming, count)?;
             let follower = &mut *follower;
             if !follower.tracker.params().rebuild {
-                let places = follower.tracker.vertices().iter();
-                return dst.fill("dst", &places.map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>());
+                let positions = follower.tracker.vertices().iter();
+                return dst.fill("dst", &positions.map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>());
             }
             follower.outlook.look(call.ctx(), &follower.tracker, now, coming, dt)?;
-            let places = follower.outlook.eased(call.ctx(), &follower.tracker, ahead as usize)?;
-            dst.fill("dst", &places.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())
+            let positions = follower.outlook.eased(call.ctx(), &follower.tracker, ahead as usize)?;
+            dst.fill("dst", &positions.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())
         }
     })
 }

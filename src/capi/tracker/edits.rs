@@ -14,7 +14,7 @@ pub(in crate::capi) struct Edits {
     pub origins: Vec<Option<u32>>,
     /// For each triangle where it comes from.
     pub sources: Vec<Source>,
-    /// Places (m) to which the step took the vertices that there were.
+    /// Positions (m) to which the step took the vertices that there were.
     pub before: Vec<DVec3>,
 }
 
@@ -29,9 +29,9 @@ impl From<Change> for Edits {
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_tracker_array {
-    /// float[3]: its place (m).
+    /// float[3]: its position (m).
     FRZ_TRACKER_POSITION = 0,
-    /// double[3]: its place (m), as exactly as it is known: also far from the origin. The next step's, less these, over dt are the
+    /// double[3]: its position (m), as exactly as it is known: also far from the origin. The next step's, less these, over dt are the
     /// velocities for motion blur; where that step changes the mesh, FRZ_EDIT_BEFORE less these.
     FRZ_TRACKER_POSITION_DOUBLE = 1,
     /// float: the distance that it keeps from the particles' surface (m), negative inside; NaN: it was too far away to have one.
@@ -88,8 +88,11 @@ pub unsafe extern "C" fn frz_tracker_read(
             let tracker = &follower.tracker;
             match array {
                 FRZ_TRACKER_POSITION => {
-                    let places = tracker.vertices().iter();
-                    dst.fill("dst", &places.map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect::<Vec<_>>())
+                    let positions = tracker.vertices().iter();
+                    dst.fill(
+                        "dst",
+                        &positions.map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect::<Vec<_>>(),
+                    )
                 }
                 FRZ_TRACKER_POSITION_DOUBLE => {
                     dst.fill("dst", &tracker.vertices().iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())
@@ -151,7 +154,7 @@ pub enum frz_edit_array {
     FRZ_EDIT_SOURCE = 1,
     /// uint32_t for each triangle: a frz_edit_kind.
     FRZ_EDIT_KIND = 2,
-    /// double[3] for each vertex that there was before the step (frz_tracker_edits): the place (m) to which the step took it, before
+    /// double[3] for each vertex that there was before the step (frz_tracker_edits): the position (m) to which the step took it, before
     /// the mesh was rebuilt. Those that are still there lie there.
     FRZ_EDIT_BEFORE = 3,
 }
@@ -234,7 +237,7 @@ pub unsafe extern "C" fn frz_tracker_read_edits(
 }
 
 impl Follower {
-    /// Places (m) of the vertices that there were before the last step, at its end.
+    /// Positions (m) of the vertices that there were before the last step, at its end.
     fn before(&self) -> &[DVec3] {
         match &self.edits {
             Some(edits) => &edits.before,

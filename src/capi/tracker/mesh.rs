@@ -160,7 +160,7 @@ pub(in crate::capi) unsafe fn particles(pointer: *const frz_particles) -> Outcom
             given.ids.elements::<i64>("ids")?,
         )
     };
-    let particles = Particles { places: places.into_iter().map(Into::into).collect(), velocities, ids };
+    let particles = Particles { positions: places.into_iter().map(Into::into).collect(), velocities, ids };
     particles.validate()?;
     Ok(particles)
 }
@@ -168,7 +168,7 @@ pub(in crate::capi) unsafe fn particles(pointer: *const frz_particles) -> Outcom
 /// Estimates the initial distance between particles: from the median of the mean distances to the six nearest ones.
 ///
 /// particles: as they are at the first frame.
-/// spacing: receives it (m); 0 where there are too few particles, or too many at one place, to tell, and after a failure.
+/// spacing: receives it (m); 0 where there are too few particles, or too many at one position, to tell, and after a failure.
 ///
 /// One thread at a time for each context.
 #[unsafe(no_mangle)]
@@ -184,7 +184,7 @@ pub unsafe extern "C" fn frz_particles_spacing(
             required(spacing, "spacing")?;
             let call = enter(context)?;
             let particles = self::particles(particles)?;
-            let estimate = call.ctx().phase("spacing", || Ok(estimate_spacing(&particles.places)))?;
+            let estimate = call.ctx().phase("spacing", || Ok(estimate_spacing(&particles.positions)))?;
             spacing.write_unaligned(estimate.unwrap_or(0.0));
             Ok(())
         }

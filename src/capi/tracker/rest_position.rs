@@ -9,7 +9,7 @@ use crate::surface::Rest;
 
 /// Copies for each vertex where the liquid there was at the first frame, by the particles around it that were there then: for a host to
 /// take textures and arrays of its own through merges and splits. What a step made (frz_tracker_read_edits) takes what the mesh of the
-/// first frame has at the nearest place to where its liquid was. Corners of a triangle may come from far apart, where liquids have come
+/// first frame has at the nearest position to where its liquid was. Corners of a triangle may come from far apart, where liquids have come
 /// together: it should have all of its corners' numbers from near one of them.
 ///
 /// first: the particles at the first frame, with ids.
@@ -37,8 +37,9 @@ pub unsafe extern "C" fn frz_tracker_read_rest(
             if now.ids.is_empty() {
                 return Err(nameless("now"));
             }
-            let places = follower.tracker.rest(call.ctx(), &rest, &now)?;
-            let of_vertex = places.iter().map(|place| place.map_or([f64::NAN; 3], |p| [p.x, p.y, p.z]));
+            let positions = follower.tracker.rest(call.ctx(), &rest, &now)?;
+            let of_vertex =
+                positions.iter().map(|position| position.map_or([f64::NAN; 3], |p| [p.x, p.y, p.z]));
             dst.fill("dst", &of_vertex.collect::<Vec<_>>())
         }
     })

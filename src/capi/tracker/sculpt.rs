@@ -13,7 +13,7 @@ use crate::surface::Outlook;
 /// the particles' surface is measured anew, and kept from there on. After a failure or a cancel the tracker is as it was.
 ///
 /// The parameters stay. No vertex and no triangle is one from before: frz_tracker_edits answers 1, and frz_tracker_read_edits says that
-/// all were made; the places from before (FRZ_EDIT_BEFORE) are those to which the last step led. States that are saved from then on
+/// all were made; the positions from before (FRZ_EDIT_BEFORE) are those to which the last step led. States that are saved from then on
 /// hold the edited mesh, and still come back with the mesh that the tracker was made with (frz_tracker_create).
 ///
 /// mesh: as frz_tracker_create takes it, with any vertices and faces, in the particles' space; it is copied. Its attribute "detail" of

@@ -19,7 +19,7 @@ use crate::cli::session::exit::{Failure, Phase};
 
 /// Say how far two meshes lie apart, or two sequences of them frame by frame, and how much a sequence flickers.
 ///
-/// Distances go from points of one mesh, its vertices and the centres of its triangles, to the nearest places of the other's surface,
+/// Distances go from points of one mesh, its vertices and the centres of its triangles, to the nearest positions of the other's surface,
 /// and back, in the unit of the files (m). Each point counts as much as the area that it stands for: three quarters of a triangle's
 /// is its centre's, a twelfth each corner's.
 #[derive(clap::Args)]
@@ -37,7 +37,7 @@ pub struct Args {
     /// Frames of sequences.
     #[arg(long, value_name = "A-B|A-BxN|A,B,C", allow_hyphen_values = true)]
     frames: Option<FrameChoice>,
-    /// Of each sequence also the second differences of its vertices' places over three frames, x(n-1) - 2 x(n) + x(n+1) (m): what a
+    /// Of each sequence also the second differences of its vertices' positions over three frames, x(n-1) - 2 x(n) + x(n+1) (m): what a
     /// still camera sees tremble.
     #[arg(long)]
     flicker: bool,

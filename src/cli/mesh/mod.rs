@@ -139,7 +139,7 @@ fn by_index(topology: &Topology) -> Value {
     })
 }
 
-/// Triangles with an area that hang together by edges, with vertices at one place joined.
+/// Triangles with an area that hang together by edges, with vertices at one position joined.
 struct Body {
     mesh: TriMesh,
     faults: Faults,
@@ -232,7 +232,7 @@ const PARTS: [Counted; 2] = [
     ),
 ];
 
-/// Edges and vertices at fault, joined by place or by index.
+/// Edges and vertices at fault, joined by position or by index.
 const JOINTS: [Counted; 4] = [
     ("open_edges", ["edge with one triangle", "edges with one triangle"]),
     (
@@ -354,7 +354,7 @@ fn in_words(mesh: &Value) -> String {
     for (key, forms) in PARTS.into_iter().chain(JOINTS).chain(TRIANGLES).filter(|(key, _)| count(key) > 0) {
         out += &format!("  {:>8} {}\n", count(key), form(count(key), forms));
     }
-    // What joining by place hides.
+    // What joining by position hides.
     for (key, forms) in JOINTS.into_iter().filter(|(key, _)| ![0, count(key)].contains(&as_it_is(key))) {
         out += &format!("  {:>8} {}, by the vertices' indices\n", as_it_is(key), form(as_it_is(key), forms));
     }

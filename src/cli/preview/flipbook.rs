@@ -44,23 +44,23 @@ impl<'a> Flipbook<'a> {
         mut sources: Sources,
         frames: Vec<i32>,
     ) -> std::result::Result<Self, Failure> {
-        let mut places = vec![0, frames.len() / 2, frames.len() - 1];
-        places.dedup();
-        let mut probe = |place: usize| {
-            let frame = Some(f64::from(frames[place]));
+        let mut positions = vec![0, frames.len() / 2, frames.len() - 1];
+        positions.dedup();
+        let mut probe = |position: usize| {
+            let frame = Some(f64::from(frames[position]));
             sources.refuse_missing(frame)?;
             let parts = sources.read(&session.ctx, frame)?;
             look.build(&session.ctx, parts)
         };
         let (mut probes, mut looked_at, mut first) = (Vec::new(), Vec::new(), None);
-        for wanted in places {
+        for wanted in positions {
             // One that cannot be drawn gives way to the next that can.
-            for place in (wanted..frames.len()).chain((0..wanted).rev()) {
-                if looked_at.contains(&place) {
+            for position in (wanted..frames.len()).chain((0..wanted).rev()) {
+                if looked_at.contains(&position) {
                     break;
                 }
-                looked_at.push(place);
-                match probe(place) {
+                looked_at.push(position);
+                match probe(position) {
                     Ok(drawing) => {
                         probes.push(drawing);
                         break;
@@ -88,9 +88,9 @@ impl<'a> Flipbook<'a> {
         let (frames, mut each) = (self.frames.clone(), Each::default());
         self.draw(
             |picture| picture.png(),
-            |place, png: Result<Vec<u8>>| {
-                let written = png.and_then(|png| atomic::write_bytes(&pattern.path(frames[place]), &png));
-                each.take(frames[place], written)
+            |position, png: Result<Vec<u8>>| {
+                let written = png.and_then(|png| atomic::write_bytes(&pattern.path(frames[position]), &png));
+                each.take(frames[position], written)
             },
         )?;
         each.finish()
@@ -111,9 +111,11 @@ impl<'a> Flipbook<'a> {
         let written = atomic::write(path, |out| {
             let mut gif = Gif::new(out, size, &palette)?;
             let (mut shown, mut waiting): (Option<Vec<u8>>, u16) = (None, 0);
-            let add = |place: usize, indices: Result<Vec<u8>>| -> std::result::Result<Option<()>, Failure> {
-                let mut delay = delays[place];
-                match each.take(frames[place], indices)? {
+            let add = |position: usize,
+                       indices: Result<Vec<u8>>|
+             -> std::result::Result<Option<()>, Failure> {
+                let mut delay = delays[position];
+                match each.take(frames[position], indices)? {
                     Some(indices) => {
                         delay = delay.saturating_add(std::mem::take(&mut waiting));
                         shown = Some(indices);
@@ -151,10 +153,10 @@ impl<'a> Flipbook<'a> {
     ) -> std::result::Result<(), Failure> {
         let Self { session, look, sources, frames, view, .. } = self;
         let ctx = &session.ctx;
-        let read = |place: usize| -> Result<Result<Vec<Part>>> {
+        let read = |position: usize| -> Result<Result<Vec<Part>>> {
             ctx.check()?;
             // What is wrong with a frame is its own result.
-            let frame = Some(f64::from(frames[place]));
+            let frame = Some(f64::from(frames[position]));
             Ok(sources.refuse_missing(frame).and_then(|()| sources.read(ctx, frame)))
         };
         let make = |_, parts: Result<_>| {
@@ -163,9 +165,9 @@ impl<'a> Flipbook<'a> {
         let mut progress = FrameProgress::new(ctx, frames.len(), 0, session.is_quiet());
         let at_once = ctx.pool().threads().min(MOST_AT_ONCE);
         let mut ended = None;
-        let done = in_order(frames.len(), at_once, read, make, |place, made| match take(place, made) {
+        let done = in_order(frames.len(), at_once, read, make, |position, made| match take(position, made) {
             Ok(Some(())) => {
-                progress.finished("picture", frames[place]);
+                progress.finished("picture", frames[position]);
                 Ok(())
             }
             Ok(None) => Ok(()),

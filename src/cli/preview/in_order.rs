@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use frazil::{Error, Result};
 
-/// A frame to be made: its place, and where it goes.
+/// A frame to be made: its position, and where it goes.
 type Job<T> = (usize, Sender<Result<T>>);
 
 /// Makes frames 0 to `count` on some threads. `read` is called with one after the other, `make` for several at once, on

@@ -52,7 +52,7 @@ pub struct Args {
     /// Scalar that tints a liquid, from clear water at 0 to blood, paint, honey, milk or coffee at 1.
     #[arg(long, value_name = "NAME=LIQUID", conflicts_with = "color")]
     tint: Option<Tint>,
-    /// Draw a plane across an axis at a place (m), seen from the axis' end, in place of the whole: the first grid in colours from
+    /// Draw a plane across an axis at a position (m), seen from the axis' end, in place of the whole: the first grid in colours from
     /// dark blue to pale yellow, of a level set from the inner end of its narrow band to the outer, of any other from the least of
     /// its values and 0 to the greatest (-v prints both), level sets as white lines and meshes as black ones; points are left out.
     #[arg(long, value_name = "AXIS=M", value_parser = plane, conflicts_with_all = ["color", "tint", "sun", "fog_density"])]

@@ -93,7 +93,8 @@ pub fn install_panic_hook() {
             (_, Some(text)) => text.as_str(),
             _ => "unknown",
         };
-        let place = panic.location().map(|at| format!(" ({}:{})", at.file(), at.line())).unwrap_or_default();
-        say_error(&format!("internal error: {what}{place}; please report it"));
+        let position =
+            panic.location().map(|at| format!(" ({}:{})", at.file(), at.line())).unwrap_or_default();
+        say_error(&format!("internal error: {what}{position}; please report it"));
     }));
 }

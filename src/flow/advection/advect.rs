@@ -1,5 +1,5 @@
 //! Advection: values are carried along the flow (semi-Lagrangian: Stam 1999). Velocities get MacCormack's correction of the blur that
-//! this leaves (Selle, Fedkiw, Kim, Liu and Rossignac 2008), within the range of the values around the place that a value came
+//! this leaves (Selle, Fedkiw, Kim, Liu and Rossignac 2008), within the range of the values around the position that a value came
 //! from. The density, which has sharp edges, is interpolated by cubic functions instead, within the same range: MacCormack's waves
 //! run behind an edge, and as the range cuts them off there, it holds edges back (by about a cell).
 //!
@@ -79,7 +79,7 @@ pub fn advect(
 }
 
 /// Carries a velocity on an axis along the paths. `hat` is room for the first guess, `below` and `above` for its distances from the
-/// least and the greatest value around the place that it came from.
+/// least and the greatest value around the position that it came from.
 ///
 /// # Errors
 /// Cancel.
@@ -249,7 +249,7 @@ fn correct_rows(
     }
 }
 
-/// A correction within its bounds: one that leaves the range of the values around the place that a value came from ends there.
+/// A correction within its bounds: one that leaves the range of the values around the position that a value came from ends there.
 /// Nothing jumps: where it was dropped at the bound, the least difference between two flows grew fourfold in ten steps.
 #[inline(always)]
 fn limited(change: Lanes, below: Lanes, above: Lanes) -> Lanes {

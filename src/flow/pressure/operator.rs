@@ -237,7 +237,7 @@ fn is_set(mask: &Mask, cell: usize) -> bool {
     mask[cell >> 6] >> (cell & 63) & 1 == 1
 }
 
-/// The cell of a tile in the first layer on an axis, at a place in that layer.
+/// The cell of a tile in the first layer on an axis, at a position in that layer.
 pub fn first(axis: usize, at: usize) -> usize {
     match axis {
         0 => at,
@@ -246,7 +246,7 @@ pub fn first(axis: usize, at: usize) -> usize {
     }
 }
 
-/// The place of a cell in its layer on an axis.
+/// The position of a cell in its layer on an axis.
 pub fn layer(axis: usize, cell: usize) -> usize {
     match axis {
         0 => cell & 63,

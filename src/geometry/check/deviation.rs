@@ -1,4 +1,4 @@
-//! How far the surface of one mesh lies from that of another: distances from its points to the nearest places there. For meshes
+//! How far the surface of one mesh lies from that of another: distances from its points to the nearest positions there. For meshes
 //! with the same triangles also how far their vertices lie apart, and how much these tremble over three frames.
 
 use rayon::prelude::*;
@@ -64,12 +64,12 @@ pub fn from_vertices(mesh: &TriMesh, to: &TriMesh) -> Option<Deviation> {
     Deviation::of(&of_vertices(mesh, far))
 }
 
-/// Lengths of the second differences of each vertex' place, x(n - 1) - 2 x(n) + x(n + 1), over three frames of meshes with the same
+/// Lengths of the second differences of each vertex' position, x(n - 1) - 2 x(n) + x(n + 1), over three frames of meshes with the same
 /// triangles: 0 where a vertex moves evenly. Vertices that triangles name count, all the same; none where there are no triangles.
 pub fn second_differences([before, here, after]: [&TriMesh; 3]) -> Option<Deviation> {
-    let places = before.positions.iter().zip(&here.positions).zip(&after.positions);
-    let far = places.map(|((before, here), after)| {
-        let [before, here, after] = [before, here, after].map(|place| place.cast::<f64>());
+    let positions = before.positions.iter().zip(&here.positions).zip(&after.positions);
+    let far = positions.map(|((before, here), after)| {
+        let [before, here, after] = [before, here, after].map(|position| position.cast::<f64>());
         (here, (before - here * 2.0 + after).norm())
     });
     Deviation::of(&of_vertices(here, far))
@@ -129,10 +129,10 @@ fn points(mesh: &TriMesh) -> Vec<(DVec3, f64)> {
         centres.push(((a + b + c) / 3.0, CENTRE * area));
     }
     let vertices = mesh.positions.iter().zip(areas);
-    vertices.filter_map(|(place, area)| Some((place.cast::<f64>(), area?))).chain(centres).collect()
+    vertices.filter_map(|(position, area)| Some((position.cast::<f64>(), area?))).chain(centres).collect()
 }
 
-/// The triangles of a mesh in a binary tree of boxes, for the place of its surface that is nearest to a point.
+/// The triangles of a mesh in a binary tree of boxes, for the position of its surface that is nearest to a point.
 pub struct NearestTree {
     /// Of each node; the children of node i are 2 i + 1 and 2 i + 2.
     boxes: Vec<Span>,
@@ -144,27 +144,27 @@ pub struct NearestTree {
     reach: f64,
 }
 
-/// The place of a mesh that is nearest to a point.
+/// The position of a mesh that is nearest to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nearest {
-    /// The place (m).
-    pub place: DVec3,
+    /// The position (m).
+    pub position: DVec3,
     /// How far it is from the point (m): 0 up to 1e-12 of the largest coordinate.
     pub distance: f64,
     /// The triangle that it lies on; of several any one.
     pub triangle: usize,
 }
 
-/// A place on a facet, with the square of its distance (m2).
+/// A position on a facet, with the square of its distance (m2).
 #[derive(Clone, Copy)]
 pub(in crate::geometry) struct Found {
-    place: DVec3,
+    position: DVec3,
     pub(in crate::geometry) square: f64,
     facet: usize,
 }
 
 impl NearestTree {
-    /// Sorts a mesh's triangles into a tree; places are finite and indices in range.
+    /// Sorts a mesh's triangles into a tree; positions are finite and indices in range.
     pub fn new(mesh: &TriMesh) -> Self {
         let count = mesh.triangles.len();
         let mut levels = 0u32;
@@ -198,11 +198,11 @@ impl NearestTree {
         Self { boxes, facets, levels, reach }
     }
 
-    /// The place that is nearest to a point (m); none without triangles.
+    /// The position that is nearest to a point (m); none without triangles.
     pub fn nearest(&self, point: DVec3) -> Option<Nearest> {
         let found = self.search(point, None)?;
         let triangle = self.facets[found.facet].triangle as usize;
-        Some(Nearest { place: found.place, distance: self.distance(point, &found), triangle })
+        Some(Nearest { position: found.position, distance: self.distance(point, &found), triangle })
     }
 
     /// The distances of points, each with what it counts.
@@ -222,7 +222,7 @@ impl NearestTree {
         if distance <= ROUNDING * self.reach.max(from.amax()) { 0.0 } else { distance }
     }
 
-    /// The nearest place; with the number of a facet that is thought to be near, in less time.
+    /// The nearest position; with the number of a facet that is thought to be near, in less time.
     fn search(&self, point: DVec3, guess: Option<usize>) -> Option<Found> {
         let mut best = guess.map(|facet| self.facets[facet].found(point, facet));
         let mut bound = best.map_or(f64::INFINITY, |found| found.square);
@@ -308,7 +308,7 @@ impl Facet {
         Self { corners, triangle, is_needle }
     }
 
-    /// Its place nearest to a point: over the face where the point lies on the inner side of all edges, else on one of these
+    /// Its position nearest to a point: over the face where the point lies on the inner side of all edges, else on one of these
     /// (Ericson, Real-Time Collision Detection, 2005, 5.1.5). The regions are told by planes along the edges and not, as there, by
     /// products of projections, whose rounding grows with the square of a needle's length.
     pub(in crate::geometry) fn found(&self, point: DVec3, facet: usize) -> Found {
@@ -318,11 +318,11 @@ impl Facet {
         let is_inward = |&(from, to): &(DVec3, DVec3)| (to - from).cross(&(point - from)).dot(&normal) > 0.0;
         if !self.is_needle && edges.iter().all(is_inward) {
             let above = normal * ((point - a).dot(&normal) / normal.norm_squared());
-            return Found { place: point - above, square: above.norm_squared(), facet };
+            return Found { position: point - above, square: above.norm_squared(), facet };
         }
         let on_edge = |(from, to): (DVec3, DVec3)| {
-            let place = nearest_of_edge(point, from, to);
-            Found { place, square: (place - point).norm_squared(), facet }
+            let position = nearest_of_edge(point, from, to);
+            Found { position, square: (position - point).norm_squared(), facet }
         };
         let [one, two, three] = edges.map(on_edge);
         let nearer = if two.square < one.square { two } else { one };
@@ -330,7 +330,7 @@ impl Facet {
     }
 }
 
-/// The place of an edge that is nearest to a point.
+/// The position of an edge that is nearest to a point.
 fn nearest_of_edge(point: DVec3, from: DVec3, to: DVec3) -> DVec3 {
     let along = to - from;
     let square = along.norm_squared();
@@ -392,7 +392,7 @@ mod tests {
                 let least = tree.facets.iter().fold(f64::INFINITY, best).sqrt();
                 let nearest = tree.nearest(point).unwrap();
                 let hinted = tree.search(point, guess).unwrap();
-                let told = [nearest.distance, (nearest.place - point).norm(), hinted.square.sqrt()];
+                let told = [nearest.distance, (nearest.position - point).norm(), hinted.square.sqrt()];
                 let is_least = told.iter().all(|told| (told - least).abs() <= 1e-12 * (1.0 + least));
                 assert!(is_least, "{told:?}: {least}");
                 guess = Some(hinted.facet);
@@ -401,7 +401,7 @@ mod tests {
     }
 
     #[test]
-    fn no_place_of_a_triangle_is_nearer_than_the_one_found() {
+    fn no_position_of_a_triangle_is_nearer_than_the_one_found() {
         let mesh = litter(7, 700);
         let mut random = Random(8);
         for triangle in 0..mesh.triangles.len() {
@@ -413,15 +413,15 @@ mod tests {
                 let point = (a + b + c) / 3.0 + random.vector(scale).cast::<f64>() * size;
                 let found = facet.found(point, 0);
                 let close = 1e-6 * size * size;
-                // The nearest place of a convex set: all of the set lies behind the plane through it across the way to the point.
-                let way = point - found.place;
-                assert!([a, b, c].iter().all(|corner| way.dot(&(corner - found.place)) <= close));
+                // The nearest position of a convex set: all of the set lies behind the plane through it across the way to the point.
+                let way = point - found.position;
+                assert!([a, b, c].iter().all(|corner| way.dot(&(corner - found.position)) <= close));
                 // It belongs to the triangle: the triangles that it makes with the edges are no larger than the whole.
                 let area = |p: DVec3, q: DVec3, r: DVec3| (q - p).cross(&(r - p)).norm();
-                let place = found.place;
-                let parts = area(place, a, b) + area(place, b, c) + area(place, c, a);
+                let position = found.position;
+                let parts = area(position, a, b) + area(position, b, c) + area(position, c, a);
                 assert!(parts <= area(a, b, c) + close, "{triangle}: {parts}");
-                let beyond = [a, b, c].iter().map(|corner| (corner - place).norm()).fold(0.0, f64::max);
+                let beyond = [a, b, c].iter().map(|corner| (corner - position).norm()).fold(0.0, f64::max);
                 assert!(beyond <= size * (1.0 + 1e-6), "{triangle}: {beyond} of {size}");
             }
         }
@@ -463,7 +463,7 @@ mod tests {
         assert_eq!((found.p95, found.max), (0.0, 0.25));
         // A slope's mean is exact: from 0 to 1 over the square.
         let mut slope = square(0.0, 0.0, 1.0);
-        slope.positions[1..3].iter_mut().for_each(|place| place.y = 1.0);
+        slope.positions[1..3].iter_mut().for_each(|position| position.y = 1.0);
         let found = from_surface(&slope, &NearestTree::new(&plane)).unwrap();
         assert!((found.mean - 0.5).abs() < 1e-12 && found.max == 1.0, "{found:?}");
     }

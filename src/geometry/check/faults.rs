@@ -23,13 +23,13 @@ const ROUNDING: f64 = 1e-12;
 pub struct Faults {
     /// Vertices that no triangle names.
     pub unused_vertices: usize,
-    /// Vertices that share their place with one before them.
+    /// Vertices that share their position with one before them.
     pub doubled_vertices: usize,
     /// Vertices on open edges that are joined with one before them within rounding.
     pub near_vertices: usize,
     /// Vertices on open edges that are within rounding of others, but which of them are one is not clear ([`Weld::ambiguous`]).
     pub ambiguous_vertices: usize,
-    /// Triangles with two corners at the same place, or without area; nothing below counts them.
+    /// Triangles with two corners at the same position, or without area; nothing below counts them.
     pub degenerate: usize,
     /// Triangles with the corners of one before them, in any order; nothing below counts them.
     pub doubled_triangles: usize,
@@ -67,7 +67,7 @@ pub struct Faults {
     pub touches: usize,
     /// Handles, summed over the parts, when the surface is closed and no edge is crowded.
     pub genus: Option<i64>,
-    /// The mesh as its indices have it, with all triangles, and vertices at the same place apart.
+    /// The mesh as its indices have it, with all triangles, and vertices at the same position apart.
     pub by_index: Topology,
 }
 
@@ -113,7 +113,7 @@ impl Faults {
         }
     }
 
-    /// Whether the mesh bounds a solid without doubt once vertices at the same place are joined: closed, each edge with two
+    /// Whether the mesh bounds a solid without doubt once vertices at the same position are joined: closed, each edge with two
     /// triangles that agree, and no part inside out, unless all are. Whether it does as it is,
     /// [`Topology::is_watertight`] of `by_index` says.
     pub fn is_solid(&self) -> bool {
@@ -128,20 +128,20 @@ impl Faults {
     }
 }
 
-/// Pairs of triangles (numbers, ascending) that meet elsewhere than in common corners and edges, exactly; vertices at the same place are
+/// Pairs of triangles (numbers, ascending) that meet elsewhere than in common corners and edges, exactly; vertices at the same position are
 /// common. A triangle that lies on one before it is paired with that; those without an area are left out.
 pub fn meeting_pairs(mesh: &TriMesh) -> Vec<[u32; 2]> {
     let same = coincident(mesh.positions.iter().map(|p| p.cast()));
-    let place = |corners: [u32; 3]| corners.map(|vertex| mesh.positions[vertex as usize]);
+    let position = |corners: [u32; 3]| corners.map(|vertex| mesh.positions[vertex as usize]);
     let joined = mesh.triangles.iter().map(|corners| corners.map(|vertex| same[vertex as usize])).zip(0u32..);
     let (triangles, numbers): (Vec<[u32; 3]>, Vec<u32>) =
-        joined.filter(|(corners, _)| !collapsed(*corners) && !is_flat(&place(*corners))).unzip();
+        joined.filter(|(corners, _)| !collapsed(*corners) && !is_flat(&position(*corners))).unzip();
     let joined = TriMesh { positions: mesh.positions.clone(), triangles };
     let near = Near::of(&joined);
     let of_triangle = |first: usize| {
         let mut pairs = Vec::new();
         near.of_triangle(first, |second| {
-            let [a, b] = [first, second].map(|triangle| place(joined.triangles[triangle]));
+            let [a, b] = [first, second].map(|triangle| position(joined.triangles[triangle]));
             if meeting(&a, &b) != Meeting::Apart {
                 let [a, b] = [first, second].map(|triangle| numbers[triangle]);
                 pairs.push([a.min(b), a.max(b)]);
@@ -157,13 +157,13 @@ pub fn meeting_pairs(mesh: &TriMesh) -> Vec<[u32; 2]> {
 
 /// Holes of a mesh: connected sets of edges with one triangle, as [`Faults::holes`]; in 64 bits, where rounding decides
 /// whether a triangle has an area. `same` has for each vertex the first one that is the same corner ([`Weld::firsts`]).
-pub fn holes(places: &[DVec3], triangles: &[[u32; 3]], same: &[u32]) -> usize {
+pub fn holes(positions: &[DVec3], triangles: &[[u32; 3]], same: &[u32]) -> usize {
     let flat = |corners: [u32; 3]| {
-        let [a, b, c] = corners.map(|vertex| places[vertex as usize]);
+        let [a, b, c] = corners.map(|vertex| positions[vertex as usize]);
         (b - a).cross(&(c - a)).norm_squared() == 0.0
     };
-    let survey = Survey::of(places.len(), &kept(triangles, same, flat).kept);
-    groups(places.len(), survey.open.into_iter())
+    let survey = Survey::of(positions.len(), &kept(triangles, same, flat).kept);
+    groups(positions.len(), survey.open.into_iter())
 }
 
 /// Area (m2) of the triangles that count: all but those with the corners of one before them.
@@ -203,7 +203,8 @@ impl<'a> Part<'a> {
     fn of(mesh: &TriMesh, triangles: &'a [usize]) -> Self {
         let corners = || Self::corners(mesh, triangles);
         let nowhere = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
-        let (low, high) = corners().fold(nowhere, |(low, high), place| (low.inf(&place), high.sup(&place)));
+        let (low, high) =
+            corners().fold(nowhere, |(low, high), position| (low.inf(&position), high.sup(&position)));
         let six = |&triangle: &usize| {
             let [a, b, c] = mesh.corners(triangle).map(|p| p - low);
             a.dot(&b.cross(&c))
@@ -223,7 +224,7 @@ impl<'a> Part<'a> {
         (0..3).all(|axis| {
             let by_axis = |a: &DVec3, b: &DVec3| a[axis].total_cmp(&b[axis]);
             let ends = [corners().min_by(by_axis), corners().max_by(by_axis)];
-            ends.into_iter().flatten().all(|place| turn * others.surrounding(place, ASLANT) > 0)
+            ends.into_iter().flatten().all(|position| turn * others.surrounding(position, ASLANT) > 0)
         })
     }
 }
@@ -255,7 +256,7 @@ struct Pairs {
 }
 
 impl Pairs {
-    /// Of triangles with an area each, and corners by place.
+    /// Of triangles with an area each, and corners by position.
     fn of(mesh: &TriMesh) -> Self {
         let near = Near::of(mesh);
         let corners =

@@ -22,7 +22,7 @@ pub enum Meeting {
 
 type Triangle = [Vec3; 3];
 
-/// How two triangles meet. Corners at the same place are in common; both have an area ([`super::predicates::is_flat`]), and
+/// How two triangles meet. Corners at the same position are in common; both have an area ([`super::predicates::is_flat`]), and
 /// finite coordinates.
 pub fn meeting(first: &[Vec3; 3], second: &[Vec3; 3]) -> Meeting {
     let common = first.map(|corner| second.iter().position(|other| *other == corner));

@@ -1,4 +1,4 @@
-//! Arrays of numbers that a mesh carries besides its places and texture coordinates: colours, masks, whatever its file has.
+//! Arrays of numbers that a mesh carries besides its positions and texture coordinates: colours, masks, whatever its file has.
 
 use super::used;
 use crate::geometry::{TriMesh, Uvs};
@@ -79,7 +79,7 @@ pub struct MeshArray {
 /// A mesh in triangles with all that it carries.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct DetailedMesh {
-    /// Places (m) and triangles.
+    /// Positions (m) and triangles.
     pub mesh: TriMesh,
     /// Texture coordinates.
     pub uvs: Option<Uvs>,
@@ -91,7 +91,7 @@ impl DetailedMesh {
     /// A mesh without vertices and faces that carries arrays of the same names.
     pub fn emptied(&self) -> Self {
         let uvs = self.uvs.as_ref().map(|uvs| Uvs {
-            places: Vec::new(),
+            positions: Vec::new(),
             corners: uvs.corners.as_ref().map(|_| Vec::new()),
             missing: 0,
         });
@@ -114,7 +114,9 @@ impl DetailedMesh {
         };
         let uvs = self.uvs.map(|uvs| match uvs.corners {
             Some(_) => uvs,
-            None => Uvs { places: used.iter().map(|&vertex| uvs.places[vertex as usize]).collect(), ..uvs },
+            None => {
+                Uvs { positions: used.iter().map(|&vertex| uvs.positions[vertex as usize]).collect(), ..uvs }
+            }
         });
         let arrays = self.arrays.into_iter().map(kept).collect();
         Self { mesh: self.mesh.without_unused(), uvs, arrays }

@@ -154,9 +154,9 @@ pub fn used(count: usize, triangles: &[[u32; 3]]) -> Option<Vec<u32>> {
 
 /// Triangles re-indexed to the vertices `used`, which ascend and include all that they name.
 pub fn renumbered(triangles: &[[u32; 3]], used: &[u32]) -> Vec<[u32; 3]> {
-    let mut places = vec![0; used.last().map_or(0, |&last| last as usize + 1)];
-    used.iter().zip(0..).for_each(|(&vertex, place)| places[vertex as usize] = place);
-    triangles.iter().map(|triangle| triangle.map(|vertex| places[vertex as usize])).collect()
+    let mut positions = vec![0; used.last().map_or(0, |&last| last as usize + 1)];
+    used.iter().zip(0..).for_each(|(&vertex, position)| positions[vertex as usize] = position);
+    triangles.iter().map(|triangle| triangle.map(|vertex| positions[vertex as usize])).collect()
 }
 
 /// Spacing of 32-bit numbers at a coordinate: the resolution of a mesh file there.
@@ -196,14 +196,15 @@ pub const BY_OPTION: &str =
     "give --origin X,Y,Z nearby, which is subtracted in 64 bits, or save it near the origin";
 
 /// Largest absolute coordinate of positions.
-pub fn farthest<'a>(places: impl Iterator<Item = &'a DVec3>) -> f64 {
-    places.map(|p| p.amax()).fold(0.0, f64::max)
+pub fn farthest<'a>(positions: impl Iterator<Item = &'a DVec3>) -> f64 {
+    positions.map(|p| p.amax()).fold(0.0, f64::max)
 }
 
 /// For each position the index of the first equal one.
-pub fn coincident(places: impl Iterator<Item = DVec3>) -> Vec<u32> {
+pub fn coincident(positions: impl Iterator<Item = DVec3>) -> Vec<u32> {
     // Adding zero makes -0 and 0 the same.
-    let keys: Vec<[u64; 3]> = places.map(|p| [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f64::to_bits)).collect();
+    let keys: Vec<[u64; 3]> =
+        positions.map(|p| [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f64::to_bits)).collect();
     // Open addressing, at most half full: several times faster than a map, and needed in every step of a host.
     let bits = (2 * keys.len().max(1)).next_power_of_two().ilog2().max(1);
     let mut slots = vec![u32::MAX; 1 << bits];

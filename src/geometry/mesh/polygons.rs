@@ -126,10 +126,10 @@ impl PolygonMesh {
         }
         let fan = |each: &mut dyn FnMut([usize; 3])| (1..polygon.len() - 1).for_each(|i| each([0, i, i + 1]));
         // Indices beyond the vertices are left for the check of the whole mesh to refuse.
-        let places: Option<Vec<DVec3>> =
+        let positions: Option<Vec<DVec3>> =
             polygon.iter().map(|&i| self.positions.get(i as usize).map(|p| p.cast())).collect();
-        let Some(places) = places else { return fan(&mut each) };
-        let flat = flattened(&places);
+        let Some(positions) = positions else { return fan(&mut each) };
+        let flat = flattened(&positions);
         let count = polygon.len();
         if (0..count).all(|i| turn(flat[(i + count - 1) % count], flat[i], flat[(i + 1) % count]) >= 0.0) {
             return fan(&mut each);
@@ -140,18 +140,19 @@ impl PolygonMesh {
 }
 
 /// Positions in the plane that a polygon mostly lies in (Newell's normal), counter-clockwise.
-fn flattened(places: &[DVec3]) -> Vec<[f64; 2]> {
-    let next = places.iter().cycle().skip(1);
-    let normal: DVec3 = places.iter().zip(next).map(|(p, q)| (p - places[0]).cross(&(q - places[0]))).sum();
+fn flattened(positions: &[DVec3]) -> Vec<[f64; 2]> {
+    let next = positions.iter().cycle().skip(1);
+    let normal: DVec3 =
+        positions.iter().zip(next).map(|(p, q)| (p - positions[0]).cross(&(q - positions[0]))).sum();
     let length = normal.norm();
     if length == 0.0 {
-        return vec![[0.0; 2]; places.len()];
+        return vec![[0.0; 2]; positions.len()];
     }
     let normal = normal / length;
     let least = normal.iamin();
     let across = normal.cross(&DVec3::ith(least, 1.0)).normalize();
     let up = normal.cross(&across);
-    places.iter().map(|p| [(p - places[0]).dot(&across), (p - places[0]).dot(&up)]).collect()
+    positions.iter().map(|p| [(p - positions[0]).dot(&across), (p - positions[0]).dot(&up)]).collect()
 }
 
 #[cfg(test)]
@@ -303,7 +304,7 @@ mod tests {
         };
         for round in 0..300 {
             let count = 3 + (random() * 60.0) as usize;
-            // Around a centre at growing angles it is simple; on few places many corners are doubled.
+            // Around a centre at growing angles it is simple; on few positions many corners are doubled.
             let simple = round % 3 == 0;
             let few = |value: f64| (value * 5.0).floor();
             let points: Vec<[f64; 2]> = (0..count)

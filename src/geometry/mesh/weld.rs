@@ -165,9 +165,9 @@ impl Ruler {
     const OWN: Self = Self { from: 0.0, step: 0.0 };
 
     /// With steps no finer than at half the longest side of positions; none where they have no extent.
-    fn of_extent(places: &[[f32; 3]]) -> Option<Self> {
+    fn of_extent(positions: &[[f32; 3]]) -> Option<Self> {
         let side = |axis: usize| {
-            let of_axis = || places.iter().map(|place| place[axis]);
+            let of_axis = || positions.iter().map(|position| position[axis]);
             of_axis().fold(f32::MIN, f32::max) - of_axis().fold(f32::MAX, f32::min)
         };
         let half = 0.5 * (0..3).map(side).fold(0.0, f32::max);
@@ -176,8 +176,8 @@ impl Ruler {
         (from > 0.0 && from.is_finite()).then(|| Self { from, step: super::spacing(f64::from(from)) })
     }
 
-    fn measure(self, places: &[[f32; 3]]) -> Vec<[i64; 3]> {
-        places.iter().map(|place| place.map(|coordinate| self.steps(coordinate))).collect()
+    fn measure(self, positions: &[[f32; 3]]) -> Vec<[i64; 3]> {
+        positions.iter().map(|position| position.map(|coordinate| self.steps(coordinate))).collect()
     }
 
     /// The count of steps from 0 to a coordinate; neighbouring 32-bit numbers have neighbouring counts, where steps are no coarser.

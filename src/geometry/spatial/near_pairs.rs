@@ -38,7 +38,7 @@ struct Fan {
 }
 
 impl<'a> Near<'a> {
-    /// Sorts triangles with an area each, and corners by place.
+    /// Sorts triangles with an area each, and corners by position.
     pub(in crate::geometry) fn of(mesh: &'a TriMesh) -> Self {
         let mut near = Self {
             mesh,
@@ -109,9 +109,9 @@ fn span(mesh: &TriMesh, triangle: usize) -> Span {
 /// A box around the arc in which a triangle is seen from one of its corners, on the unit sphere around that.
 fn arc(mesh: &TriMesh, triangle: usize, hub: u32) -> Span {
     let corners = mesh.triangles[triangle];
-    let place = |vertex: u32| mesh.positions[vertex as usize].cast::<f64>();
+    let position = |vertex: u32| mesh.positions[vertex as usize].cast::<f64>();
     let first = corners.iter().position(|&corner| corner == hub).unwrap_or(0);
-    let end = |next: usize| (place(corners[(first + next) % 3]) - place(hub)).normalize();
+    let end = |next: usize| (position(corners[(first + next) % 3]) - position(hub)).normalize();
     let (a, b) = (end(1), end(2));
     // Half the sum reaches to the middle of the chord; the arc rises above the chord by what is left of the radius.
     let rise = DVec3::repeat(1.0 - (a + b).norm() / 2.0 + MARGIN);

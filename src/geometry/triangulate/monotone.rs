@@ -19,16 +19,16 @@ pub fn triangles(points: &[Point]) -> Vec<[usize; 3]> {
     let whole = rounded(points);
     let mut out = Vec::with_capacity(points.len() - 2);
     let ring = without_spikes(&whole, &mut out);
-    let places: Vec<[i64; 2]> = ring.iter().map(|&corner| whole[corner]).collect();
-    let mut order: Vec<usize> = (0..places.len()).collect();
-    order.sort_unstable_by_key(|&corner| (places[corner], corner));
-    let mut rank = vec![0; places.len()];
+    let positions: Vec<[i64; 2]> = ring.iter().map(|&corner| whole[corner]).collect();
+    let mut order: Vec<usize> = (0..positions.len()).collect();
+    order.sort_unstable_by_key(|&corner| (positions[corner], corner));
+    let mut rank = vec![0; positions.len()];
     order.iter().enumerate().for_each(|(at, &corner)| rank[corner] = at);
-    let diagonals = Sweep::new(&places, &rank).run(&order);
+    let diagonals = Sweep::new(&positions, &rank).run(&order);
     let mut cut = Vec::new();
-    for piece in pieces(places.len(), diagonals) {
+    for piece in pieces(positions.len(), diagonals) {
         cut.clear();
-        if !cut_monotone(&places, &rank, &piece, &mut cut) {
+        if !cut_monotone(&positions, &rank, &piece, &mut cut) {
             let own: Vec<Point> = piece.iter().map(|&corner| points[ring[corner]]).collect();
             cut = ear_clipping::triangles(&own)
                 .into_iter()
@@ -59,15 +59,15 @@ fn turn(a: [i64; 2], b: [i64; 2], c: [i64; 2]) -> i64 {
 
 /// Cuts off corners that are doubled, or from which the polygon goes back the way that it came; gives those that are left,
 /// at least three.
-fn without_spikes(places: &[[i64; 2]], out: &mut Vec<[usize; 3]>) -> Vec<usize> {
-    let mut ring: Vec<usize> = Vec::with_capacity(places.len());
+fn without_spikes(positions: &[[i64; 2]], out: &mut Vec<[usize; 3]>) -> Vec<usize> {
+    let mut ring: Vec<usize> = Vec::with_capacity(positions.len());
     let is_spike = |a: usize, b: usize, c: usize| {
-        let [p, q, r] = [a, b, c].map(|corner| places[corner]);
+        let [p, q, r] = [a, b, c].map(|corner| positions[corner]);
         let along = (p[0] - q[0]) * (r[0] - q[0]) + (p[1] - q[1]) * (r[1] - q[1]);
         turn(p, q, r) == 0 && along >= 0
     };
-    for corner in 0..places.len() {
-        let rest = places.len() - corner;
+    for corner in 0..positions.len() {
+        let rest = positions.len() - corner;
         while let [.., a, b] = ring[..] {
             if ring.len() + rest <= 3 || !is_spike(a, b, corner) {
                 break;
@@ -94,10 +94,10 @@ fn without_spikes(places: &[[i64; 2]], out: &mut Vec<[usize; 3]>) -> Vec<usize> 
     ring[begin..end].to_vec()
 }
 
-/// The sweep from left to right. Corners are in the order of their places, then of their indices; an edge is named by the
+/// The sweep from left to right. Corners are in the order of their positions, then of their indices; an edge is named by the
 /// corner that it leaves. Of the edges that the line crosses those with the polygon above them are kept, upward.
 struct Sweep<'a> {
-    places: &'a [[i64; 2]],
+    positions: &'a [[i64; 2]],
     rank: &'a [usize],
     /// Runs of edges, and the order of the runs.
     runs: Vec<Vec<u32>>,
@@ -110,10 +110,10 @@ struct Sweep<'a> {
 }
 
 impl<'a> Sweep<'a> {
-    fn new(places: &'a [[i64; 2]], rank: &'a [usize]) -> Self {
-        let count = places.len();
+    fn new(positions: &'a [[i64; 2]], rank: &'a [usize]) -> Self {
+        let count = positions.len();
         Self {
-            places,
+            positions,
             rank,
             runs: Vec::new(),
             order: Vec::new(),
@@ -130,17 +130,17 @@ impl<'a> Sweep<'a> {
     }
 
     fn before(&self, corner: usize) -> usize {
-        if corner == 0 { self.places.len() - 1 } else { corner - 1 }
+        if corner == 0 { self.positions.len() - 1 } else { corner - 1 }
     }
 
     fn after(&self, corner: usize) -> usize {
-        if corner + 1 == self.places.len() { 0 } else { corner + 1 }
+        if corner + 1 == self.positions.len() { 0 } else { corner + 1 }
     }
 
     fn meet(&mut self, corner: usize) {
         let (before, after) = (self.before(corner), self.after(corner));
         let [comes_from_left, goes_left] = [before, after].map(|other| self.rank[other] < self.rank[corner]);
-        let is_convex = turn(self.places[before], self.places[corner], self.places[after]) > 0;
+        let is_convex = turn(self.positions[before], self.positions[corner], self.positions[after]) > 0;
         if comes_from_left {
             // A start, a split, or a corner of a lower side put it there.
             self.join_merged(before, corner);
@@ -180,15 +180,15 @@ impl<'a> Sweep<'a> {
     /// Whether a corner is above an edge, or on it with another point above.
     fn is_above(&self, edge: u32, corner: usize, other: usize) -> bool {
         let edge = edge as usize;
-        let (a, b) = (self.places[edge], self.places[self.after(edge)]);
-        match turn(a, b, self.places[corner]) {
-            0 => turn(a, b, self.places[other]) > 0,
+        let (a, b) = (self.positions[edge], self.positions[self.after(edge)]);
+        match turn(a, b, self.positions[corner]) {
+            0 => turn(a, b, self.positions[other]) > 0,
             side => side > 0,
         }
     }
 
-    /// The place in the list below which all edges lie below a corner: a run, by its place in the order, and a place in it.
-    fn place(&self, corner: usize, other: usize) -> Option<(usize, usize)> {
+    /// The position in the list below which all edges lie below a corner: a run, by its position in the order, and a position in it.
+    fn position(&self, corner: usize, other: usize) -> Option<(usize, usize)> {
         let run = self.order.partition_point(|&run| self.is_above(self.runs[run][0], corner, other));
         let run = run.checked_sub(1)?;
         let edges = &self.runs[self.order[run]];
@@ -196,7 +196,7 @@ impl<'a> Sweep<'a> {
     }
 
     fn below(&self, corner: usize, other: usize) -> Option<usize> {
-        let (run, at) = self.place(corner, other)?;
+        let (run, at) = self.position(corner, other)?;
         // The first of the run is below.
         Some(self.runs[self.order[run]][at.max(1) - 1] as usize)
     }
@@ -209,7 +209,7 @@ impl<'a> Sweep<'a> {
             self.order.push(self.runs.len());
             return self.runs.push(vec![corner as u32]);
         }
-        let (run, at) = self.place(corner, after).unwrap_or((0, 0));
+        let (run, at) = self.position(corner, after).unwrap_or((0, 0));
         let name = self.order[run];
         self.runs[name].insert(at, corner as u32);
         self.run_of[corner] = name;
@@ -261,7 +261,7 @@ fn pieces(count: usize, diagonals: Vec<[usize; 2]>) -> Vec<Vec<usize>> {
 }
 
 /// Cuts a monotone piece; returns whether it was monotone and no triangle is flipped.
-fn cut_monotone(places: &[[i64; 2]], rank: &[usize], piece: &[usize], out: &mut Vec<[usize; 3]>) -> bool {
+fn cut_monotone(positions: &[[i64; 2]], rank: &[usize], piece: &[usize], out: &mut Vec<[usize; 3]>) -> bool {
     let count = piece.len();
     let first = (0..count).min_by_key(|&at| rank[piece[at]]).unwrap_or(0);
     let corner = |at: usize| piece[(first + at) % count];
@@ -272,7 +272,7 @@ fn cut_monotone(places: &[[i64; 2]], rank: &[usize], piece: &[usize], out: &mut 
     }
     let mut good = true;
     let mut add = |a: usize, b: usize, c: usize| {
-        good &= turn(places[a], places[b], places[c]) >= 0;
+        good &= turn(positions[a], positions[b], positions[c]) >= 0;
         out.push([a, b, c]);
     };
     // The lower side counts up from the first corner, the upper one down to it.
@@ -297,7 +297,7 @@ fn cut_monotone(places: &[[i64; 2]], rank: &[usize], piece: &[usize], out: &mut 
             stack.push((top, was_lower));
         } else {
             while let [.., (a, _), (b, _)] = stack[..] {
-                let seen = turn(places[a], places[b], places[next]);
+                let seen = turn(positions[a], positions[b], positions[next]);
                 if if is_lower { seen <= 0 } else { seen >= 0 } {
                     break;
                 }

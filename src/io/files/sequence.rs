@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 /// Most digits of a frame number.
 const MOST_DIGITS: usize = 32;
 
-/// A file's name with a place for the frame number, in a folder.
+/// A file's name with a position for the frame number, in a folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern {
     folder: PathBuf,
@@ -17,12 +17,12 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// Finds the frame number's place in a file's name; none when the name is of one file, as every name of a file that
+    /// Finds the frame number's position in a file's name; none when the name is of one file, as every name of a file that
     /// is there. Names of folders are not considered.
     pub fn parse(path: &Path) -> Option<Self> {
         let text = path.file_name()?.to_str()?;
         let part = |start: usize, end: usize, digits: usize| {
-            // After the folder was looked at: most names have no place for a number.
+            // After the folder was looked at: most names have no position for a number.
             (digits <= MOST_DIGITS && !path.is_file()).then(|| Self {
                 folder: path.parent().unwrap_or(Path::new("")).to_path_buf(),
                 before: text[..start].into(),

@@ -13,7 +13,7 @@ use crate::io::files::{source, text};
 const EMPTY: &[u8] = b"# an empty mesh\n";
 /// Lines between two looks at whether to stop.
 const PIECE: usize = 1 << 14;
-/// Names of the arrays that a vertex' three numbers behind its place are.
+/// Names of the arrays that a vertex' three numbers behind its position are.
 const COLOURS: [&str; 3] = ["red", "green", "blue"];
 
 /// Reads positions, less an origin that is subtracted in 64 bits, faces and texture coordinates. Lines of other kinds may be of
@@ -72,8 +72,8 @@ pub(in crate::io) fn is_empty_of_ours(bytes: &[u8]) -> bool {
 struct Reader {
     origin: [f64; 3],
     mesh: PolygonMesh,
-    places: Vec<[f32; 2]>,
-    /// For each corner its index into `places`, or none.
+    positions: Vec<[f32; 2]>,
+    /// For each corner its index into `positions`, or none.
     at: Vec<u32>,
     /// Red, green and blue of the vertices, as long as all have them.
     colours: Vec<[f32; 3]>,
@@ -85,15 +85,15 @@ impl Reader {
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
         match words.next() {
             Some(b"v") => self.vertex(words),
-            Some(b"vt") => self.place(words),
+            Some(b"vt") => self.position(words),
             Some(b"f") => self.face(words),
             _ => Ok(()),
         }
     }
 
     fn vertex<'a>(&mut self, mut words: impl Iterator<Item = &'a [u8]>) -> Result<(), String> {
-        let mut place = [0.0; 3];
-        for (value, origin) in place.iter_mut().zip(self.origin) {
+        let mut position = [0.0; 3];
+        for (value, origin) in position.iter_mut().zip(self.origin) {
             let word = words.next().unwrap_or_default();
             let read = text::coordinate(word, origin).filter(|value| value.is_finite());
             *value = read.ok_or_else(|| {
@@ -102,7 +102,7 @@ impl Reader {
                 if has_comma { format!("{what}: {}", text::no_number(word)) } else { what.into() }
             })?;
         }
-        self.mesh.positions.push(Vec3::from(place));
+        self.mesh.positions.push(Vec3::from(position));
         let mut next = || words.next().and_then(number).filter(|value| value.is_finite());
         if let (Some(red), Some(green), Some(blue)) = (next(), next(), next()) {
             self.colours.push([red, green, blue]);
@@ -111,9 +111,9 @@ impl Reader {
     }
 
     /// Texture coordinates: v may be left out. Those that are not finite count as missing when a face names them.
-    fn place<'a>(&mut self, mut words: impl Iterator<Item = &'a [u8]>) -> Result<(), String> {
+    fn position<'a>(&mut self, mut words: impl Iterator<Item = &'a [u8]>) -> Result<(), String> {
         let mut next = |default: f32| words.next().map_or(Some(default), number).unwrap_or(f32::NAN);
-        self.places.push([next(f32::NAN), next(0.0)]);
+        self.positions.push([next(f32::NAN), next(0.0)]);
         Ok(())
     }
 
@@ -124,15 +124,16 @@ impl Reader {
             let mut parts = word.split(|&byte| byte == b'/');
             let vertex = parts.next().and_then(|part| index(part, self.mesh.positions.len()));
             corners.push(vertex.ok_or_else(|| names(word, "vertex", self.mesh.positions.len()))?);
-            let place = match parts.next() {
+            let position = match parts.next() {
                 None | Some(b"") => uvs::NONE,
                 Some(part) => {
-                    let place = index(part, self.places.len());
-                    let place = place.ok_or_else(|| names(word, "texture coordinates", self.places.len()))?;
-                    if uvs::is_finite(self.places[place as usize]) { place } else { uvs::NONE }
+                    let position = index(part, self.positions.len());
+                    let position =
+                        position.ok_or_else(|| names(word, "texture coordinates", self.positions.len()))?;
+                    if uvs::is_finite(self.positions[position as usize]) { position } else { uvs::NONE }
                 }
             };
-            self.at.push(place);
+            self.at.push(position);
         }
         self.mesh.push(corners);
         // A face of fewer than three corners is none.
@@ -145,7 +146,7 @@ impl Reader {
 
     fn finish(self) -> PolygonMesh {
         let (corners, count) = (&self.mesh.corners, self.mesh.positions.len());
-        let uvs = Uvs::of_corners(self.places, self.at, corners, count);
+        let uvs = Uvs::of_corners(self.positions, self.at, corners, count);
         let colour = |(channel, name): (usize, &&str)| MeshArray {
             name: name.to_string(),
             on: On::Vertices,
@@ -205,12 +206,12 @@ pub(in crate::io) fn write(
             .iter()
             .try_for_each(|[a, b, c]| writeln!(out, "f {} {} {}", a + 1, b + 1, c + 1));
     };
-    for [u, v] in &uvs.places {
+    for [u, v] in &uvs.positions {
         writeln!(out, "vt {u} {v}")?;
     }
     for (index, triangle) in mesh.triangles.iter().enumerate() {
-        let places = uvs.indices(&mesh.triangles, index);
-        let [a, b, c] = [0, 1, 2].map(|corner| format!("{}/{}", triangle[corner] + 1, places[corner] + 1));
+        let positions = uvs.indices(&mesh.triangles, index);
+        let [a, b, c] = [0, 1, 2].map(|corner| format!("{}/{}", triangle[corner] + 1, positions[corner] + 1));
         writeln!(out, "f {a} {b} {c}")?;
     }
     Ok(())

@@ -13,9 +13,9 @@ use crate::io::files::{source, text};
 pub(in crate::io) use super::ply_header::{Element, NAMES};
 
 /// Names of a vertex' texture coordinates.
-pub(in crate::io) const PLACES: [[&str; 2]; 3] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]];
+pub(in crate::io) const POSITIONS: [[&str; 2]; 3] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]];
 
-/// What is no array of its own: places, and normals.
+/// What is no array of its own: positions, and normals.
 const NO_ARRAYS: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 
 /// Rows between two looks at whether to stop.
@@ -121,7 +121,7 @@ impl Parsed {
         let has = |name: &&str| {
             vertex.is_some_and(|vertex| vertex.properties.iter().any(|p| p.name == *name && p.list.is_none()))
         };
-        let names = PLACES.into_iter().find(|pair| pair.iter().all(has));
+        let names = POSITIONS.into_iter().find(|pair| pair.iter().all(has));
         Self {
             origin,
             mesh: PolygonMesh::default(),
@@ -143,11 +143,12 @@ impl Parsed {
     }
 
     /// Adds a face, with two texture coordinates for each corner, one after another, or none.
-    fn face(&mut self, corners: Vec<u32>, places: &[f64]) {
-        let has = places.len() == 2 * corners.len();
+    fn face(&mut self, corners: Vec<u32>, positions: &[f64]) {
+        let has = positions.len() == 2 * corners.len();
         for corner in 0..corners.len() {
-            let place = [0, 1].map(|axis| if has { places[2 * corner + axis] as f32 } else { f32::NAN });
-            let index = if uvs::is_finite(place) { self.index(place) } else { uvs::NONE };
+            let position =
+                [0, 1].map(|axis| if has { positions[2 * corner + axis] as f32 } else { f32::NAN });
+            let index = if uvs::is_finite(position) { self.index(position) } else { uvs::NONE };
             self.at.push(index);
         }
         self.mesh.push(corners);
@@ -155,11 +156,11 @@ impl Parsed {
         self.at.truncate(self.mesh.corners.len());
     }
 
-    fn index(&mut self, place: [f32; 2]) -> u32 {
+    fn index(&mut self, position: [f32; 2]) -> u32 {
         let next = self.of_corners.len() as u32;
-        let index = *self.known.entry(place.map(|value| (value + 0.0).to_bits())).or_insert(next);
+        let index = *self.known.entry(position.map(|value| (value + 0.0).to_bits())).or_insert(next);
         if index == next {
-            self.of_corners.push(place);
+            self.of_corners.push(position);
         }
         index
     }
@@ -168,11 +169,11 @@ impl Parsed {
         let (corners, count) = (&self.mesh.corners, self.mesh.positions.len());
         let uvs = match Uvs::of_corners(self.of_corners, self.at, corners, count) {
             None if self.names.is_some() => {
-                let is_missing = |place: &[f32; 2]| !uvs::is_finite(*place);
-                let missing = self.of_vertices.iter().filter(|place| is_missing(place)).count();
-                let known = |place: [f32; 2]| if uvs::is_finite(place) { place } else { [0.0; 2] };
-                let places = self.of_vertices.into_iter().map(known).collect();
-                Some(Uvs { places, corners: None, missing })
+                let is_missing = |position: &[f32; 2]| !uvs::is_finite(*position);
+                let missing = self.of_vertices.iter().filter(|position| is_missing(position)).count();
+                let known = |position: [f32; 2]| if uvs::is_finite(position) { position } else { [0.0; 2] };
+                let positions = self.of_vertices.into_iter().map(known).collect();
+                Some(Uvs { positions, corners: None, missing })
             }
             of_corners => of_corners,
         };
@@ -207,11 +208,11 @@ enum Fault {
 impl Fault {
     /// In words.
     fn at(self, element: &Element, row: usize) -> String {
-        let place = format_args!("{} {} of {}", element.name, row + 1, element.count);
+        let position = format_args!("{} {} of {}", element.name, row + 1, element.count);
         match self {
-            Self::End => format!("the .ply file ends in {place}"),
-            Self::Text(what) => format!("{place}: {what}"),
-            Self::Count(count) => format!("{place} cannot have {count} entries"),
+            Self::End => format!("the .ply file ends in {position}"),
+            Self::Text(what) => format!("{position}: {what}"),
+            Self::Count(count) => format!("{position} cannot have {count} entries"),
         }
     }
 }

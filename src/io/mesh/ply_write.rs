@@ -2,11 +2,11 @@
 
 use std::io::{Result, Write};
 
-use super::ply::{NAMES, PLACES};
+use super::ply::{NAMES, POSITIONS};
 use crate::geometry::mesh::attributes::{MeshArray, Number, On};
 use crate::geometry::{TriMesh, Uvs, Vec3};
 
-/// What a mesh carries into a file besides its places.
+/// What a mesh carries into a file besides its positions.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Carried<'a> {
     /// Velocities (m/s), one a vertex, as vx, vy, vz; or none.
@@ -25,7 +25,7 @@ pub(in crate::io) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carrie
     let of_corners = uvs.filter(|uvs| uvs.corners.is_some());
     let mut names = vec!["x", "y", "z"];
     names.extend(moving.then_some(["vx", "vy", "vz"]).into_iter().flatten());
-    names.extend(of_vertices.map(|_| PLACES[0]).into_iter().flatten());
+    names.extend(of_vertices.map(|_| POSITIONS[0]).into_iter().flatten());
     let vertices = arrays(carried, On::Vertices, &names);
     let faces = arrays(carried, On::Faces, &["vertex_indices", "texcoord"]);
     let corners = arrays(carried, On::Corners, &["vertex_indices", "texcoord"]);
@@ -47,8 +47,8 @@ pub(in crate::io) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carrie
     writeln!(out, "end_header")?;
     for (vertex, p) in mesh.positions.iter().enumerate() {
         let velocity = velocities.get(vertex).filter(|_| moving);
-        let place = of_vertices.map(|uvs| uvs.places[vertex]);
-        let values = p.iter().chain(velocity.into_iter().flatten()).chain(place.iter().flatten());
+        let position = of_vertices.map(|uvs| uvs.positions[vertex]);
+        let values = p.iter().chain(velocity.into_iter().flatten()).chain(position.iter().flatten());
         for value in values {
             out.write_all(&value.to_le_bytes())?;
         }
@@ -62,7 +62,7 @@ pub(in crate::io) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carrie
         if let Some(uvs) = of_corners {
             out.write_all(&[6])?;
             for index in uvs.indices(&mesh.triangles, number) {
-                for value in uvs.places[index as usize] {
+                for value in uvs.positions[index as usize] {
                     out.write_all(&value.to_le_bytes())?;
                 }
             }

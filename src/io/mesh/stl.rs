@@ -43,8 +43,8 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMes
             f32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]])
         };
         for corner in 0..3 {
-            let place = [0, 1, 2].map(|axis| less(value(3 * corner + axis), origin[axis]));
-            let corner = joined.corner(place);
+            let position = [0, 1, 2].map(|axis| less(value(3 * corner + axis), origin[axis]));
+            let corner = joined.corner(position);
             joined.mesh.corners.push(corner);
         }
         joined.mesh.ends.push(joined.mesh.corners.len() as u32);
@@ -68,12 +68,12 @@ pub(in crate::io) struct Joined {
 
 impl Joined {
     /// The vertex at a position.
-    pub fn corner(&mut self, place: [f32; 3]) -> u32 {
+    pub fn corner(&mut self, position: [f32; 3]) -> u32 {
         // Adding zero makes -0 and 0 the same.
-        let place = place.map(|value| value + 0.0);
+        let position = position.map(|value| value + 0.0);
         let positions = &mut self.mesh.positions;
-        *self.known.entry(place.map(f32::to_bits)).or_insert_with(|| {
-            positions.push(Vec3::from(place));
+        *self.known.entry(position.map(f32::to_bits)).or_insert_with(|| {
+            positions.push(Vec3::from(position));
             positions.len() as u32 - 1
         })
     }

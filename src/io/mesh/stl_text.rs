@@ -109,8 +109,8 @@ impl<'a> Reader<'a> {
         loop {
             let word = self.next()?;
             if is(word, "vertex") {
-                let place = self.vertex()?;
-                let corner = self.joined.corner(place);
+                let position = self.vertex()?;
+                let corner = self.joined.corner(position);
                 self.joined.mesh.corners.push(corner);
             } else if self.ends(word, "loop") {
                 break;
@@ -133,8 +133,8 @@ impl<'a> Reader<'a> {
     }
 
     fn vertex(&mut self) -> Result<[f32; 3], String> {
-        let mut place = [0.0; 3];
-        for (axis, value) in place.iter_mut().enumerate() {
+        let mut position = [0.0; 3];
+        for (axis, value) in position.iter_mut().enumerate() {
             let word = self.next()?;
             let line = self.words.line;
             let read = text::coordinate(word, self.origin[axis]);
@@ -143,7 +143,7 @@ impl<'a> Reader<'a> {
                 return Err(format!("line {line}: \"{}\" is not a finite number", text::shown(word)));
             }
         }
-        Ok(place)
+        Ok(position)
     }
 }
 

@@ -55,7 +55,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
             "the file says that it has {points} particles, and is too short for them ({bytes} bytes)"
         ));
     }
-    let mut places = Kind::F32.none();
+    let mut positions = Kind::F32.none();
     let mut rows = vec![0; (PIECE / row).clamp(1, head.points.max(1)) * row];
     let mut done = 0;
     while done < head.points {
@@ -69,7 +69,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
             _ => damaged(&error),
         })?;
         for point in piece.chunks_exact(row) {
-            Kind::F32.decode(&point[..3 * WORD], Order::Big, &mut places)?;
+            Kind::F32.decode(&point[..3 * WORD], Order::Big, &mut positions)?;
             let mut at = 4 * WORD;
             for Field { kind, size, numbers, .. } in &mut fields {
                 if let Some(numbers) = numbers {
@@ -83,7 +83,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
     if is_packed {
         read_to_the_end(&mut *reader)?;
     }
-    let mut found = Found::new(places);
+    let mut found = Found::new(positions);
     for Field { name, kind, size, numbers } in fields {
         match numbers {
             Some(numbers) => found.add(&name, kind, size, numbers)?,

@@ -9,7 +9,7 @@
 //! | .xyz | text with x, y and z in the first three columns, or little-endian 32-bit floats |
 //! | .ply | vertices: see [`ply`] |
 //!
-//! Attributes keep the names of the file. Floats become 32-bit ones, places keep 64 bits. Integers of up to 32 bits with a sign become
+//! Attributes keep the names of the file. Floats become 32-bit ones, positions keep 64 bits. Integers of up to 32 bits with a sign become
 //! 32-bit ones, longer ones 64-bit ones. As in .ply, `id` becomes 64-bit integers, `active` and `trapped` `bool`, and a value that all
 //! points share is one. Attributes of other than one or three components, texts, and those named `P` or nothing, are named in a
 //! warning and left out.
@@ -39,8 +39,8 @@ pub const WRITTEN: [&str; 5] = ["bgeo", "bgeo.gz", "bhclassic", "ply", "xyz"];
 /// Points of a file, and whether it says their voxel size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cloud {
-    /// Places (m).
-    pub places: Vec<DVec3>,
+    /// Positions (m).
+    pub positions: Vec<DVec3>,
     /// Attributes.
     pub attributes: Vec<Attribute>,
     /// Edge of a voxel (m), if the file says it.
@@ -58,20 +58,20 @@ impl Cloud {
     /// # Panics
     /// Unless there is one flag for each.
     pub fn retain(&mut self, kept: &[bool]) {
-        assert_eq!(kept.len(), self.places.len(), "one flag for each particle");
+        assert_eq!(kept.len(), self.positions.len(), "one flag for each particle");
         let order: Vec<u32> = (0..).zip(kept).filter(|(_, kept)| **kept).map(|(n, _)| n).collect();
-        self.places = order.iter().map(|&n| self.places[n as usize]).collect();
+        self.positions = order.iter().map(|&n| self.positions[n as usize]).collect();
         self.attributes.iter_mut().for_each(|attribute| attribute.values.reorder(&order));
     }
 
     /// The points, in voxels of the file's own size, unless another is given (m).
     ///
     /// # Errors
-    /// No size, or places that it does not fit: see [`Points::at`]; attributes that [`Points::validate`] refuses.
+    /// No size, or positions that it does not fit: see [`Points::at`]; attributes that [`Points::validate`] refuses.
     pub fn into_points(self, voxel_size: Option<f64>) -> Result<Points> {
         let unknown = || Error::argument("the file does not say how large the voxels of its points are");
         let size = voxel_size.or(self.voxel_size).ok_or_else(unknown)?;
-        let points = Points { attributes: self.attributes, ..Points::at(size, &self.places)? };
+        let points = Points { attributes: self.attributes, ..Points::at(size, &self.positions)? };
         points.validate()?;
         Ok(points)
     }
@@ -79,8 +79,8 @@ impl Cloud {
 
 impl From<Points> for Cloud {
     fn from(points: Points) -> Self {
-        let places = (0..points.count()).map(|point| points.position(point)).collect();
-        Self { places, attributes: points.attributes, voxel_size: Some(points.voxel_size) }
+        let positions = (0..points.count()).map(|point| points.position(point)).collect();
+        Self { positions, attributes: points.attributes, voxel_size: Some(points.voxel_size) }
     }
 }
 
@@ -128,7 +128,7 @@ pub fn is_written(path: &Path) -> bool {
 /// Reads the particles of a file, in the file's order and its units.
 ///
 /// # Errors
-/// A missing, empty, cut or malformed file; a place that is not finite (the particle is named, counted from 1); an integer that its
+/// A missing, empty, cut or malformed file; a position that is not finite (the particle is named, counted from 1); an integer that its
 /// type does not hold; Houdini's own .bgeo.
 pub fn read(path: &Path) -> Result<Cloud> {
     parse(path, &source::read(path)?)
@@ -153,7 +153,8 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Cloud> {
         None => Err(format!("a file of particles must be {}", listed(&READ))),
     };
     let (cloud, left_out) = caught(path, || parse().map_err(|what| Error::file(path, one_line(&what))))?;
-    if let Some(n) = cloud.places.iter().position(|place| !place.iter().all(|part| part.is_finite())) {
+    if let Some(n) = cloud.positions.iter().position(|position| !position.iter().all(|part| part.is_finite()))
+    {
         return Err(Error::file(path, format!("the place of particle {} is not finite", n + 1)));
     }
     if !left_out.is_empty() {
@@ -163,7 +164,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Cloud> {
     Ok(cloud)
 }
 
-/// Writes points, whole or not at all: .bgeo and .bhclassic as classic version 5 in gzip, with 32-bit places and integers; .xyz as
+/// Writes points, whole or not at all: .bgeo and .bhclassic as classic version 5 in gzip, with 32-bit positions and integers; .xyz as
 /// little-endian 32-bit floats, without attributes, which a warning names; .ply as [`ply`] does, with the voxel size if
 /// `keeps_voxels`.
 ///
@@ -195,7 +196,7 @@ fn listed(extensions: &[&str]) -> String {
     extensions.iter().map(|extension| format!(".{extension}")).collect::<Vec<_>>().join(", ")
 }
 
-/// Rounding of a place (m) that is worth a warning.
+/// Rounding of a position (m) that is worth a warning.
 const MOST_MOVED: f64 = 1e-3;
 
 fn warn_of_rounding(path: &Path, points: &Points) {
@@ -209,23 +210,26 @@ fn warn_of_rounding(path: &Path, points: &Points) {
 /// The particles of a file as a reader finds them.
 #[derive(Debug)]
 pub(super) struct Found {
-    places: Vec<DVec3>,
+    positions: Vec<DVec3>,
     attributes: Vec<Attribute>,
     /// Attributes that no [`Values`] hold.
     left_out: Vec<String>,
 }
 
 impl Found {
-    /// Places in groups of three numbers; a rest is left out.
+    /// Positions in groups of three numbers; a rest is left out.
     pub fn new(numbers: Numbers) -> Self {
         let numbers = numbers.into_reals();
-        let places = numbers.chunks_exact(3).map(|place| DVec3::new(place[0], place[1], place[2])).collect();
-        Self { places, attributes: Vec::new(), left_out: Vec::new() }
+        let positions = numbers
+            .chunks_exact(3)
+            .map(|position| DVec3::new(position[0], position[1], position[2]))
+            .collect();
+        Self { positions, attributes: Vec::new(), left_out: Vec::new() }
     }
 
     /// How many particles there are.
     pub fn count(&self) -> usize {
-        self.places.len()
+        self.positions.len()
     }
 
     /// Adds an attribute of one value, or so many components, for each particle.
@@ -281,8 +285,8 @@ impl Found {
     }
 
     fn into_parts(self) -> (Cloud, Vec<String>) {
-        let Self { places, attributes, left_out } = self;
-        (Cloud { places, attributes, voxel_size: None }, left_out)
+        let Self { positions, attributes, left_out } = self;
+        (Cloud { positions, attributes, voxel_size: None }, left_out)
     }
 }
 

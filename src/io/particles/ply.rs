@@ -2,7 +2,7 @@
 //!
 //! An attribute of vectors takes three properties, its name with x, y and z behind it (`v`: vx, vy, vz; `rest`: restx ...).
 //! `bool` becomes `uchar`. PLY has no 64-bit integers: they become `int` where all of them fit, else `double`. A comment
-//! keeps the voxel size. Places are `float`, or `double` where 32 bits would move points by over a thousandth of a voxel.
+//! keeps the voxel size. Positions are `float`, or `double` where 32 bits would move points by over a thousandth of a voxel.
 
 use std::io::Write;
 use std::path::Path;
@@ -18,7 +18,7 @@ use crate::io::mesh::ply::Element;
 
 /// The comment before the voxel size (m).
 const VOXEL: &str = "frazil voxel_size";
-/// How far rounding may move a point (voxels) before its place is written in 64 bits.
+/// How far rounding may move a point (voxels) before its position is written in 64 bits.
 const MOST_MOVED: f64 = 1e-3;
 
 /// Whether a .ply file has vertices and no faces. One that has neither holds a mesh where it says that there are no faces, and points
@@ -60,13 +60,13 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> std::result::Result<Cloud, String> {
     for row in 0..vertices.count {
         body.row(&vertices, row, |property, value| columns[property].push(value))?;
     }
-    let place = |axis: &str| names.iter().position(|name| name == axis).expect("open looks for them");
-    let axes = ["x", "y", "z"].map(place);
-    let places: Vec<DVec3> =
+    let position = |axis: &str| names.iter().position(|name| name == axis).expect("open looks for them");
+    let axes = ["x", "y", "z"].map(position);
+    let positions: Vec<DVec3> =
         (0..vertices.count).map(|row| DVec3::from(axes.map(|axis| columns[axis][row]))).collect();
     let attributes = attributes(&vertices, &names, &columns)?;
     let voxel_size = body.comments.iter().find_map(|line| line.strip_prefix(VOXEL)?.trim().parse().ok());
-    Ok(Cloud { places, attributes, voxel_size })
+    Ok(Cloud { positions, attributes, voxel_size })
 }
 
 fn attributes(
@@ -196,12 +196,12 @@ fn write_to(
 ) -> std::io::Result<()> {
     let farthest = points.bounds().map_or(0.0, |(low, high)| low.amax().max(high.amax()));
     let is_far = spacing(farthest) > MOST_MOVED * points.voxel_size;
-    let places = if is_far { "double" } else { "float" };
+    let positions = if is_far { "double" } else { "float" };
     let voxel = if keeps_voxels { format!("comment {VOXEL} {}\n", points.voxel_size) } else { String::new() };
     let mut head =
         format!("ply\nformat binary_little_endian 1.0\n{voxel}element vertex {}\n", points.count());
     for axis in ["x", "y", "z"] {
-        head += &format!("property {places} {axis}\n");
+        head += &format!("property {positions} {axis}\n");
     }
     for Plain { kind, names, .. } in attributes {
         names.iter().for_each(|name| head += &format!("property {kind} {name}\n"));
@@ -243,8 +243,9 @@ mod tests {
     #[test]
     fn what_is_written_is_read_and_a_cut_file_is_refused() {
         for far in [0.0, 1.0e6] {
-            let places = [[0.26 + far, -0.26, 0.0], [1.0 + far, 0.0, -3.0], [far, 0.0, 0.0]].map(DVec3::from);
-            let mut points = Points::at(0.5, &places).unwrap();
+            let positions =
+                [[0.26 + far, -0.26, 0.0], [1.0 + far, 0.0, -3.0], [far, 0.0, 0.0]].map(DVec3::from);
+            let mut points = Points::at(0.5, &positions).unwrap();
             points.set("v", Values::Vector(Column::Each(vec![[0.0, 1.0, -2.0], [3.0; 3], [4.0; 3]])));
             points.set("id", Values::Long(Column::Each(vec![5, 1 << 40, 7])));
             points.set("pscale", Values::Float(Column::Uniform(0.1)));

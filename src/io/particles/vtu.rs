@@ -35,8 +35,8 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
             _ => all = Some(piece),
         }
     }
-    let Piece { places, arrays, left_out, .. } = all.ok_or("the .vtu file has no Piece")?;
-    let mut found = Found::new(places);
+    let Piece { positions, arrays, left_out, .. } = all.ok_or("the .vtu file has no Piece")?;
+    let mut found = Found::new(positions);
     for Array { name, kind, components, numbers } in arrays {
         found.add(&name, kind, components, numbers)?;
     }
@@ -122,7 +122,7 @@ struct Array {
 /// The points of a piece of the grid.
 struct Piece {
     count: usize,
-    places: Numbers,
+    positions: Numbers,
     arrays: Vec<Array>,
     left_out: Vec<String>,
 }
@@ -131,12 +131,12 @@ impl Piece {
     fn read(file: &File<'_>, node: Node<'_, '_>) -> Result<Self, String> {
         let count = number(node, "NumberOfPoints", None)?;
         let points = child(node, "Points").and_then(|points| child(points, "DataArray"));
-        let places = match points {
+        let positions = match points {
             Some(node) => Array::read(file, node, count)?,
             None if count == 0 => None,
             None => return Err("the .vtu file has a piece without Points".into()),
         };
-        let places = match places {
+        let positions = match positions {
             Some(Array { kind, components: 3, numbers, .. }) if kind.is_real() => numbers,
             None if count == 0 => Kind::F64.none(),
             _ => return Err("the Points of the .vtu file are not three floats each".into()),
@@ -149,7 +149,7 @@ impl Piece {
                 None => left_out.push(node.attribute("Name").unwrap_or("").to_string()),
             }
         }
-        Ok(Self { count, places, arrays, left_out })
+        Ok(Self { count, positions, arrays, left_out })
     }
 
     /// Adds another piece; none where its arrays are others.
@@ -158,12 +158,13 @@ impl Piece {
             |(a, b): (&Array, &Array)| a.name == b.name && a.kind == b.kind && a.components == b.components;
         let has_all =
             self.arrays.len() == other.arrays.len() && self.arrays.iter().zip(&other.arrays).all(is_alike);
-        let is_of_one_kind = std::mem::discriminant(&self.places) == std::mem::discriminant(&other.places);
+        let is_of_one_kind =
+            std::mem::discriminant(&self.positions) == std::mem::discriminant(&other.positions);
         if !has_all || !is_of_one_kind {
             return None;
         }
         self.count += other.count;
-        self.places.append(other.places);
+        self.positions.append(other.positions);
         self.arrays.iter_mut().zip(other.arrays).for_each(|(own, other)| own.numbers.append(other.numbers));
         Some(())
     }

@@ -158,7 +158,7 @@ fn unclear(word: &[u8]) -> String {
     )
 }
 
-/// Writes the places of points in binary.
+/// Writes the positions of points in binary.
 pub(in crate::io) fn write(out: &mut dyn Write, points: &Points) -> std::io::Result<()> {
     if points.count() == 0 {
         // A file without a byte is one that was cut.

@@ -16,7 +16,7 @@ use primvars::Primvar;
 pub struct MeshFrame<'a> {
     /// Name of its prim: see [`prim_name`].
     pub name: &'a str,
-    /// Places (m).
+    /// Positions (m).
     pub points: &'a [Vec3],
     /// Velocities (m/s) over the coming frame, one a point; of a mesh that is another one at each frame none.
     pub velocities: &'a [Vec3],
@@ -299,17 +299,18 @@ const ATTRIBUTES: [(&str, &str); 5] = [
 
 const VELOCITIES: &str = "velocities";
 
-/// Texture coordinates: the places, and where there are seams an index for each corner.
-const PLACES: &str = "texCoord2f[] primvars:st";
-const PLACE_INDICES: &str = "int[] primvars:st:indices";
+/// Texture coordinates: the positions, and where there are seams an index for each corner.
+const POSITIONS: &str = "texCoord2f[] primvars:st";
+const POSITION_INDICES: &str = "int[] primvars:st:indices";
 
 /// Says what the values of texture coordinates, elsewhere, belong to: the vertices, or the corners of faces.
 fn declare_uvs(out: &mut String, indent: &str, uvs: Option<&Uvs>) {
     let Some(uvs) = uvs else { return };
     let interpolation = if uvs.corners.is_some() { "faceVarying" } else { "vertex" };
-    let _ = write!(out, "{indent}{PLACES} (\n{indent}    interpolation = \"{interpolation}\"\n{indent})\n");
+    let _ =
+        write!(out, "{indent}{POSITIONS} (\n{indent}    interpolation = \"{interpolation}\"\n{indent})\n");
     if uvs.corners.is_some() {
-        let _ = writeln!(out, "{indent}{PLACE_INDICES}");
+        let _ = writeln!(out, "{indent}{POSITION_INDICES}");
     }
 }
 
@@ -372,15 +373,15 @@ pub fn clip(kind: &str, frame: i32, fps: f64, units: Units, meshes: &[MeshFrame]
         }
         declare_uvs(&mut out, "        ", mesh.uvs);
         if let Some(uvs) = mesh.uvs {
-            let places = list(uvs.places.iter(), |out, [u, v]| {
+            let positions = list(uvs.positions.iter(), |out, [u, v]| {
                 let _ = write!(out, "({u}, {v})");
             });
-            let _ = writeln!(out, "        {PLACES}.timeSamples = {{ {frame}: {places} }}");
+            let _ = writeln!(out, "        {POSITIONS}.timeSamples = {{ {frame}: {positions} }}");
             if let Some(corners) = &uvs.corners {
                 let indices = list(corners.iter(), |out, index| {
                     let _ = write!(out, "{index}");
                 });
-                let _ = writeln!(out, "        {PLACE_INDICES}.timeSamples = {{ {frame}: {indices} }}");
+                let _ = writeln!(out, "        {POSITION_INDICES}.timeSamples = {{ {frame}: {indices} }}");
             }
         }
         primvars::write(&mut out, "        ", frame, mesh.arrays);
@@ -416,9 +417,9 @@ pub(super) fn list<T>(items: impl ExactSizeIterator<Item = T>, write: impl Fn(&m
     out
 }
 
-/// Places as 32-bit floats.
-pub fn to_floats(places: &[DVec3]) -> Vec<Vec3> {
-    places.iter().map(|place| place.cast()).collect()
+/// Positions as 32-bit floats.
+pub fn to_floats(positions: &[DVec3]) -> Vec<Vec3> {
+    positions.iter().map(|position| position.cast()).collect()
 }
 
 #[cfg(test)]

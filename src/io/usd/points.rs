@@ -30,9 +30,9 @@ pub fn frame(name: &str, frame: i32, fps: f64, points: &Points) -> String {
         }
         let _ = writeln!(out, "    {declared}.timeSamples = {{ {frame}: {values} }}");
     };
-    let places: Vec<Vec3> = (0..points.count()).map(|point| points.position(point).cast()).collect();
+    let positions: Vec<Vec3> = (0..points.count()).map(|point| points.position(point).cast()).collect();
     sample(&mut out, EXTENT, None, &list(extent(points, pscale).iter(), |out, p| vector(out, *p)));
-    sample(&mut out, PLACES, None, &list(places.iter(), |out, p| vector(out, (*p).into())));
+    sample(&mut out, POSITIONS, None, &list(positions.iter(), |out, p| vector(out, (*p).into())));
     let velocities = velocities(points);
     for (attribute, (declared, interpolation)) in points.attributes.iter().zip(declarations(points)) {
         let each = 0..points.count();
@@ -56,7 +56,7 @@ pub fn frame(name: &str, frame: i32, fps: f64, points: &Points) -> String {
 
 /// What [`frame`] writes of points with these attributes, without values: for what is over them in a stage.
 pub(in crate::io) fn declared(points: &Points, indent: &str) -> String {
-    let mut out = format!("{indent}{EXTENT}\n{indent}{PLACES}\n");
+    let mut out = format!("{indent}{EXTENT}\n{indent}{POSITIONS}\n");
     for (declared, interpolation) in declarations(points) {
         let of = interpolation
             .map_or(String::new(), |word| format!(" (\n{indent}    interpolation = \"{word}\"\n{indent})"));
@@ -66,7 +66,7 @@ pub(in crate::io) fn declared(points: &Points, indent: &str) -> String {
 }
 
 const EXTENT: &str = "float3[] extent";
-const PLACES: &str = "point3f[] points";
+const POSITIONS: &str = "point3f[] points";
 
 /// Type and name of each attribute, and its interpolation where that is not known from the name; no name is there twice.
 fn declarations(points: &Points) -> Vec<(String, Option<&'static str>)> {

@@ -1,7 +1,7 @@
 //! What a mesh carries, on what became of it.
 //!
-//! Vertices and triangles that are still there keep their numbers bit for bit. What was made takes those of a place on the old mesh: a
-//! vertex of the nearest one, the corners of a triangle all of places on one old triangle, its chart, so that none lies across a seam.
+//! Vertices and triangles that are still there keep their numbers bit for bit. What was made takes those of a position on the old mesh: a
+//! vertex of the nearest one, the corners of a triangle all of positions on one old triangle, its chart, so that none lies across a seam.
 //! Where it is known where the liquid was at the first frame, that frame's mesh is asked first (`attributes/traced.rs`).
 
 mod texture;
@@ -24,8 +24,8 @@ pub(super) const GRAIN: usize = 1024;
 /// triangles `sources` says where they come from.
 ///
 /// Vertices that were there keep their numbers, and so do triangles that are [`Source::Whole`], with their corners. The corners of a
-/// [`Source::Part`] take what there is at their places in the triangle that it is a part of, those of a [`Source::New`] at the nearest
-/// places on the old triangle that is nearest to its middle; made vertices at the nearest place on the old mesh. There floats are
+/// [`Source::Part`] take what there is at their positions in the triangle that it is a part of, those of a [`Source::New`] at the nearest
+/// positions on the old triangle that is nearest to its middle; made vertices at the nearest position on the old mesh. There floats are
 /// interpolated, and colours in 8-bit integers (`red`, `green`, `blue`, `alpha`); other integers are those of the nearest corner.
 /// Where vertices with different texture coordinates were joined, the corners have coordinates then. Of other arrays of vertices that
 /// were joined the first one's number stays.
@@ -69,7 +69,7 @@ fn of_old(
     DetailedMesh { mesh, uvs, arrays }
 }
 
-/// The same of a mesh that carries the mask of what was made alone: that needs no places.
+/// The same of a mesh that carries the mask of what was made alone: that needs no positions.
 fn of_mask(mask: &MeshArray, mesh: TriMesh, sources: &[Source]) -> DetailedMesh {
     let value = |source: &Source| match *source {
         Source::Whole(triangle) | Source::Part(triangle) => mask.values[triangle as usize],
@@ -94,7 +94,7 @@ fn of_nothing(detail: &DetailedMesh, mesh: TriMesh) -> DetailedMesh {
 enum Origin {
     /// A vertex of the old mesh.
     Vertex(u32),
-    /// A place on a triangle of the old mesh.
+    /// A position on a triangle of the old mesh.
     Place(usize, Weights),
 }
 
@@ -104,7 +104,7 @@ struct Origins<'a> {
     old: &'a [[u32; 3]],
     /// Of each vertex.
     vertices: Vec<Origin>,
-    /// Of each triangle: its chart, a triangle of the old mesh, and the places of its corners there.
+    /// Of each triangle: its chart, a triangle of the old mesh, and the positions of its corners there.
     triangles: Vec<(usize, [Weights; 3])>,
 }
 
@@ -167,16 +167,16 @@ impl<'a> Origins<'a> {
     /// Texture coordinates, for these triangles of the new mesh with their sources.
     fn uvs(&self, uvs: &Uvs, triangles: &[[u32; 3]], sources: &[Source], is_tracked: bool) -> Uvs {
         if uvs.corners.is_none() && (is_tracked || !self.joins_seams(uvs, triangles)) {
-            let place = |origin: &Origin| match origin {
-                Origin::Vertex(vertex) => uvs.places[*vertex as usize],
+            let position = |origin: &Origin| match origin {
+                Origin::Vertex(vertex) => uvs.positions[*vertex as usize],
                 Origin::Place(triangle, weights) => {
-                    between(self.old[*triangle].map(|vertex| uvs.places[vertex as usize]), weights)
+                    between(self.old[*triangle].map(|vertex| uvs.positions[vertex as usize]), weights)
                 }
             };
-            let places = self.vertices.iter().map(place).collect();
-            return Uvs { places, corners: None, missing: uvs.missing };
+            let positions = self.vertices.iter().map(position).collect();
+            return Uvs { positions, corners: None, missing: uvs.missing };
         }
-        let mut places = uvs.places.clone();
+        let mut positions = uvs.positions.clone();
         let mut corners = Vec::with_capacity(3 * self.triangles.len());
         let mut beside = self.beside(uvs, triangles, sources).into_iter().peekable();
         for (chart, weights) in &self.triangles {
@@ -188,12 +188,12 @@ impl<'a> Origins<'a> {
                 } else if weights[most] == 1.0 {
                     corners.push(own[most]);
                 } else {
-                    corners.push(places.len() as u32);
-                    places.push(between(own.map(|index| uvs.places[index as usize]), weights));
+                    corners.push(positions.len() as u32);
+                    positions.push(between(own.map(|index| uvs.positions[index as usize]), weights));
                 }
             }
         }
-        Uvs { places, corners: Some(corners), missing: uvs.missing }
+        Uvs { positions, corners: Some(corners), missing: uvs.missing }
     }
 
     /// The vertex of the old mesh that one of the new mesh is.
@@ -252,11 +252,11 @@ impl<'a> Origins<'a> {
 
     /// Whether a vertex is several of the old mesh that had different texture coordinates.
     fn joins_seams(&self, uvs: &Uvs, triangles: &[[u32; 3]]) -> bool {
-        let place = |vertex: u32| uvs.places[vertex as usize];
+        let position = |vertex: u32| uvs.positions[vertex as usize];
         let is_other = |chart: usize, weights: &Weights, vertex: u32| {
             let most = heaviest(weights);
             let own = self.own(vertex);
-            own.is_some_and(|own| weights[most] == 1.0 && place(self.old[chart][most]) != place(own))
+            own.is_some_and(|own| weights[most] == 1.0 && position(self.old[chart][most]) != position(own))
         };
         self.triangles.iter().zip(triangles).any(|((chart, weights), names)| {
             weights.iter().zip(names).any(|(weights, vertex)| is_other(*chart, weights, *vertex))
@@ -300,8 +300,8 @@ mod tests {
             array("hole", On::Vertices, Number::F64, &[f64::NAN, 1.0, 2.0, 3.0]),
             array("spread", On::Vertices, Number::F64, &[0.0, 1.0, f64::NAN, 3.0]),
         ];
-        let places = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-        let uvs = Uvs { places: places.clone(), corners: None, missing: 2 };
+        let positions = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let uvs = Uvs { positions: positions.clone(), corners: None, missing: 2 };
         let detail = DetailedMesh { mesh: old, uvs: Some(uvs), arrays };
         let carried = carried(&detail, new.clone(), &VERTICES, &SOURCES, None);
         assert_eq!(carried.mesh, new);
@@ -321,19 +321,19 @@ mod tests {
         assert!(spread[2].is_nan() && spread[4].is_nan() && spread[3] == 3.0, "{spread:?}");
         let uvs = carried.uvs.unwrap();
         assert_eq!((uvs.corners, uvs.missing), (None, 2));
-        assert!(uvs.places[..4] == places && uvs.places[4] == [0.5, 1.0], "{:?}", uvs.places);
+        assert!(uvs.positions[..4] == positions && uvs.positions[4] == [0.5, 1.0], "{:?}", uvs.positions);
     }
 
     #[test]
     fn coordinates_with_seams_stay_coordinates_of_corners() {
         let (old, new) = squares();
-        let places: Vec<[f32; 2]> = (0..6u8).map(|n| [f32::from(n), 0.125 * f32::from(n)]).collect();
-        let uvs = Uvs { places: places.clone(), corners: Some((0..6).collect()), missing: 0 };
+        let positions: Vec<[f32; 2]> = (0..6u8).map(|n| [f32::from(n), 0.125 * f32::from(n)]).collect();
+        let uvs = Uvs { positions: positions.clone(), corners: Some((0..6).collect()), missing: 0 };
         let detail = DetailedMesh { mesh: old, uvs: Some(uvs), arrays: Vec::new() };
         let uvs = carried(&detail, new, &VERTICES, &SOURCES, None).uvs.unwrap();
         assert_eq!(uvs.corners.unwrap(), [0, 2, 1, 3, 4, 6, 3, 7, 5]);
-        assert!(uvs.places.starts_with(&places));
-        assert_eq!(uvs.places[6..], [[4.5, 0.5625]; 2]);
+        assert!(uvs.positions.starts_with(&positions));
+        assert_eq!(uvs.positions[6..], [[4.5, 0.5625]; 2]);
     }
 
     #[test]
@@ -349,13 +349,13 @@ mod tests {
         let sources = [Source::Part(2), Source::Part(3), Source::Whole(1)];
         let places: Vec<[f32; 2]> = (0..7u8).map(|n| [f32::from(n), 0.5 * f32::from(n)]).collect();
         let found = |places: &[[f32; 2]], corners| {
-            let uvs = Some(Uvs { places: places.to_vec(), corners, missing: 0 });
+            let uvs = Some(Uvs { positions: places.to_vec(), corners, missing: 0 });
             let detail = DetailedMesh { mesh: old.clone(), uvs, arrays: Vec::new() };
-            let traced = Traced { first: &detail, tree: None, places: &[], spacing: 1.0 };
+            let traced = Traced { first: &detail, tree: None, positions: &[], spacing: 1.0 };
             carried(&detail, new.clone(), &vertices, &sources, Some(&traced)).uvs.unwrap()
         };
         let uvs = found(&places[..6], None);
-        assert_eq!((uvs.places, uvs.corners), (kept.map(|n| places[n]).to_vec(), None));
+        assert_eq!((uvs.positions, uvs.corners), (kept.map(|n| places[n]).to_vec(), None));
         let mut indices = old.triangles.as_flattened().to_vec();
         for has_seam in [false, true] {
             if has_seam {
@@ -365,7 +365,7 @@ mod tests {
             let uvs = found(&places, Some(indices.clone()));
             let first = if has_seam { 6 } else { 0 };
             assert_eq!(
-                (uvs.places, uvs.corners),
+                (uvs.positions, uvs.corners),
                 (places.clone(), Some(vec![first, 2, 5, 0, 5, 4, 0, 4, 3]))
             );
         }
@@ -374,22 +374,23 @@ mod tests {
     #[test]
     fn coordinates_that_no_corner_has_any_more_go_where_nothing_is_traced() {
         let (old, mut new) = squares();
-        let places: Vec<[f32; 2]> = (0..6u8).map(|n| [f32::from(n), 0.125 * f32::from(n)]).collect();
-        let uvs = Some(Uvs { places: places.clone(), corners: Some((0..6).collect()), missing: 0 });
+        let positions: Vec<[f32; 2]> = (0..6u8).map(|n| [f32::from(n), 0.125 * f32::from(n)]).collect();
+        let uvs = Some(Uvs { positions: positions.clone(), corners: Some((0..6).collect()), missing: 0 });
         let first = DetailedMesh { mesh: old, uvs, arrays: Vec::new() };
-        let traced = Traced { first: &first, tree: None, places: &[], spacing: 1.0 };
+        let traced = Traced { first: &first, tree: None, positions: &[], spacing: 1.0 };
         let [mut with, mut without] = [first.clone(), first.clone()];
         for change in 0..3 {
             with = carried(&with, new.clone(), &VERTICES, &SOURCES, Some(&traced));
             without = carried(&without, new.clone(), &VERTICES, &SOURCES, None);
             let (uvs, all) = (with.uvs.as_ref().unwrap(), without.uvs.as_ref().unwrap());
-            assert!(uvs.places.starts_with(&places));
+            assert!(uvs.positions.starts_with(&positions));
             let corners = uvs.corners.as_ref().unwrap();
-            assert!((6..uvs.places.len() as u32).all(|index| corners.contains(&index)), "{corners:?}");
-            assert_eq!(all.places.len() > uvs.places.len(), change > 0);
+            assert!((6..uvs.positions.len() as u32).all(|index| corners.contains(&index)), "{corners:?}");
+            assert_eq!(all.positions.len() > uvs.positions.len(), change > 0);
             for triangle in 0..3 {
-                let of =
-                    |uvs: &Uvs| uvs.indices(&new.triangles, triangle).map(|index| uvs.places[index as usize]);
+                let of = |uvs: &Uvs| {
+                    uvs.indices(&new.triangles, triangle).map(|index| uvs.positions[index as usize])
+                };
                 assert_eq!(of(uvs), of(all));
             }
             // The vertex that was made is made again, a little farther on.
@@ -409,14 +410,14 @@ mod tests {
             if has_seam {
                 places[4] = [7.0, 7.0];
             }
-            let uvs = Some(Uvs { places: places.clone(), corners: None, missing: 0 });
+            let uvs = Some(Uvs { positions: places.clone(), corners: None, missing: 0 });
             let detail = DetailedMesh { mesh: soup.clone(), uvs, arrays: Vec::new() };
             let uvs = carried(&detail, square.clone(), &vertices, &sources, None).uvs.unwrap();
             if has_seam {
-                assert_eq!((uvs.places, uvs.corners), (places, Some(vec![0, 1, 2, 3, 4, 5])));
+                assert_eq!((uvs.positions, uvs.corners), (places, Some(vec![0, 1, 2, 3, 4, 5])));
             } else {
                 let kept = [0, 1, 2, 5].map(|n: usize| places[n]);
-                assert_eq!((&uvs.places[..], uvs.corners), (&kept[..], None));
+                assert_eq!((&uvs.positions[..], uvs.corners), (&kept[..], None));
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Texture coordinates of what was made, from those of the first frame.
 //!
-//! A vertex of charted triangles has a coordinate of its own, that of the place of the first mesh nearest to where the liquid there was,
-//! and the triangles around it share it: on one side of a seam. Where that place lies across a seam from a triangle's chart, its corner
+//! A vertex of charted triangles has a coordinate of its own, that of the position of the first mesh nearest to where the liquid there was,
+//! and the triangles around it share it: on one side of a seam. Where that position lies across a seam from a triangle's chart, its corner
 //! takes the nearest one on the chart.
 //!
 //! Beside triangles that were kept, the mesh and the particles may have drifted apart by a little. There a vertex keeps the coordinate
@@ -15,7 +15,7 @@ use crate::geometry::{TriMesh, Uvs};
 /// A coordinate, or a difference of two.
 type Pair = [f64; 2];
 
-/// Of two places of the first mesh the coordinates are on one side of a seam where they lie no farther apart than so many times what
+/// Of two positions of the first mesh the coordinates are on one side of a seam where they lie no farther apart than so many times what
 /// they change at most, on the triangles of the two, over the way between them.
 const SEAMLESS: f64 = 4.0;
 /// What rounding to 32 bits may make of coordinates that are the same.
@@ -40,7 +40,7 @@ pub(in crate::mesh_repair) fn textured(
 ) {
     if charts.list.is_empty() {
         // What was made has coordinates of the mesh before, and each change adds some.
-        tidy(out, first.places.len());
+        tidy(out, first.positions.len());
         return;
     }
     let texture = Texture::of(charts, first, mesh);
@@ -50,14 +50,14 @@ pub(in crate::mesh_repair) fn textured(
         .map(|slot| near.nearest(slot, out, texture.own[slot], texture.reach[slot]))
         .collect();
     let differences = kept.iter().zip(&texture.own).map(|(kept, own)| {
-        let place = out.places[(*kept)? as usize].map(f64::from);
-        Some([place[0] - own[0], place[1] - own[1]])
+        let position = out.positions[(*kept)? as usize].map(f64::from);
+        Some([position[0] - own[0], position[1] - own[1]])
     });
     let spread = texture.spread(charts, differences.collect());
     let own = |slot: usize| [0, 1].map(|axis| (texture.own[slot][axis] + spread[slot][axis]) as f32);
     if out.corners.is_none() {
         for (slot, name) in charts.names.iter().enumerate().filter(|(slot, _)| !is_kept[*slot]) {
-            out.places[*name as usize] = own(slot);
+            out.positions[*name as usize] = own(slot);
         }
         let is_far = |slot: &usize| is_kept[*slot] && kept[*slot].is_none();
         charts.list.iter_mut().for_each(|chart| chart.is_torn |= chart.slots.iter().any(is_far));
@@ -70,15 +70,15 @@ pub(in crate::mesh_repair) fn textured(
             let found = match corner {
                 Corner::Own => kept[slot].or(made[slot]),
                 Corner::Chart(_) if chart.is_torn => None,
-                Corner::Chart(place) => near.nearest(slot, out, *place, corners.reach),
+                Corner::Chart(position) => near.nearest(slot, out, *position, corners.reach),
             };
             let index = found.unwrap_or_else(|| {
-                let place = match corner {
+                let position = match corner {
                     Corner::Own => own(slot),
-                    Corner::Chart(place) => place.map(|x| x as f32),
+                    Corner::Chart(position) => position.map(|x| x as f32),
                 };
-                out.places.push(place);
-                out.places.len() as u32 - 1
+                out.positions.push(position);
+                out.positions.len() as u32 - 1
             });
             if let Corner::Own = corner {
                 made[slot] = Some(index);
@@ -91,13 +91,13 @@ pub(in crate::mesh_repair) fn textured(
             corners[3 * chart.number..3 * chart.number + 3].copy_from_slice(own);
         }
     }
-    tidy(out, first.places.len());
+    tidy(out, first.positions.len());
 }
 
 /// Takes coordinates away that no corner has, but the first ones.
 fn tidy(uvs: &mut Uvs, first: usize) {
     let Some(corners) = &mut uvs.corners else { return };
-    let mut is_used: Vec<bool> = (0..uvs.places.len()).map(|at| at < first).collect();
+    let mut is_used: Vec<bool> = (0..uvs.positions.len()).map(|at| at < first).collect();
     corners.iter().for_each(|corner| is_used[*corner as usize] = true);
     let mut next = 0;
     let number = |is_used: &bool| {
@@ -107,7 +107,7 @@ fn tidy(uvs: &mut Uvs, first: usize) {
     let numbers: Vec<u32> = is_used.iter().map(number).collect();
     corners.iter_mut().for_each(|corner| *corner = numbers[*corner as usize]);
     let mut marks = is_used.iter();
-    uvs.places.retain(|_| marks.next().copied().unwrap_or_default());
+    uvs.positions.retain(|_| marks.next().copied().unwrap_or_default());
 }
 
 /// Where a corner of a charted triangle has its coordinate from.
@@ -115,7 +115,7 @@ fn tidy(uvs: &mut Uvs, first: usize) {
 enum Corner {
     /// It is its vertex' own.
     Own,
-    /// That at a place on the chart.
+    /// That at a position on the chart.
     Chart(Pair),
 }
 
@@ -140,17 +140,17 @@ impl Texture {
     fn of(charts: &Charts<'_>, first: &Uvs, mesh: &TriMesh) -> Self {
         let triangles = &charts.first.mesh.triangles;
         let at = |triangle: usize, weights: &Weights| -> Pair {
-            let corners = first.indices(triangles, triangle).map(|index| first.places[index as usize]);
+            let corners = first.indices(triangles, triangle).map(|index| first.positions[index as usize]);
             between(corners, weights).map(f64::from)
         };
         let own: Vec<Pair> = charts.spots.iter().map(|spot| at(spot.triangle, &spot.weights)).collect();
         // How much coordinates change at most over a metre of a triangle of the first mesh.
         let rate = |triangle: usize| {
-            let places = charts.first.mesh.corners(triangle);
-            let corners = first.indices(triangles, triangle).map(|index| first.places[index as usize]);
-            let corners = corners.map(|place| place.map(f64::from));
+            let positions = charts.first.mesh.corners(triangle);
+            let corners = first.indices(triangles, triangle).map(|index| first.positions[index as usize]);
+            let corners = corners.map(|position| position.map(f64::from));
             let of_edge = |[a, b]: [usize; 2]| {
-                let length = (places[b] - places[a]).norm();
+                let length = (positions[b] - positions[a]).norm();
                 if length > 0.0 { apart(corners[a], corners[b]) / length } else { 0.0 }
             };
             EDGES.into_iter().map(of_edge).fold(0.0, f64::max)
@@ -161,7 +161,7 @@ impl Texture {
             let corner = |n: usize| {
                 let (slot, weights) = (chart.slots[n], &chart.corners[n]);
                 let there = at(chart.triangle, weights);
-                let way = (charts.place(&charts.spots[slot]) - charts.at(chart.triangle, weights)).norm();
+                let way = (charts.position(&charts.spots[slot]) - charts.at(chart.triangle, weights)).norm();
                 let most = SEAMLESS * of_chart.max(rates[slot]) * way + ROUNDING;
                 let is_own = !chart.is_torn && apart(own[slot], there) <= most;
                 if is_own { (Corner::Own, own[slot]) } else { (Corner::Chart(there), there) }
@@ -240,11 +240,11 @@ impl Around {
         Self(list)
     }
 
-    /// The index of the coordinate of a slot that is nearest to a place, of several the first; none farther away than `reach`.
-    fn nearest(&self, slot: usize, uvs: &Uvs, place: Pair, reach: f64) -> Option<u32> {
+    /// The index of the coordinate of a slot that is nearest to a position, of several the first; none farther away than `reach`.
+    fn nearest(&self, slot: usize, uvs: &Uvs, position: Pair, reach: f64) -> Option<u32> {
         let begin = self.0.partition_point(|(other, _)| *other < slot);
         let own = self.0[begin..].iter().take_while(|(other, _)| *other == slot);
-        let far = |index: u32| apart(uvs.places[index as usize].map(f64::from), place);
+        let far = |index: u32| apart(uvs.positions[index as usize].map(f64::from), position);
         let all = own.map(|(_, index)| (far(*index), *index));
         let nearest = all.fold(None, |best: Option<(f64, u32)>, next| match best {
             Some(best) if best.0 <= next.0 => Some(best),

@@ -2,7 +2,7 @@
 //! and splits.
 //!
 //! A made triangle, a *charted* one, has a chart on the first mesh: the triangle there that is nearest to where its middle was.
-//! Liquids that were apart meet in triangles whose corners come from far apart: these are *torn*. They have a place of one of the two,
+//! Liquids that were apart meet in triangles whose corners come from far apart: these are *torn*. They have a position of one of the two,
 //! and are marked.
 
 use rayon::prelude::*;
@@ -22,9 +22,9 @@ const TORN: f64 = 3.0;
 /// Where what was made comes from: what [`carry_attributes`](crate::mesh_repair::carry_attributes) needs for it to take the numbers of the
 /// first frame.
 ///
-/// A made triangle takes them where the places of its three corners are known: its corners those at the places of the first mesh
+/// A made triangle takes them where the positions of its three corners are known: its corners those at the positions of the first mesh
 /// nearest to these, all on one side of a seam, the triangle those of the one that is nearest to its middle. Made vertices of such
-/// triangles alone take those at the nearest place. A vertex that other triangles have too keeps the texture coordinates of these where
+/// triangles alone take those at the nearest position. A vertex that other triangles have too keeps the texture coordinates of these where
 /// they are about the same, and what was made blends into them; where they are not, there is a seam, or, in coordinates of vertices,
 /// the triangle is marked.
 #[derive(Clone, Copy)]
@@ -35,7 +35,7 @@ pub struct Traced<'a> {
     pub tree: Option<&'a NearestTree>,
     /// For each vertex of the new mesh, where the liquid there was at the first frame (m); none where that is not known, and for
     /// vertices that no made triangle has. Empty: of none.
-    pub places: &'a [Option<DVec3>],
+    pub positions: &'a [Option<DVec3>],
     /// Initial distance between particles (m).
     pub spacing: f64,
 }
@@ -96,14 +96,14 @@ pub(in crate::mesh_repair) struct Chart {
     pub number: usize,
     /// Which of the charts' vertices its corners are.
     pub slots: [usize; 3],
-    /// A triangle of the first mesh, and its places that are nearest to where the corners were.
+    /// A triangle of the first mesh, and its positions that are nearest to where the corners were.
     pub triangle: usize,
     pub corners: [Weights; 3],
     /// Whether its corners come from far apart.
     pub is_torn: bool,
 }
 
-/// A place on the first mesh.
+/// A position on the first mesh.
 pub(in crate::mesh_repair) struct Spot {
     pub triangle: usize,
     pub weights: Weights,
@@ -116,16 +116,16 @@ pub(in crate::mesh_repair) struct Charts<'a> {
     pub list: Vec<Chart>,
     /// The vertices of the new mesh that they have, ascending.
     pub names: Vec<u32>,
-    /// For each of these the place of the first mesh nearest to where the liquid there was.
+    /// For each of these the position of the first mesh nearest to where the liquid there was.
     pub spots: Vec<Spot>,
 }
 
 impl<'a> Charts<'a> {
     fn of(traced: &Traced<'a>, mesh: &TriMesh, sources: &[Source]) -> Self {
         let first = traced.first;
-        let place = |vertex: u32| traced.places.get(vertex as usize).copied().flatten();
+        let position = |vertex: u32| traced.positions.get(vertex as usize).copied().flatten();
         let known = |(number, source): (usize, &Source)| {
-            let [a, b, c] = mesh.triangles[number].map(place);
+            let [a, b, c] = mesh.triangles[number].map(position);
             if *source == Source::New { Some((number, [a?, b?, c?])) } else { None }
         };
         let known: Vec<(usize, [DVec3; 3])> = match first.mesh.triangles.is_empty() {
@@ -144,24 +144,24 @@ impl<'a> Charts<'a> {
                 &made
             }
         };
-        let spot = |place: DVec3| {
-            let triangle = tree.nearest(place).map_or(0, |nearest| nearest.triangle);
-            Spot { triangle, weights: weights(&first.mesh.corners(triangle), place) }
+        let spot = |position: DVec3| {
+            let triangle = tree.nearest(position).map_or(0, |nearest| nearest.triangle);
+            Spot { triangle, weights: weights(&first.mesh.corners(triangle), position) }
         };
         out.names = known.iter().flat_map(|(number, _)| mesh.triangles[*number]).collect();
         out.names.sort_unstable();
         out.names.dedup();
-        let of_name = |name: &u32| spot(place(*name).unwrap_or_default());
+        let of_name = |name: &u32| spot(position(*name).unwrap_or_default());
         out.spots = out.names.par_iter().with_min_len(GRAIN).map(of_name).collect();
-        let chart = |(number, places): &(usize, [DVec3; 3])| {
+        let chart = |(number, positions): &(usize, [DVec3; 3])| {
             let slots = mesh.triangles[*number].map(|name| out.slot(name));
             let most = TORN * longest(&mesh.corners(*number)) + traced.spacing;
-            let there = slots.map(|slot| out.place(&out.spots[slot]));
-            let is_torn = longest(places) > most || longest(&there) > most;
-            let middle = (places[0] + places[1] + places[2]) / 3.0;
-            let triangle = spot(if is_torn { nearest_to(middle, places) } else { middle }).triangle;
+            let there = slots.map(|slot| out.position(&out.spots[slot]));
+            let is_torn = longest(positions) > most || longest(&there) > most;
+            let middle = (positions[0] + positions[1] + positions[2]) / 3.0;
+            let triangle = spot(if is_torn { nearest_to(middle, positions) } else { middle }).triangle;
             let corners = first.mesh.corners(triangle);
-            let corners = places.map(|place| weights(&corners, place));
+            let corners = positions.map(|position| weights(&corners, position));
             Chart { number: *number, slots, triangle, corners, is_torn }
         };
         out.list = known.par_iter().with_min_len(GRAIN).map(chart).collect();
@@ -174,11 +174,11 @@ impl<'a> Charts<'a> {
     }
 
     /// Where on the first mesh a spot is (m).
-    pub fn place(&self, spot: &Spot) -> DVec3 {
+    pub fn position(&self, spot: &Spot) -> DVec3 {
         self.at(spot.triangle, &spot.weights)
     }
 
-    /// A place on a triangle of the first mesh (m).
+    /// A position on a triangle of the first mesh (m).
     pub fn at(&self, triangle: usize, weights: &Weights) -> DVec3 {
         let [a, b, c] = self.first.mesh.corners(triangle);
         a * weights[0] + b * weights[1] + c * weights[2]
@@ -238,7 +238,7 @@ pub(in crate::mesh_repair) fn longest([a, b, c]: &[DVec3; 3]) -> f64 {
 
 /// That of some places which is nearest to one, of several the first.
 fn nearest_to(middle: DVec3, [a, b, c]: &[DVec3; 3]) -> DVec3 {
-    let far = |place: &DVec3| (place - middle).norm_squared();
+    let far = |position: &DVec3| (position - middle).norm_squared();
     let nearer = if far(b) < far(a) { b } else { a };
     if far(c) < far(nearer) { *c } else { *nearer }
 }
@@ -261,8 +261,8 @@ mod tests {
     /// A sheet of cells of a metre in two triangles each.
     fn sheet(along: f32) -> TriMesh {
         let on = || 0..=SIDE;
-        let place = |x: usize, y: usize| Vec3::new(x as f32 + along, y as f32, 0.0);
-        let positions = on().flat_map(|x| on().map(move |y| place(x, y))).collect();
+        let position = |x: usize, y: usize| Vec3::new(x as f32 + along, y as f32, 0.0);
+        let positions = on().flat_map(|x| on().map(move |y| position(x, y))).collect();
         let name = |x: usize, y: usize| (x * (SIDE + 1) + y) as u32;
         let cell = |n: usize| {
             let (x, y) = (n / SIDE, n % SIDE);
@@ -284,24 +284,24 @@ mod tests {
     /// The sheet at the first frame, with what it carries.
     fn first(kind: Kind) -> DetailedMesh {
         let mesh = sheet(0.0);
-        let places: Vec<[f32; 2]> = mesh.positions.iter().map(|p| [SCALE * p.x, SCALE * p.y]).collect();
-        let count = places.len() as u32;
-        let beyond: Vec<[f32; 2]> = places.iter().map(|[u, v]| [u + SEAM, *v]).collect();
+        let positions: Vec<[f32; 2]> = mesh.positions.iter().map(|p| [SCALE * p.x, SCALE * p.y]).collect();
+        let count = positions.len() as u32;
+        let beyond: Vec<[f32; 2]> = positions.iter().map(|[u, v]| [u + SEAM, *v]).collect();
         let corner = |names: &[u32; 3]| {
             let is_beyond = names.iter().all(|name| mesh.positions[*name as usize].x >= 4.0);
             names.map(|name| if is_beyond { name + count } else { name })
         };
         let uvs = match kind {
-            Kind::OfVertices => Uvs { places, corners: None, missing: 0 },
+            Kind::OfVertices => Uvs { positions, corners: None, missing: 0 },
             Kind::OfCorners => {
-                Uvs { places, corners: Some(mesh.triangles.as_flattened().to_vec()), missing: 0 }
+                Uvs { positions, corners: Some(mesh.triangles.as_flattened().to_vec()), missing: 0 }
             }
             Kind::WithSeam => {
                 let corners = mesh.triangles.iter().flat_map(corner).collect();
-                Uvs { places: [places, beyond].concat(), corners: Some(corners), missing: 0 }
+                Uvs { positions: [positions, beyond].concat(), corners: Some(corners), missing: 0 }
             }
         };
-        let x = mesh.positions.iter().map(|place| f64::from(place.x)).collect();
+        let x = mesh.positions.iter().map(|position| f64::from(position.x)).collect();
         let numbers = (0..mesh.triangles.len()).map(|triangle| triangle as f64).collect();
         let array = |name: &str, on, values| MeshArray { name: name.into(), on, number: Number::F32, values };
         let arrays = vec![array("x", On::Vertices, x), array("number", On::Faces, numbers)];
@@ -328,22 +328,22 @@ mod tests {
             false => Source::Whole(triangle),
         };
         let sources: Vec<Source> = (0..).zip(&new.triangles).map(source).collect();
-        let place = |place: &Vec3| {
-            let aside = if (place.x - WAY - 4.0).abs() < lost { 8.0 } else { 0.0 };
-            Some(place.cast::<f64>() - DVec3::new(f64::from(WAY) - astray, -aside, 0.0))
+        let position = |position: &Vec3| {
+            let aside = if (position.x - WAY - 4.0).abs() < lost { 8.0 } else { 0.0 };
+            Some(position.cast::<f64>() - DVec3::new(f64::from(WAY) - astray, -aside, 0.0))
         };
-        let places: Vec<Option<DVec3>> = new.positions.iter().map(place).collect();
-        let traced = Traced { first: &first, tree: None, places: &places, spacing: 1.0 };
+        let positions: Vec<Option<DVec3>> = new.positions.iter().map(position).collect();
+        let traced = Traced { first: &first, tree: None, positions: &positions, spacing: 1.0 };
         let out = carried(&old, new, &origins, &sources, Some(&traced));
         (out, sources)
     }
 
-    /// Coordinates of a triangle's corners, and the places of these (m).
+    /// Coordinates of a triangle's corners, and the positions of these (m).
     fn corners(detail: &DetailedMesh, triangle: usize) -> [([f32; 2], Vec3); 3] {
         let uvs = detail.uvs.as_ref().unwrap();
         let indices = uvs.indices(&detail.mesh.triangles, triangle);
         let names = detail.mesh.triangles[triangle];
-        [0, 1, 2].map(|n| (uvs.places[indices[n] as usize], detail.mesh.positions[names[n] as usize]))
+        [0, 1, 2].map(|n| (uvs.positions[indices[n] as usize], detail.mesh.positions[names[n] as usize]))
     }
 
     fn mask(detail: &DetailedMesh) -> &[f64] {
@@ -361,11 +361,11 @@ mod tests {
                 for (triangle, source) in sources.iter().enumerate() {
                     assert_eq!(mask(&out)[triangle], f64::from(u8::from(*source == Source::New)));
                     let names = out.mesh.triangles[triangle];
-                    for (name, ([u, v], place)) in names.into_iter().zip(corners(&out, triangle)) {
-                        let off = (u - SCALE * (place.x - WAY)).abs().max((v - SCALE * place.y).abs());
+                    for (name, ([u, v], position)) in names.into_iter().zip(corners(&out, triangle)) {
+                        let off = (u - SCALE * (position.x - WAY)).abs().max((v - SCALE * position.y).abs());
                         // Away from what is kept the particles' own texture counts more and more.
                         let most = if *source == Source::New { SCALE * astray as f32 } else { 0.0 };
-                        assert!(off < most + 1e-5, "{triangle}, {source:?}: {u} {v} at {place}");
+                        assert!(off < most + 1e-5, "{triangle}, {source:?}: {u} {v} at {position}");
                         if name as usize == middle {
                             // Two edges from the rim 0.475 of the difference there is left.
                             let wanted = 0.525 * most;
@@ -376,12 +376,12 @@ mod tests {
                 }
                 assert_eq!(corners_there, 6);
                 let [x, number] = [0, 1].map(|n: usize| &out.arrays[n].values);
-                for (vertex, place) in out.mesh.positions.iter().enumerate() {
-                    let wanted = f64::from(place.x - WAY) + if is_made(vertex) { astray } else { 0.0 };
+                for (vertex, position) in out.mesh.positions.iter().enumerate() {
+                    let wanted = f64::from(position.x - WAY) + if is_made(vertex) { astray } else { 0.0 };
                     assert!((x[vertex] - wanted).abs() < 1e-4, "{vertex}: {} {wanted}", x[vertex]);
                 }
                 assert!((0..sources.len()).all(|n| astray > 0.0 || (number[n] - n as f64).abs() < 40.0));
-                let made = out.uvs.as_ref().unwrap().places.len() - (SIDE + 1) * (SIDE + 1);
+                let made = out.uvs.as_ref().unwrap().positions.len() - (SIDE + 1) * (SIDE + 1);
                 assert_eq!(made, if kind == Kind::OfVertices { 0 } else { 9 });
             }
         }
@@ -416,8 +416,11 @@ mod tests {
                     continue;
                 }
                 let by = if is_new { astray as f32 } else { 0.0 };
-                for ([u, _], place) in corners(&out, triangle) {
-                    assert!((u - SCALE * (place.x - WAY + by)).abs() < 1e-5, "{triangle}: {u} at {place}");
+                for ([u, _], position) in corners(&out, triangle) {
+                    assert!(
+                        (u - SCALE * (position.x - WAY + by)).abs() < 1e-5,
+                        "{triangle}: {u} at {position}"
+                    );
                 }
             }
         }
@@ -426,11 +429,11 @@ mod tests {
     #[test]
     fn triangles_of_liquids_that_were_apart_are_marked_and_not_smeared() {
         let (out, sources) = after(Kind::OfCorners, 0.0, 0.6);
-        let is_lost = |place: &Vec3| (place.x - WAY - 4.0).abs() < 0.6;
+        let is_lost = |position: &Vec3| (position.x - WAY - 4.0).abs() < 0.6;
         let mut torn = 0;
         for (triangle, source) in sources.iter().enumerate().filter(|(_, source)| **source == Source::New) {
             let corners = corners(&out, triangle);
-            let lost = corners.iter().filter(|(_, place)| is_lost(place)).count();
+            let lost = corners.iter().filter(|(_, position)| is_lost(position)).count();
             let is_torn = lost % 3 != 0;
             torn += usize::from(is_torn);
             assert_eq!(mask(&out)[triangle], if is_torn { 2.0 } else { 1.0 }, "{triangle}, {source:?}");
@@ -454,7 +457,7 @@ mod tests {
         (sources[0], sources[1], sources[torn]) = (Source::Part(0), Source::New, Source::Part(torn as u32));
         let origins: Vec<Option<u32>> = (0..old.mesh.positions.len() as u32).map(Some).collect();
         // Nothing is known of where the liquid was.
-        let traced = Traced { first: &first, tree: None, places: &[], spacing: 1.0 };
+        let traced = Traced { first: &first, tree: None, positions: &[], spacing: 1.0 };
         let out = carried(&old, old.mesh.clone(), &origins, &sources, Some(&traced));
         let mut wanted = mask(&old).to_vec();
         (wanted[0], wanted[1]) = (1.0, 1.0);

@@ -1,14 +1,14 @@
-//! Numbers at a place on a triangle, from those of its corners.
+//! Numbers at a position on a triangle, from those of its corners.
 
 use crate::geometry::DVec3;
 use crate::geometry::mesh::attributes::{MeshArray, Number};
 
 /// Arrays whose 8-bit integers are shares of a colour: they are interpolated, as floats are.
 const COLOURS: [&str; 4] = ["red", "green", "blue", "alpha"];
-/// A triangle whose first corner has a lesser sine has no face to speak of: its places are those of its edges.
+/// A triangle whose first corner has a lesser sine has no face to speak of: its positions are those of its edges.
 const NEEDLE: f64 = 1e-8;
 
-/// How much the corners of a triangle count at a place on it: 0 or more, 1 in all.
+/// How much the corners of a triangle count at a position on it: 0 or more, 1 in all.
 pub type Weights = [f64; 3];
 
 /// The weights of a corner.
@@ -29,13 +29,13 @@ pub(in crate::mesh_repair) fn heaviest(&[a, b, c]: &Weights) -> usize {
     }
 }
 
-/// The place of a triangle that is nearest to another place (m); where that is a corner's, exactly this corner.
-pub fn weights(corners: &[DVec3; 3], place: DVec3) -> Weights {
-    if let Some(corner) = corners.iter().position(|corner| *corner == place) {
+/// The position of a triangle that is nearest to another position (m); where that is a corner's, exactly this corner.
+pub fn weights(corners: &[DVec3; 3], position: DVec3) -> Weights {
+    if let Some(corner) = corners.iter().position(|corner| *corner == position) {
         return alone(corner);
     }
     let [a, b, c] = corners;
-    let (ab, ac, way) = (b - a, c - a, place - a);
+    let (ab, ac, way) = (b - a, c - a, position - a);
     let normal = ab.cross(&ac);
     let square = normal.norm_squared();
     if square > NEEDLE * NEEDLE * ab.norm_squared() * ac.norm_squared() {
@@ -50,9 +50,9 @@ pub fn weights(corners: &[DVec3; 3], place: DVec3) -> Weights {
     for (from, to) in [(0, 1), (1, 2), (2, 0)] {
         let along = corners[to] - corners[from];
         let square = along.norm_squared();
-        let way = (place - corners[from]).dot(&along);
+        let way = (position - corners[from]).dot(&along);
         let share = if square > 0.0 { (way / square).clamp(0.0, 1.0) } else { 0.0 };
-        let far = (corners[from] + along * share - place).norm_squared();
+        let far = (corners[from] + along * share - position).norm_squared();
         if far < best.0 {
             let mut weights = [0.0; 3];
             weights[from] = 1.0 - share;
@@ -63,7 +63,7 @@ pub fn weights(corners: &[DVec3; 3], place: DVec3) -> Weights {
     best.1
 }
 
-/// An array's number at a place, from those of the corners.
+/// An array's number at a position, from those of the corners.
 pub(in crate::mesh_repair) fn blended(array: &MeshArray, numbers: [f64; 3], weights: &Weights) -> f64 {
     let most = heaviest(weights);
     if weights[most] == 1.0 {
@@ -77,9 +77,9 @@ pub(in crate::mesh_repair) fn blended(array: &MeshArray, numbers: [f64; 3], weig
     }
 }
 
-/// Texture coordinates at a place, from those of the corners.
-pub(in crate::mesh_repair) fn between(places: [[f32; 2]; 3], weights: &Weights) -> [f32; 2] {
-    [0, 1].map(|axis| mean(places.map(|place| f64::from(place[axis])), weights) as f32)
+/// Texture coordinates at a position, from those of the corners.
+pub(in crate::mesh_repair) fn between(positions: [[f32; 2]; 3], weights: &Weights) -> [f32; 2] {
+    [0, 1].map(|axis| mean(positions.map(|position| f64::from(position[axis])), weights) as f32)
 }
 
 /// The mean of three numbers: any of them where all are the same, and without those that do not count at all.
@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_nearest_place_of_any_triangle_has_weights() {
+    fn the_nearest_position_of_any_triangle_has_weights() {
         let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
         let triangles = [
             [at(0.0, 0.0, 0.0), at(2.0, 0.1, 0.0), at(0.3, 1.5, 0.7)],
@@ -108,15 +108,15 @@ mod tests {
             let there = |weights: &Weights| -> DVec3 {
                 corners.iter().zip(weights).map(|(corner, weight)| corner * *weight).sum()
             };
-            for place in (0..216).map(|n| at(steps(n % 6), steps(n / 6 % 6), steps(n / 36))) {
-                let found = weights(corners, place);
+            for position in (0..216).map(|n| at(steps(n % 6), steps(n / 6 % 6), steps(n / 36))) {
+                let found = weights(corners, position);
                 assert!(found.iter().all(|weight| (0.0..=1.0).contains(weight)), "{found:?}");
                 assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{found:?}");
-                let far = (there(&found) - place).norm();
+                let far = (there(&found) - position).norm();
                 for n in 0..121 {
                     let [b, c] = [n % 11, n / 11].map(|n| f64::from(n) / 10.0);
-                    let other = (there(&[1.0 - b - c, b, c]) - place).norm();
-                    assert!(b + c > 1.0 || far <= other + 1e-9, "{corners:?} {place}: {far} {other}");
+                    let other = (there(&[1.0 - b - c, b, c]) - position).norm();
+                    assert!(b + c > 1.0 || far <= other + 1e-9, "{corners:?} {position}: {far} {other}");
                 }
             }
             (0..3).for_each(|n| assert_eq!(there(&weights(corners, corners[n])), corners[n]));

@@ -8,10 +8,10 @@ use crate::geometry::DVec3;
 use crate::mesh_repair::Source;
 use crate::mesh_repair::fill::Fill;
 
-/// A mesh that is being rebuilt; places in cells.
+/// A mesh that is being rebuilt; positions in cells.
 pub struct Draft {
-    /// Places of the vertices (cells): those of the mesh first, then those that were made.
-    pub places: Vec<DVec3>,
+    /// Positions of the vertices (cells): those of the mesh first, then those that were made.
+    pub positions: Vec<DVec3>,
     /// Which vertices were made here; the others are the mesh's own, and stay.
     pub is_made: Vec<bool>,
     /// Counter-clockwise seen from outside.
@@ -20,13 +20,13 @@ pub struct Draft {
     pub sources: Vec<Source>,
 }
 
-/// Joins the parts of a mesh, whose own vertices have these places (cells).
+/// Joins the parts of a mesh, whose own vertices have these positions (cells).
 ///
 /// # Errors
-/// [`Trouble`] without cells, where a point has no place.
+/// [`Trouble`] without cells, where a point has no position.
 pub fn sewn(shape: &Shape, own: &[DVec3], cut: &Cut, fill: &Fill) -> Result<Draft, Trouble> {
     let mut draft = Draft {
-        places: own.to_vec(),
+        positions: own.to_vec(),
         is_made: vec![false; own.len()],
         triangles: cut.whole.iter().map(|triangle| shape.triangles[*triangle as usize]).collect(),
         sources: cut.whole.iter().map(|triangle| Source::Whole(*triangle)).collect(),
@@ -39,9 +39,9 @@ pub fn sewn(shape: &Shape, own: &[DVec3], cut: &Cut, fill: &Fill) -> Result<Draf
         if let Some(number) = numbers.get(&point) {
             return Ok(*number);
         }
-        let place = place(shape, fill, point).ok_or_else(|| Trouble(Vec::new()))?;
-        let number = draft.places.len() as u32;
-        draft.places.push(place);
+        let position = position(shape, fill, point).ok_or_else(|| Trouble(Vec::new()))?;
+        let number = draft.positions.len() as u32;
+        draft.positions.push(position);
         draft.is_made.push(true);
         numbers.insert(point, number);
         Ok(number)
@@ -59,34 +59,34 @@ pub fn sewn(shape: &Shape, own: &[DVec3], cut: &Cut, fill: &Fill) -> Result<Draf
     Ok(draft)
 }
 
-fn place(shape: &Shape, fill: &Fill, point: Point) -> Option<DVec3> {
+fn position(shape: &Shape, fill: &Fill, point: Point) -> Option<DVec3> {
     match point {
         Point::OnGrid(edge) => on_grid(fill, edge),
         Point::Middle(..) => {
             let at = fill.middles.binary_search_by(|(middle, _)| middle.cmp(&point)).ok()?;
             let ring = &fill.middles[at].1;
-            let places: Vec<DVec3> = ring
+            let positions: Vec<DVec3> = ring
                 .iter()
                 .map(|point| match point {
                     Point::OnGrid(edge) => on_grid(fill, *edge),
-                    other => shape.place(*other),
+                    other => shape.position(*other),
                 })
                 .collect::<Option<_>>()?;
             // By lengths: many points that lie close together draw it to them no more than few.
-            let next = places.iter().cycle().skip(1);
-            let (sum, all) = places.iter().zip(next).fold((DVec3::zeros(), 0.0), |(sum, all), (a, b)| {
+            let next = positions.iter().cycle().skip(1);
+            let (sum, all) = positions.iter().zip(next).fold((DVec3::zeros(), 0.0), |(sum, all), (a, b)| {
                 let length = (b - a).norm();
                 (sum + (a + b) * (0.5 * length), all + length)
             });
-            Some(if all > 0.0 { sum / all } else { places[0] })
+            Some(if all > 0.0 { sum / all } else { positions[0] })
         }
-        other => shape.place(other),
+        other => shape.position(other),
     }
 }
 
 fn on_grid(fill: &Fill, edge: GridEdge) -> Option<DVec3> {
     let at = fill.shares.binary_search_by(|(other, _)| other.cmp(&edge)).ok()?;
-    let mut place = DVec3::from(edge.1.map(f64::from));
-    place[edge.0] += fill.shares[at].1;
-    Some(place)
+    let mut position = DVec3::from(edge.1.map(f64::from));
+    position[edge.0] += fill.shares[at].1;
+    Some(position)
 }

@@ -69,7 +69,7 @@ pub fn cell_of([x, y, z]: Fixed) -> Coord {
     [(x - 1).div_euclid(UNITS), (y - 1).div_euclid(UNITS), z.div_euclid(UNITS)]
 }
 
-/// A place in cells.
+/// A position in cells.
 pub fn to_cells(fixed: Fixed) -> DVec3 {
     DVec3::from(fixed.map(|x| f64::from(x) / f64::from(UNITS)))
 }
@@ -126,9 +126,9 @@ pub fn passages(a: Fixed, b: Fixed) -> Option<Vec<Passage>> {
 pub fn on_edge([p, q]: [Fixed; 2], axis: usize, plane: i32) -> DVec3 {
     let share = (f64::from(plane) * f64::from(UNITS) - f64::from(p[axis]))
         / (f64::from(q[axis]) - f64::from(p[axis]));
-    let mut place = to_cells(p) + (to_cells(q) - to_cells(p)) * share.clamp(0.0, 1.0);
-    place[axis] = f64::from(plane);
-    place
+    let mut position = to_cells(p) + (to_cells(q) - to_cells(p)) * share.clamp(0.0, 1.0);
+    position[axis] = f64::from(plane);
+    position
 }
 
 /// The way along which a triangle meets a face of the grid: two points, and the face.
@@ -150,7 +150,7 @@ pub struct Traced {
     pub segments: Vec<Segment>,
 }
 
-/// Traces a triangle with a number, vertices and their places, which passes through these edges of the grid, ascending. None where that does
+/// Traces a triangle with a number, vertices and their positions, which passes through these edges of the grid, ascending. None where that does
 /// not fit together: the triangle has no area on the lattice in some view, or the edges are not all of them.
 pub fn trace(number: u32, names: [u32; 3], v: [Fixed; 3], pierced: &[GridEdge]) -> Option<Traced> {
     let mut traced = Traced { cells: v.map(cell_of), ..Traced::default() };

@@ -26,7 +26,7 @@ const FEW: i64 = 64;
 
 /// A closed mesh on the lattice.
 pub struct Shape {
-    /// Places of the vertices.
+    /// Positions of the vertices.
     pub fixed: Vec<Fixed>,
     /// Counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
@@ -49,8 +49,8 @@ pub struct Cut {
 pub struct Trouble(pub Vec<Coord>);
 
 impl Shape {
-    /// The place of a point that lies on the mesh (cells).
-    pub fn place(&self, point: Point) -> Option<DVec3> {
+    /// The position of a point that lies on the mesh (cells).
+    pub fn position(&self, point: Point) -> Option<DVec3> {
         match point {
             Point::Vertex(vertex) => Some(to_cells(self.fixed[vertex as usize])),
             Point::OnEdge(ends, axis, plane) => {
@@ -59,9 +59,9 @@ impl Shape {
             Point::OnTriangle(triangle, (axis, node)) => {
                 let pierce =
                     self.pierces.on((axis, node)).iter().find(|pierce| pierce.triangle == triangle)?;
-                let mut place = DVec3::from(node.map(f64::from));
-                place[axis] += pierce.share;
-                Some(place)
+                let mut position = DVec3::from(node.map(f64::from));
+                position[axis] += pierce.share;
+                Some(position)
             }
             Point::OnGrid(_) | Point::Middle(..) => None,
         }

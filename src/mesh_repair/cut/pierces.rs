@@ -28,7 +28,7 @@ pub struct Pierce {
 
 /// All passages of a closed mesh through edges of the grid.
 pub struct Pierces {
-    /// Keys of edges, ascending; within an edge in the order of places.
+    /// Keys of edges, ascending; within an edge in the order of positions.
     keys: Vec<u64>,
     items: Vec<Pierce>,
     /// `start[t]..start[t + 1]` are those of triangle t in `edges`, ascending.

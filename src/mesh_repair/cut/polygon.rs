@@ -13,7 +13,7 @@ type Corner = (Point, [f64; 2]);
 
 /// Triangles of the part of a triangle that these sides bound, to their left. None where the sides do not join.
 pub fn polygons(shape: &Shape, triangle: u32, halves: Vec<Half>) -> Option<Vec<[Point; 3]>> {
-    let [a, b, c] = shape.triangles[triangle as usize].map(|name| shape.place(Point::Vertex(name)));
+    let [a, b, c] = shape.triangles[triangle as usize].map(|name| shape.position(Point::Vertex(name)));
     let [a, b, c] = [a?, b?, c?];
     let normal = (b - a).cross(&(c - a));
     let along = normal.iamax();
@@ -25,7 +25,9 @@ pub fn polygons(shape: &Shape, triangle: u32, halves: Vec<Half>) -> Option<Vec<[
     let mut outer: Vec<Vec<Corner>> = Vec::new();
     let mut holes: Vec<Vec<Corner>> = Vec::new();
     for ring in rings(halves)? {
-        let seen = |point: Point| shape.place(point).map(|place| (point, [place[x] - a[x], place[y] - a[y]]));
+        let seen = |point: Point| {
+            shape.position(point).map(|position| (point, [position[x] - a[x], position[y] - a[y]]))
+        };
         let ring: Vec<Corner> = ring.into_iter().map(seen).collect::<Option<_>>()?;
         // A ring of points within the triangle alone is a hole, or an island.
         let is_within = ring.iter().all(|(point, _)| matches!(point, Point::OnTriangle(..)));

@@ -70,24 +70,24 @@ fn rings(vertices: usize, mut edges: Vec<[u32; 2]>) -> Vec<Vec<u32>> {
     let mut next = begins.clone();
     let mut path: Vec<u32> = Vec::new();
     // Of each vertex how far along the path it is, from 1 on; 0: it is not on it.
-    let mut place = vec![0usize; vertices];
+    let mut position = vec![0usize; vertices];
     for first in 0..vertices {
         while next[first] < begins[first + 1] {
             let mut at = first;
             loop {
-                if place[at] > 0 {
-                    let ring = path.split_off(place[at] - 1);
-                    ring.iter().for_each(|&vertex| place[vertex as usize] = 0);
+                if position[at] > 0 {
+                    let ring = path.split_off(position[at] - 1);
+                    ring.iter().for_each(|&vertex| position[vertex as usize] = 0);
                     out.push(ring);
                     if path.is_empty() {
                         break;
                     }
                 }
                 path.push(at as u32);
-                place[at] = path.len();
+                position[at] = path.len();
                 // An edge that closes a ring goes first, that of the smallest ring before others.
                 let ways = (next[at]..begins[at + 1]).take(WAYS);
-                let way = ways.max_by_key(|&way| place[edges[way][1] as usize]).unwrap_or(next[at]);
+                let way = ways.max_by_key(|&way| position[edges[way][1] as usize]).unwrap_or(next[at]);
                 edges.swap(way, next[at]);
                 let to = edges[next[at]][1];
                 next[at] += 1;
@@ -141,9 +141,9 @@ fn cut(positions: &[Vec3], ring: &[u32], uses: &[Use], made: &BTreeSet<[u32; 2]>
 }
 
 /// Whether the corners of a ring lie near a plane.
-fn is_flat_enough(places: &[DVec3]) -> bool {
-    let middle = places.iter().sum::<DVec3>() / places.len() as f64;
-    let arms: Vec<DVec3> = places.iter().map(|place| place - middle).collect();
+fn is_flat_enough(positions: &[DVec3]) -> bool {
+    let middle = positions.iter().sum::<DVec3>() / positions.len() as f64;
+    let arms: Vec<DVec3> = positions.iter().map(|position| position - middle).collect();
     let next = arms.iter().cycle().skip(1);
     let normal: DVec3 = arms.iter().zip(next).map(|(p, q)| p.cross(q)).sum();
     let radius = arms.iter().map(|arm| arm.norm()).fold(0.0, f64::max);
@@ -151,7 +151,7 @@ fn is_flat_enough(places: &[DVec3]) -> bool {
     normal.try_normalize(0.0).is_none_or(is_near)
 }
 
-/// A ring in triangles around a new vertex at the mean place of its corners.
+/// A ring in triangles around a new vertex at the mean position of its corners.
 fn fan(positions: &mut Vec<Vec3>, ring: &[u32]) -> Vec<[u32; 3]> {
     let sum: DVec3 = ring.iter().map(|&vertex| positions[vertex as usize].cast::<f64>()).sum();
     let middle = positions.len() as u32;

@@ -19,7 +19,7 @@ const NEAR: f64 = 0.02;
 #[derive(Default)]
 pub struct Fill {
     pub triangles: Vec<[Point; 3]>,
-    /// Places of points that are not on the mesh, on edges of the grid, as shares of them; ascending.
+    /// Positions of points that are not on the mesh, on edges of the grid, as shares of them; ascending.
     pub shares: Vec<(GridEdge, f64)>,
     /// The middles of rings, ascending, each with the ring's points.
     pub middles: Vec<(Point, Vec<Point>)>,

@@ -98,11 +98,12 @@ impl Closed {
         }
         let mut names: Vec<u32> = (0..self.positions.len() as u32).collect();
         let named: Vec<u32> = names.iter().copied().filter(|&vertex| is_named[vertex as usize]).collect();
-        let places: Vec<DVec3> = named.iter().map(|&vertex| self.positions[vertex as usize].cast()).collect();
+        let positions: Vec<DVec3> =
+            named.iter().map(|&vertex| self.positions[vertex as usize].cast()).collect();
         let unsound = self.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound);
         let number = |vertex: u32| named.partition_point(|other| *other < vertex) as u32;
         let triangles: Vec<[u32; 3]> = unsound.map(|(triangle, _)| triangle.map(number)).collect();
-        let weld = Weld::of(&places, &triangles);
+        let weld = Weld::of(&positions, &triangles);
         self.prepared.ambiguous_vertices = weld.ambiguous.len();
         for (&vertex, first) in named.iter().zip(weld.firsts) {
             names[vertex as usize] = named[first as usize];
@@ -144,7 +145,7 @@ impl Closed {
         let mut six = vec![0.0f64; parts.len()];
         for (triangle, &part) in self.triangles.iter().zip(parts) {
             let origin: DVec3 = self.positions[self.triangles[part as usize][0] as usize].cast();
-            let [a, b, c] = corners(&self.positions, triangle).map(|place| place - origin);
+            let [a, b, c] = corners(&self.positions, triangle).map(|position| position - origin);
             six[part as usize] += a.dot(&b.cross(&c));
         }
         for (triangle, &part) in self.triangles.iter_mut().zip(parts) {
@@ -298,7 +299,7 @@ pub(super) mod tests {
         let shared = |vertex: u32| [(8, 3), (12, 7)].iter().find(|pair| pair.0 == vertex).map(|pair| pair.1);
         joined.triangles.as_flattened_mut().iter_mut().for_each(|at| *at = shared(*at).unwrap_or(*at));
         assert_eq!(checked(&joined), (joined.clone(), Prepared::default()));
-        // Cubes with a wall at the same place, beside one that is open.
+        // Cubes with a wall at the same position, beside one that is open.
         let mut mesh = both(both(cube(0.0), &cube(1.0)), &cube(5.0));
         mesh.triangles.truncate(34);
         let (out, prepared) = checked(&mesh);

@@ -13,7 +13,7 @@ use crate::mesh_repair::cut::Shape;
 use crate::mesh_repair::cut::exact::{around, beside, cell_of, passages};
 use crate::mesh_repair::prepare::Closed;
 
-/// Pierces so near to each other are at one place (cells).
+/// Pierces so near to each other are at one position (cells).
 const TOGETHER: f64 = 1e-6;
 /// Least altitude of a triangle that closes a hole, over its longest edge.
 const THINNEST: f64 = 4e-4;
@@ -73,7 +73,7 @@ pub fn overlaps(shape: &Shape, depth: f64, set: &mut CellSet) {
         let mut from = 0.0;
         let is_wrong = |winding: i32| !(0..=1).contains(&winding);
         let mut is_deep = false;
-        // Pierces at one place are in no order: only what is before and behind them counts.
+        // Pierces at one position are in no order: only what is before and behind them counts.
         for together in shape.pierces.on(*edge).chunk_by(|a, b| b.share - a.share < TOGETHER) {
             let at = together[0].share;
             is_deep |= is_wrong(winding) && (from == 0.0 || at - from >= depth);

@@ -8,8 +8,8 @@ use crate::mesh_repair::{Draft, Source};
 /// A change of the mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::mesh_repair) enum Change {
-    /// A made vertex goes into a neighbour, which lies at a place (cells) then.
-    Collapse { from: u32, to: u32, place: DVec3 },
+    /// A made vertex goes into a neighbour, which lies at a position (cells) then.
+    Collapse { from: u32, to: u32, position: DVec3 },
     /// Triangles a, b, c and b, a, d become c, a, d and d, b, c.
     Flip { triangles: [u32; 2], corners: [u32; 4] },
 }
@@ -36,7 +36,7 @@ pub(in crate::mesh_repair) struct Fans<'a> {
 impl<'a> Fans<'a> {
     /// Takes a pass over all triangles, and memory for those near created ones.
     pub(in crate::mesh_repair) fn of(draft: &'a mut Draft) -> Self {
-        let mut slots = vec![NONE; draft.places.len()];
+        let mut slots = vec![NONE; draft.positions.len()];
         let mut count = 0;
         for (corners, source) in draft.triangles.iter().zip(&draft.sources) {
             if matches!(source, Source::Whole(_)) {
@@ -72,9 +72,9 @@ impl<'a> Fans<'a> {
         self.draft.triangles[triangle as usize]
     }
 
-    /// The place of a vertex (cells).
-    pub(in crate::mesh_repair) fn place(&self, vertex: u32) -> DVec3 {
-        self.draft.places[vertex as usize]
+    /// The position of a vertex (cells).
+    pub(in crate::mesh_repair) fn position(&self, vertex: u32) -> DVec3 {
+        self.draft.positions[vertex as usize]
     }
 
     fn source(&self, triangle: u32) -> Source {
@@ -111,15 +111,15 @@ impl<'a> Fans<'a> {
             let [a, b, c] = [0, 1, 2].map(|n| corners[(first + n) % 3]);
             let [a_is_made, b_is_made] = [a, b].map(|vertex| self.is_made(vertex));
             if (a_is_made || b_is_made) && self.may_join(a, b) {
-                let [at_a, at_b] = [a, b].map(|vertex| self.place(vertex));
+                let [at_a, at_b] = [a, b].map(|vertex| self.position(vertex));
                 if a_is_made {
-                    out.push(Change::Collapse { from: a, to: b, place: at_b });
+                    out.push(Change::Collapse { from: a, to: b, position: at_b });
                 }
                 if b_is_made {
-                    out.push(Change::Collapse { from: b, to: a, place: at_a });
+                    out.push(Change::Collapse { from: b, to: a, position: at_a });
                 }
                 if a_is_made && b_is_made {
-                    out.push(Change::Collapse { from: a, to: b, place: (at_a + at_b) / 2.0 });
+                    out.push(Change::Collapse { from: a, to: b, position: (at_a + at_b) / 2.0 });
                 }
             }
             out.extend(self.flip(triangle, [a, b, c]));
@@ -150,9 +150,9 @@ impl<'a> Fans<'a> {
         &self,
         from: u32,
         to: u32,
-        place: DVec3,
+        position: DVec3,
     ) -> impl Iterator<Item = u32> {
-        let around: &[u32] = if place == self.place(to) { &[] } else { self.around(to) };
+        let around: &[u32] = if position == self.position(to) { &[] } else { self.around(to) };
         let others = around.iter().filter(move |&&triangle| !self.corners(triangle).contains(&from));
         self.around(from).iter().chain(others).copied()
     }
@@ -167,7 +167,7 @@ impl<'a> Fans<'a> {
     /// whole ones around the same vertex.
     pub(in crate::mesh_repair) fn make(&mut self, change: Change) -> Vec<u32> {
         match change {
-            Change::Collapse { from, to, place } => self.collapse(from, to, place),
+            Change::Collapse { from, to, position } => self.collapse(from, to, position),
             Change::Flip { triangles: [one, two], corners: [a, b, c, d] } => {
                 let source = if self.are_of_one(&[one, two]) { self.source(one) } else { Source::New };
                 for (triangle, corners) in [one, two].into_iter().zip(flipped([a, b, c, d])) {
@@ -183,14 +183,14 @@ impl<'a> Fans<'a> {
         }
     }
 
-    fn collapse(&mut self, from: u32, to: u32, place: DVec3) -> Vec<u32> {
-        let moving: Vec<u32> = self.moving(from, to, place).collect();
+    fn collapse(&mut self, from: u32, to: u32, position: DVec3) -> Vec<u32> {
+        let moving: Vec<u32> = self.moving(from, to, position).collect();
         // Where nothing moves, or all within one plane, parts stay parts.
-        let stays = place == self.place(from) && place == self.place(to);
+        let stays = position == self.position(from) && position == self.position(to);
         if !stays && !self.are_of_one(&moving) {
             moving.iter().for_each(|&triangle| self.draft.sources[triangle as usize] = Source::New);
         }
-        self.draft.places[to as usize] = place;
+        self.draft.positions[to as usize] = position;
         let fan = self.around_mut(from).map(std::mem::take).unwrap_or_default();
         for triangle in fan {
             let corners = self.corners(triangle);
@@ -224,19 +224,19 @@ impl<'a> Fans<'a> {
         let alive: Vec<usize> = (0..is_dead.len()).filter(|&triangle| !is_dead[triangle]).collect();
         draft.triangles = alive.iter().map(|&triangle| draft.triangles[triangle]).collect();
         draft.sources = alive.iter().map(|&triangle| draft.sources[triangle]).collect();
-        let mut is_named = vec![false; draft.places.len()];
+        let mut is_named = vec![false; draft.positions.len()];
         draft.triangles.as_flattened().iter().for_each(|&corner| is_named[corner as usize] = true);
         let mut numbers = vec![0; is_named.len()];
         let mut kept = 0;
         for vertex in 0..is_named.len() {
             numbers[vertex] = kept as u32;
             if is_named[vertex] || !draft.is_made[vertex] {
-                draft.places[kept] = draft.places[vertex];
+                draft.positions[kept] = draft.positions[vertex];
                 draft.is_made[kept] = draft.is_made[vertex];
                 kept += 1;
             }
         }
-        draft.places.truncate(kept);
+        draft.positions.truncate(kept);
         draft.is_made.truncate(kept);
         for corners in &mut draft.triangles {
             *corners = corners.map(|corner| numbers[corner as usize]);
@@ -257,7 +257,7 @@ pub(in crate::mesh_repair) mod tests {
 
     /// A torus of whole triangles with edges of 0.3 to 0.9 sizes (cells). Triangles 2n and 2n + 1 have their first edge in common.
     pub fn torus(size: f64) -> Draft {
-        let place = |n: u32| {
+        let position = |n: u32| {
             let turn = |n: u32, of: u32| TAU * f64::from(n) / f64::from(of);
             let (u, v) = (turn(n / ACROSS, AROUND), turn(n % ACROSS, ACROSS));
             let far = 6.0 + 2.0 * libm::cos(v);
@@ -270,20 +270,20 @@ pub(in crate::mesh_repair) mod tests {
         };
         let triangles: Vec<[u32; 3]> = (0..AROUND * ACROSS).flat_map(quad).collect();
         Draft {
-            places: (0..AROUND * ACROSS).map(place).collect(),
+            positions: (0..AROUND * ACROSS).map(position).collect(),
             is_made: vec![false; (AROUND * ACROSS) as usize],
             sources: (0..triangles.len() as u32).map(Source::Whole).collect(),
             triangles,
         }
     }
 
-    fn make(draft: &mut Draft, place: DVec3) -> u32 {
-        draft.places.push(place);
+    fn make(draft: &mut Draft, position: DVec3) -> u32 {
+        draft.positions.push(position);
         draft.is_made.push(true);
-        draft.places.len() as u32 - 1
+        draft.positions.len() as u32 - 1
     }
 
-    /// Puts parts of a triangle in its place.
+    /// Puts parts of a triangle in its position.
     fn replace(draft: &mut Draft, triangle: usize, parts: &[[u32; 3]]) {
         let source = match draft.sources[triangle] {
             Source::Whole(of) => Source::Part(of),
@@ -298,7 +298,7 @@ pub(in crate::mesh_repair) mod tests {
     /// Makes a vertex in a triangle, where weights of its corners put it.
     pub fn split(draft: &mut Draft, triangle: usize, weights: [f64; 3]) {
         let [a, b, c] = draft.triangles[triangle];
-        let [p, q, r] = [a, b, c].map(|corner| draft.places[corner as usize]);
+        let [p, q, r] = [a, b, c].map(|corner| draft.positions[corner as usize]);
         let all = weights[0] + weights[1] + weights[2];
         let made = make(draft, (p * weights[0] + q * weights[1] + r * weights[2]) / all);
         replace(draft, triangle, &[[a, b, made], [b, c, made], [c, a, made]]);
@@ -310,7 +310,7 @@ pub(in crate::mesh_repair) mod tests {
         let runs_back = |corners: &[u32; 3]| (0..3).any(|n| corners[n] == b && corners[(n + 1) % 3] == a);
         let beyond = draft.triangles.iter().position(runs_back).unwrap();
         let d = draft.triangles[beyond].into_iter().find(|&corner| corner != a && corner != b).unwrap();
-        let [p, q] = [a, b].map(|corner| draft.places[corner as usize]);
+        let [p, q] = [a, b].map(|corner| draft.positions[corner as usize]);
         let made = make(draft, p + (q - p) * share);
         replace(draft, triangle, &[[a, made, c], [made, b, c]]);
         replace(draft, beyond, &[[b, made, d], [made, a, d]]);
@@ -322,7 +322,7 @@ pub(in crate::mesh_repair) mod tests {
         let tetrahedron = [[6, 8, 7], [6, 7, 9], [7, 8, 9], [8, 6, 9]];
         let source = |n: u32| if n < 4 { Source::New } else { Source::Whole(n) };
         Draft {
-            places: (0..10).map(|vertex| DVec3::repeat(f64::from(vertex))).collect(),
+            positions: (0..10).map(|vertex| DVec3::repeat(f64::from(vertex))).collect(),
             is_made: (0..10).map(|vertex| vertex == 4).collect(),
             triangles: pyramid.into_iter().chain(tetrahedron).collect(),
             sources: (0..10).map(source).collect(),
@@ -348,7 +348,7 @@ pub(in crate::mesh_repair) mod tests {
         // Beside 1 and 4 are 0 and 2 alone.
         assert!(fans.may_join(4, 1) && fans.may_join(4, 3));
         let [a, b, c, d] = [1, 4, 0, 2];
-        let into = Change::Collapse { from: 4, to: 1, place: DVec3::repeat(1.0) };
+        let into = Change::Collapse { from: 4, to: 1, position: DVec3::repeat(1.0) };
         // The edge 0-2 is there already; that from 1 to 3 is not, but 0-1 has a whole triangle beyond.
         assert_eq!(fans.flip(0, [a, b, c]), None);
         let flip = Change::Flip { triangles: [0, 3], corners: [4, 0, 1, 3] };
@@ -364,12 +364,12 @@ pub(in crate::mesh_repair) mod tests {
             let touched = fans.make(fans.changes(0)[change]);
             assert_eq!(touched.len(), [3, 2][change]);
             fans.finish();
-            assert!(Topology::of(draft.places.len(), &draft.triangles).is_watertight());
+            assert!(Topology::of(draft.positions.len(), &draft.triangles).is_watertight());
             // Vertex 5 stays: it was not made.
             let (vertices, triangles) = [(9, 8), (10, 10)][change];
-            assert_eq!((draft.places.len(), draft.triangles.len()), (vertices, triangles));
+            assert_eq!((draft.positions.len(), draft.triangles.len()), (vertices, triangles));
             assert_eq!((draft.is_made.len(), draft.sources.len()), (vertices, triangles));
-            assert_eq!(draft.places[vertices - 1], DVec3::repeat(9.0));
+            assert_eq!(draft.positions[vertices - 1], DVec3::repeat(9.0));
             assert_eq!(draft.triangles[triangles - 1].map(|n| n as usize + 10 - vertices), [8, 6, 9]);
         }
     }

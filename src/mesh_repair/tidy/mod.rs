@@ -1,8 +1,8 @@
 //! Takes slivers out of the triangles that a repair made: pieces of a cut as thin as rounding, points beside vertices or at the same
-//! place, corners almost on the edge opposite. A made vertex goes into a neighbour, or an edge flips ([`editable_mesh`]).
+//! position, corners almost on the edge opposite. A made vertex goes into a neighbour, or an edge flips ([`editable_mesh`]).
 //!
 //! Quality is the altitude of a triangle on its longest edge over that edge, 0.87 at best. Edges shorter than [`SHORT`] count as that
-//! long: triangles among points that all but coincide look well shaped by chance, and are none once their places have 32 bits.
+//! long: triangles among points that all but coincide look well shaped by chance, and are none once their positions have 32 bits.
 
 mod editable_mesh;
 
@@ -101,7 +101,7 @@ fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
 }
 
 /// Altitude of a triangle on its longest edge, over that edge, which counts as `least` (cells) where it is shorter; 0 where all
-/// corners are at one place.
+/// corners are at one position.
 fn altitude(corners: &[DVec3; 3], least: f64) -> f64 {
     let [a, b, c] = corners;
     let square = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
@@ -205,16 +205,16 @@ impl<'a> Tidy<'a> {
     /// Count of created triangles whose least altitude is below [`LEAST`] of their longest edge.
     fn slivers(&self) -> usize {
         let there = self.created.iter().filter(|&&triangle| self.fans.is_created(triangle));
-        there.filter(|&&triangle| altitude(&self.places(triangle), 0.0) < LEAST).count()
+        there.filter(|&&triangle| altitude(&self.positions(triangle), 0.0) < LEAST).count()
     }
 
     /// Whether a triangle was created, is there still, and has less than a quality.
     fn is_below(&self, triangle: u32, bound: f64) -> bool {
-        self.fans.is_created(triangle) && quality(&self.places(triangle)) < bound
+        self.fans.is_created(triangle) && quality(&self.positions(triangle)) < bound
     }
 
-    fn places(&self, triangle: u32) -> [DVec3; 3] {
-        self.fans.corners(triangle).map(|corner| self.fans.place(corner))
+    fn positions(&self, triangle: u32) -> [DVec3; 3] {
+        self.fans.corners(triangle).map(|corner| self.fans.position(corner))
     }
 
     /// The best change that a rule allows for a triangle; of equal ones the first.
@@ -233,8 +233,8 @@ impl<'a> Tidy<'a> {
     /// What comes of a change; none where a rule forbids it.
     fn outcome(&self, change: Change, rule: &Rule) -> Option<Outcome> {
         let far = match change {
-            Change::Collapse { from, place, .. } => (place - self.fans.place(from)).norm(),
-            Change::Flip { corners, .. } => apart(corners.map(|corner| self.fans.place(corner))),
+            Change::Collapse { from, position, .. } => (position - self.fans.position(from)).norm(),
+            Change::Flip { corners, .. } => apart(corners.map(|corner| self.fans.position(corner))),
         };
         let farthest =
             if let Change::Flip { .. } = change { rule.farthest.min(BEVEL) } else { rule.farthest };
@@ -242,7 +242,7 @@ impl<'a> Tidy<'a> {
             return None;
         }
         let [before, after] = match change {
-            Change::Collapse { from, to, place } => self.collapsed(from, to, place, rule)?,
+            Change::Collapse { from, to, position } => self.collapsed(from, to, position, rule)?,
             Change::Flip { triangles, corners } if rule.may_flip => self.flipped(triangles, corners, rule)?,
             Change::Flip { .. } => return None,
         };
@@ -258,19 +258,19 @@ impl<'a> Tidy<'a> {
     }
 
     /// The triangles around a collapse, before and after it.
-    fn collapsed(&self, from: u32, to: u32, place: DVec3, rule: &Rule) -> Option<[Score; 2]> {
+    fn collapsed(&self, from: u32, to: u32, position: DVec3, rule: &Rule) -> Option<[Score; 2]> {
         let [mut before, mut after] = [Score::EMPTY; 2];
-        for triangle in self.fans.moving(from, to, place) {
+        for triangle in self.fans.moving(from, to, position) {
             if !self.fans.is_created(triangle) {
                 return None;
             }
-            let (corners, old) = (self.fans.corners(triangle), self.places(triangle));
+            let (corners, old) = (self.fans.corners(triangle), self.positions(triangle));
             let old_quality = quality(&old);
             before.count(old_quality);
             if corners.contains(&from) && corners.contains(&to) {
                 continue;
             }
-            let moved = |at: u32| if at == from || at == to { place } else { self.fans.place(at) };
+            let moved = |at: u32| if at == from || at == to { position } else { self.fans.position(at) };
             let new = corners.map(moved);
             // Which way a sliver looks says nothing.
             let turns = old_quality >= LEAST && normal(&old).dot(&normal(&new)) <= 0.0;
@@ -287,12 +287,12 @@ impl<'a> Tidy<'a> {
         let [mut before, mut after] = [Score::EMPTY; 2];
         let mut sum = DVec3::zeros();
         for triangle in triangles {
-            let old = self.places(triangle);
+            let old = self.positions(triangle);
             before.count(quality(&old));
             sum += normal(&old);
         }
         for corners in flipped(corners) {
-            let new = corners.map(|corner| self.fans.place(corner));
+            let new = corners.map(|corner| self.fans.position(corner));
             if normal(&new).dot(&sum) <= 0.0 && !rule.may_fold {
                 return None;
             }
@@ -310,13 +310,13 @@ mod tests {
 
     fn is_watertight(draft: &Draft) -> bool {
         let arrays =
-            [(draft.is_made.len(), draft.places.len()), (draft.sources.len(), draft.triangles.len())];
+            [(draft.is_made.len(), draft.positions.len()), (draft.sources.len(), draft.triangles.len())];
         arrays.iter().all(|(one, other)| one == other)
-            && Topology::of(draft.places.len(), &draft.triangles).is_watertight()
+            && Topology::of(draft.positions.len(), &draft.triangles).is_watertight()
     }
 
     fn corners(draft: &Draft, triangle: usize) -> [DVec3; 3] {
-        draft.triangles[triangle].map(|corner| draft.places[corner as usize])
+        draft.triangles[triangle].map(|corner| draft.positions[corner as usize])
     }
 
     fn volume(draft: &Draft) -> f64 {
@@ -331,8 +331,8 @@ mod tests {
     /// less than a share.
     fn tidied(draft: &mut Draft, first: &Draft, share: f64) -> usize {
         let own = |draft: &Draft| -> Vec<DVec3> {
-            let all = draft.places.iter().zip(&draft.is_made);
-            all.filter(|(_, is_made)| !**is_made).map(|(place, _)| *place).collect()
+            let all = draft.positions.iter().zip(&draft.is_made);
+            all.filter(|(_, is_made)| !**is_made).map(|(position, _)| *position).collect()
         };
         let whole = |draft: &Draft| -> Vec<(Source, [DVec3; 3])> {
             let all = (0..draft.triangles.len()).map(|at| (draft.sources[at], corners(draft, at)));
@@ -350,7 +350,7 @@ mod tests {
             if let Source::Part(of) = draft.sources[at] {
                 let plane = corners(first, of as usize);
                 let up = normal(&plane).normalize();
-                let is_in_plane = |place: DVec3| (place - plane[0]).dot(&up).abs() < 1e-9;
+                let is_in_plane = |position: DVec3| (position - plane[0]).dot(&up).abs() < 1e-9;
                 assert!(corners(draft, at).into_iter().all(is_in_plane), "triangle {at} is no part of {of}");
             }
         }
@@ -383,8 +383,8 @@ mod tests {
             (0..30).for_each(|n| split(&mut draft, 20 * n, weights));
             assert_eq!(tidied(&mut draft, &first, 1e-4), 0, "{weights:?}");
             assert_eq!(
-                (draft.places.len(), draft.triangles.len()),
-                (first.places.len(), first.triangles.len())
+                (draft.positions.len(), draft.triangles.len()),
+                (first.positions.len(), first.triangles.len())
             );
             let is_part = |source: &&Source| matches!(source, Source::Part(_));
             assert_eq!(draft.sources.iter().filter(is_part).count(), 30, "{weights:?}");
@@ -407,7 +407,7 @@ mod tests {
         }
         let count = draft.triangles.len();
         assert_eq!(tidied(&mut draft, &first, 1e-4), 0);
-        assert_eq!((draft.places.len(), draft.triangles.len()), (first.places.len() + 60, count));
+        assert_eq!((draft.positions.len(), draft.triangles.len()), (first.positions.len() + 60, count));
         assert_eq!(draft.sources.iter().filter(|source| **source == Source::New).count(), 60);
     }
 
@@ -443,11 +443,11 @@ mod tests {
         let first = torus(1.0);
         for (made, noise) in [(1.0, 0.0), (1.0, 1e-9), (0.7, 1e-9)] {
             let (mut draft, mut random) = (torus(1.0), Random(1));
-            for vertex in 0..draft.places.len() {
+            for vertex in 0..draft.positions.len() {
                 if random.share() < made {
                     draft.is_made[vertex] = true;
-                    draft.places[vertex] =
-                        draft.places[vertex].map(|x| x.round() + noise * (random.share() - 0.5));
+                    draft.positions[vertex] =
+                        draft.positions[vertex].map(|x| x.round() + noise * (random.share() - 0.5));
                 }
             }
             for (corners, source) in draft.triangles.iter().zip(&mut draft.sources) {
@@ -461,16 +461,16 @@ mod tests {
 
     #[test]
     fn the_smallest_bodies_stay_closed() {
-        let body = |places: &[[f64; 3]], triangles: &[[u32; 3]]| Draft {
-            places: places.iter().map(|place| DVec3::from(*place)).collect(),
-            is_made: vec![true; places.len()],
+        let body = |positions: &[[f64; 3]], triangles: &[[u32; 3]]| Draft {
+            positions: positions.iter().map(|position| DVec3::from(*position)).collect(),
+            is_made: vec![true; positions.len()],
             triangles: triangles.to_vec(),
             sources: vec![Source::New; triangles.len()],
         };
         let needle = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1e-9, 0.0], [0.5, 0.0, 1e-9]];
         let mut tetrahedron = body(&needle, &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]);
         assert_eq!(tidy(&mut tetrahedron), 4);
-        assert!(is_watertight(&tetrahedron) && tetrahedron.places.len() == 4);
+        assert!(is_watertight(&tetrahedron) && tetrahedron.positions.len() == 4);
         // Two pyramids, base to base: the tip of one is almost on an edge of the base.
         let flat = [[0.0; 3], [0.4, 0.0, 0.0], [0.2, 0.3, 0.0], [0.2, 1e-9, 1e-9], [0.2, 0.1, -0.1]];
         let sides = [[0, 1, 3], [1, 2, 3], [2, 0, 3], [1, 0, 4], [2, 1, 4], [0, 2, 4]];

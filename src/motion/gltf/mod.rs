@@ -1,7 +1,7 @@
 //! Animated characters in glTF 2.0 files (.gltf, .glb): node animation, skins, morph targets.
 //!
 //! The file's own rules apply (Khronos, glTF 2.0 specification, sections 3.7 and 3.11): a skinned vertex is the weighted sum
-//! of its joints' matrices, its own node's place does not count; rotations are interpolated along the shorter arc.
+//! of its joints' matrices, its own node's position does not count; rotations are interpolated along the shorter arc.
 
 mod clip;
 mod file;
@@ -163,11 +163,11 @@ impl Character {
         let character = Self::open(path, play)?;
         let mut pose = Vec::new();
         character.pose(time, &mut pose)?;
-        let positions = pose.iter().map(|place| place.cast()).collect();
+        let positions = pose.iter().map(|position| position.cast()).collect();
         Ok(TriMesh { positions, triangles: character.triangles().to_vec() })
     }
 
-    /// Names of what a file holds besides places, triangles and motion, in the plural: "UVs", "materials" ...
+    /// Names of what a file holds besides positions, triangles and motion, in the plural: "UVs", "materials" ...
     ///
     /// # Errors
     /// A file that is cut short or malformed.
@@ -206,7 +206,7 @@ impl Character {
         let mut pose = Vec::new();
         rest.pose_at_own(0.0, &mut pose);
         Ok(TriMesh {
-            positions: pose.iter().map(|place| (place - origin).cast()).collect(),
+            positions: pose.iter().map(|position| (position - origin).cast()).collect(),
             triangles: rest.vertices.triangles,
         })
     }
@@ -244,11 +244,11 @@ impl Character {
     }
 
     /// Keeps the positions of vertices that triangles name.
-    fn keep_moving(&self, places: &mut Vec<DVec3>) {
+    fn keep_moving(&self, positions: &mut Vec<DVec3>) {
         if let Some((used, _)) = &self.moving {
             // They ascend: none is overwritten before it is read.
-            used.iter().enumerate().for_each(|(to, &from)| places[to] = places[from as usize]);
-            places.truncate(used.len());
+            used.iter().enumerate().for_each(|(to, &from)| positions[to] = positions[from as usize]);
+            positions.truncate(used.len());
         }
     }
 

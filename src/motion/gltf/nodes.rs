@@ -1,10 +1,10 @@
-//! The tree of nodes: where each one is, from its own place and its parents'.
+//! The tree of nodes: where each one is, from its own position and its parents'.
 
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion};
 
 use crate::geometry::DVec3;
 
-/// A node's own place, which a clip may animate.
+/// A node's own position, which a clip may animate.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Local {
     pub translation: DVec3,

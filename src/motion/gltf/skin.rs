@@ -42,7 +42,7 @@ struct Part {
 /// What a corner of the file is made of: corners that agree in all of it are one vertex.
 #[derive(PartialEq, Eq, Hash)]
 struct Corner {
-    place: [u32; 3],
+    position: [u32; 3],
     joints: Vec<(u32, u32)>,
     deltas: Vec<[u32; 3]>,
 }
@@ -190,16 +190,16 @@ impl Vertices {
         }
         let bits = |p: [f32; 3]| p.map(|value| (value + 0.0).to_bits());
         let mut numbers = Vec::with_capacity(positions.len());
-        for (vertex, &place) in positions.iter().enumerate() {
+        for (vertex, &position) in positions.iter().enumerate() {
             let corner = Corner {
-                place: bits(place),
+                position: bits(position),
                 joints: joints[vertex].iter().map(|&(joint, weight)| (joint, weight.to_bits())).collect(),
                 deltas: targets.iter().map(|target| bits(target[vertex])).collect(),
             };
             let next = (part.first + part.rest.len()) as u32;
             let number = *known.entry(corner).or_insert(next);
             if number == next {
-                part.rest.push(Vec3::from(place).cast());
+                part.rest.push(Vec3::from(position).cast());
                 let at = |target: usize| targets.get(target).map_or([0.0; 3], |target| target[vertex]);
                 part.deltas.iter_mut().enumerate().for_each(|(t, list)| list.push(Vec3::from(at(t)).cast()));
                 let sum: f64 = joints[vertex].iter().map(|&(_, weight)| f64::from(weight)).sum();
@@ -268,15 +268,16 @@ impl Vertices {
             let matrices = part.skin.map_or(&node[..], |skin| &skins[skin]);
             for (vertex, rest) in part.rest.iter().enumerate() {
                 let moved = part.deltas.iter().zip(weights).filter(|(_, weight)| **weight != 0.0);
-                let place = moved.fold(*rest, |place, (deltas, weight)| place + deltas[vertex] * *weight);
-                let place = place.push(1.0);
+                let position =
+                    moved.fold(*rest, |position, (deltas, weight)| position + deltas[vertex] * *weight);
+                let position = position.push(1.0);
                 let span = part.spans[vertex] as usize..part.spans[vertex + 1] as usize;
                 out.push(match &part.influences[span] {
-                    [] => matrices[0] * place,
-                    [(joint, _)] => matrices[*joint as usize] * place,
+                    [] => matrices[0] * position,
+                    [(joint, _)] => matrices[*joint as usize] * position,
                     many => many
                         .iter()
-                        .map(|&(joint, weight)| matrices[joint as usize] * place * weight)
+                        .map(|&(joint, weight)| matrices[joint as usize] * position * weight)
                         .sum::<DVec3>(),
                 });
             }
@@ -299,7 +300,7 @@ impl Sheet {
             self.triangles.push(self.triangles[at].map(|vertex| vertex + by));
         }
         if let Some(uvs) = &mut self.uvs {
-            uvs.places.extend_from_within(vertices.clone());
+            uvs.positions.extend_from_within(vertices.clone());
         }
         for at in vertices {
             self.vertices.push(self.vertices[at] + shift);
@@ -314,8 +315,8 @@ impl Sheet {
         numbers: &[u32],
         triangles: &[[u32; 3]],
     ) -> Result<(), String> {
-        let places = primitive.get(&Semantic::TexCoords(0));
-        let named = [primitive.get(&Semantic::Positions), places.clone()];
+        let positions = primitive.get(&Semantic::TexCoords(0));
+        let named = [primitive.get(&Semantic::Positions), positions.clone()];
         let accessors: Vec<usize> = named.iter().flatten().map(gltf::Accessor::index).collect();
         let is_same = |(others, begin): &&(Vec<usize>, usize)| {
             *others == accessors && self.vertices.get(*begin..*begin + numbers.len()) == Some(numbers)
@@ -325,7 +326,7 @@ impl Sheet {
             None => {
                 let begin = self.vertices.len();
                 self.vertices.extend_from_slice(numbers);
-                self.add_places(file, places, begin)?;
+                self.add_positions(file, positions, begin)?;
                 self.shared.push((accessors, begin));
                 begin
             }
@@ -335,27 +336,27 @@ impl Sheet {
     }
 
     /// Texture coordinates of the vertices from `begin` on: their own ones point down from the top.
-    fn add_places(
+    fn add_positions(
         &mut self,
         file: &File,
-        places: Option<gltf::Accessor>,
+        positions: Option<gltf::Accessor>,
         begin: usize,
     ) -> Result<(), String> {
         let count = self.vertices.len() - begin;
-        let Some(places) = places else {
+        let Some(positions) = positions else {
             if let Some(uvs) = &mut self.uvs {
-                uvs.places.resize(self.vertices.len(), [0.0; 2]);
+                uvs.positions.resize(self.vertices.len(), [0.0; 2]);
                 uvs.missing += count;
             }
             return Ok(());
         };
-        let places = file.rows::<2>(&places)?;
-        if places.len() != count {
+        let positions = file.rows::<2>(&positions)?;
+        if positions.len() != count {
             return Err("has not texture coordinates for every vertex".into());
         }
-        let before = || Uvs { places: vec![[0.0; 2]; begin], corners: None, missing: begin };
+        let before = || Uvs { positions: vec![[0.0; 2]; begin], corners: None, missing: begin };
         let uvs = self.uvs.get_or_insert_with(before);
-        uvs.places.extend(places.into_iter().map(|[u, v]| [u, 1.0 - v]));
+        uvs.positions.extend(positions.into_iter().map(|[u, v]| [u, 1.0 - v]));
         Ok(())
     }
 }

@@ -15,7 +15,7 @@ pub(super) type Told<T> = std::result::Result<T, String>;
 /// Reads a buffer. A file must lie in the model's folder or below: a model is data, and names no other file.
 ///
 /// # Errors
-/// Another place, a missing file, something that is not a regular file, text that is not base64.
+/// Another position, a missing file, something that is not a regular file, text that is not base64.
 pub(super) fn read(
     buffer: &gltf::Buffer,
     folder: &Path,

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::numeric::blocks::{DIM, Mask, Origin, Values, offset};
 
-/// Samples along an edge of a block: its own voxels and the first of the next block, so that every place in the block is
+/// Samples along an edge of a block: its own voxels and the first of the next block, so that every position in the block is
 /// interpolated from its samples alone.
 const EDGE: usize = DIM + 1;
 /// Extinctions (1/m) at the samples of a block; sample (x, y, z) lies at `(x * 9 + y) * 9 + z`.
@@ -31,7 +31,7 @@ const SEEN: f32 = 0.01;
 /// Memory (bytes) of a block with samples of its own while a fog is made: these, twice, and its light.
 const DENSE_BYTES: u64 = 2 * size_of::<Samples>() as u64 + 1500;
 /// Memory (bytes) of any block position while a fog is made.
-const PLACE_BYTES: u64 = 256;
+const POSITION_BYTES: u64 = 256;
 /// No node, or no block.
 const NONE: u32 = u32::MAX;
 
@@ -77,7 +77,7 @@ impl Placement {
         inverse.iter().all(|number| number.is_finite()).then_some(Self { origin, axes, inverse })
     }
 
-    /// World position (m) of a place in voxels.
+    /// World position (m) of a position in voxels.
     pub fn to_world(self, at: DVec3) -> DVec3 {
         self.origin + self.axes * at
     }
@@ -148,23 +148,23 @@ impl Fog {
         const WHAT: &str = "a fog";
         // Of each block, the eight positions in which its samples count.
         ctx.allow(WHAT, 8 * parts.len() as u64 * size_of::<Origin>() as u64)?;
-        let places = ctx.pool().install(|| places(&parts));
-        ctx.allow(WHAT, parts.len() as u64 * PLACE_BYTES + places.len() as u64 * PLACE_BYTES)?;
-        let of_place: HashMap<Origin, Part<'_>> = parts.iter().copied().collect();
-        let dense = places.iter().filter(|place| even_at(**place, &of_place).is_none()).count();
+        let positions = ctx.pool().install(|| positions(&parts));
+        ctx.allow(WHAT, parts.len() as u64 * POSITION_BYTES + positions.len() as u64 * POSITION_BYTES)?;
+        let of_position: HashMap<Origin, Part<'_>> = parts.iter().copied().collect();
+        let dense = positions.iter().filter(|position| even_at(**position, &of_position).is_none()).count();
         let nodes: HashSet<[i32; 3]> =
-            places.iter().map(|place| place.map(|at| at.div_euclid(NODE * DIM as i32))).collect();
+            positions.iter().map(|position| position.map(|at| at.div_euclid(NODE * DIM as i32))).collect();
         let needed = dense as u64 * DENSE_BYTES
-            + places.len() as u64 * PLACE_BYTES
+            + positions.len() as u64 * POSITION_BYTES
             + nodes.len() as u64 * size_of::<[u32; NODE_BLOCKS]>() as u64
             + counts.iter().product::<usize>() as u64 * size_of::<u32>() as u64;
         ctx.allow(WHAT, needed)?;
         let filled: Vec<Option<Filled>> = ctx.pool().install(|| {
-            let fill = |place: &Origin| {
+            let fill = |position: &Origin| {
                 ctx.check()?;
-                Ok(fill(*place, &of_place, extinction))
+                Ok(fill(*position, &of_position, extinction))
             };
-            places.par_iter().map(fill).collect::<Result<_>>()
+            positions.par_iter().map(fill).collect::<Result<_>>()
         })?;
         let mut fog = Self {
             placement,
@@ -180,7 +180,7 @@ impl Fog {
             bounds: None,
         };
         let mut even: HashMap<u32, u32> = HashMap::new();
-        for (place, filled) in places.into_iter().zip(filled) {
+        for (position, filled) in positions.into_iter().zip(filled) {
             let next = fog.samples.len() as u32;
             let samples = match filled {
                 None => continue,
@@ -193,7 +193,7 @@ impl Fog {
                     next
                 }
             };
-            fog.put(FogBlock { origin: place, samples });
+            fog.put(FogBlock { origin: position, samples });
         }
         fog.bounds = fog.find_bounds();
         Ok(fog)
@@ -201,8 +201,8 @@ impl Fog {
 
     /// Adds a block.
     fn put(&mut self, block: FogBlock) {
-        let place = block.origin.map(|at| at.div_euclid(DIM as i32));
-        let (Some(slot), within) = self.slot(place) else { return };
+        let position = block.origin.map(|at| at.div_euclid(DIM as i32));
+        let (Some(slot), within) = self.slot(position) else { return };
         if self.table[slot] == NONE {
             self.table[slot] = self.nodes.len() as u32;
             self.nodes.push(Box::new([NONE; NODE_BLOCKS]));
@@ -212,17 +212,17 @@ impl Fog {
     }
 
     /// Where the node of a block is in the table, none outside of the box, and where the block is in the node.
-    fn slot(&self, place: [i32; 3]) -> (Option<usize>, usize) {
-        let [x, y, z] = [0, 1, 2].map(|axis| i64::from(place[axis].div_euclid(NODE) - self.low[axis]));
+    fn slot(&self, position: [i32; 3]) -> (Option<usize>, usize) {
+        let [x, y, z] = [0, 1, 2].map(|axis| i64::from(position[axis].div_euclid(NODE) - self.low[axis]));
         let inside = [x, y, z].iter().zip(&self.counts).all(|(at, count)| (0..*count as i64).contains(at));
         let slot = (x as usize * self.counts[1] + y as usize) * self.counts[2] + z as usize;
-        let [x, y, z] = place.map(|at| at.rem_euclid(NODE) as usize);
+        let [x, y, z] = position.map(|at| at.rem_euclid(NODE) as usize);
         (inside.then_some(slot), (x * NODE as usize + y) * NODE as usize + z)
     }
 
     /// What is at a block position, in blocks.
-    pub(super) fn look(&self, place: [i32; 3]) -> Look {
-        let (Some(slot), within) = self.slot(place) else { return Look::Outside };
+    pub(super) fn look(&self, position: [i32; 3]) -> Look {
+        let (Some(slot), within) = self.slot(position) else { return Look::Outside };
         match self.table[slot] {
             NONE => Look::EmptyNode,
             node => match self.nodes[node as usize][within] {
@@ -248,7 +248,7 @@ impl Fog {
         self.placement
     }
 
-    /// Extinction (1/m) at a place in a block, in voxels from its least corner, 0 to 8.
+    /// Extinction (1/m) at a position in a block, in voxels from its least corner, 0 to 8.
     #[inline]
     pub(super) fn extinction(&self, block: usize, local: [f32; 3]) -> f32 {
         let samples = &self.samples[self.blocks[block].samples as usize];
@@ -264,7 +264,7 @@ impl Fog {
         near + (far - near) * x
     }
 
-    /// Greatest extinction (1/m) of the samples of a block around a place, less than `reach` voxels away along each axis.
+    /// Greatest extinction (1/m) of the samples of a block around a position, less than `reach` voxels away along each axis.
     pub(super) fn most_near(&self, block: usize, local: [i32; 3], reach: i32) -> f32 {
         let samples = &self.samples[self.blocks[block].samples as usize];
         let [x, y, z] =
@@ -340,37 +340,37 @@ fn node_box(parts: &[(Origin, Part<'_>)]) -> Result<([i32; 3], [usize; 3])> {
 }
 
 /// The block positions in which something may be: those of the parts and those before them, whose last cells end there.
-fn places(parts: &[(Origin, Part<'_>)]) -> Vec<Origin> {
+fn positions(parts: &[(Origin, Part<'_>)]) -> Vec<Origin> {
     let before = |n: usize, origin: &Origin| [0, 1, 2].map(|axis| origin[axis] - (n >> axis & 1) as i32 * 8);
-    let mut places: Vec<Origin> =
+    let mut positions: Vec<Origin> =
         parts.iter().flat_map(|(origin, _)| (0..8).map(move |n| before(n, origin))).collect();
-    places.par_sort_unstable();
-    places.dedup();
-    places
+    positions.par_sort_unstable();
+    positions.dedup();
+    positions
 }
 
 /// The block at a position and those behind it along the axes.
-fn near<'a>(place: Origin, parts: &HashMap<Origin, Part<'a>>) -> [Option<Part<'a>>; 8] {
+fn near<'a>(position: Origin, parts: &HashMap<Origin, Part<'a>>) -> [Option<Part<'a>>; 8] {
     std::array::from_fn(|n| {
-        parts.get(&[0, 1, 2].map(|axis| place[axis] + (n >> axis & 1) as i32 * DIM as i32)).copied()
+        parts.get(&[0, 1, 2].map(|axis| position[axis] + (n >> axis & 1) as i32 * DIM as i32)).copied()
     })
 }
 
 /// The density of all samples of the block at a position; none where they may differ.
-fn even_at(place: Origin, parts: &HashMap<Origin, Part<'_>>) -> Option<f32> {
-    let near = near(place, parts);
+fn even_at(position: Origin, parts: &HashMap<Origin, Part<'_>>) -> Option<f32> {
+    let near = near(position, parts);
     let Some(Part::Even(first)) = near[0] else { return None };
     let is_same = |part: &Option<Part<'_>>| matches!(part, Some(Part::Even(other)) if *other == first);
     near.iter().all(is_same).then_some(first)
 }
 
 /// The samples of the block at a position; none when all are 0.
-fn fill(place: Origin, parts: &HashMap<Origin, Part<'_>>, extinction: f64) -> Option<Filled> {
+fn fill(position: Origin, parts: &HashMap<Origin, Part<'_>>, extinction: f64) -> Option<Filled> {
     let value = |density: f32| (f64::from(density) * extinction).min(MOST_EXTINCTION) as f32;
-    if let Some(density) = even_at(place, parts) {
+    if let Some(density) = even_at(position, parts) {
         return Some(value(density)).filter(|value| *value > 0.0).map(Filled::Even);
     }
-    let near = near(place, parts);
+    let near = near(position, parts);
     let mut samples = Box::new([0.0; EDGE * EDGE * EDGE]);
     for (n, part) in near.iter().enumerate().filter_map(|(n, part)| part.map(|part| (n, part))) {
         // The block itself gives 8 samples along an axis, the next one its first.

@@ -24,7 +24,7 @@ const DARK: f32 = 1.0e-4;
 /// Part of the sky's light that arrives in the thickest fog: it comes from the side, scattered many times.
 const LEAST_SKY: f32 = 0.35;
 
-/// The light at a place, each as a part of what there is in the open, 0 to 1.
+/// The light at a position, each as a part of what there is in the open, 0 to 1.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lit {
     /// Sun that the fogs let through.
@@ -85,7 +85,7 @@ impl<'a> LitFogs<'a> {
         entry(self.fogs, (point, toward)).map_or(1.0, |here| f64::from(self.at(here).sun))
     }
 
-    /// The light at a place.
+    /// The light at a position.
     #[inline]
     pub(super) fn at(&self, here: Here) -> Lit {
         let lattice = &self.lattices[self.of_block[here.fog][here.block] as usize];
@@ -117,11 +117,11 @@ fn lattice(
     // Rays towards the sun start a little off, so that fog on the ground is not in the ground's shade.
     let skin = sun * (SPACING as f64 * of.placement().cell());
     let lit = |n: usize| {
-        let place = [n / (EDGE * EDGE), n / EDGE % EDGE, n % EDGE].map(|at| (at * SPACING) as i32);
-        let point = of.placement().to_world(corner + DVec3::from(place.map(f64::from)));
+        let position = [n / (EDGE * EDGE), n / EDGE % EDGE, n % EDGE].map(|at| (at * SPACING) as i32);
+        let point = of.placement().to_world(corner + DVec3::from(position.map(f64::from)));
         let sun_left = left(fogs, point, sun);
         // Light where there is no fog around is only asked for by [`LitFogs::sunlight`].
-        let is_seen = sun_left > DARK && of.most_near(block, place, SPACING as i32) > 0.0;
+        let is_seen = sun_left > DARK && of.most_near(block, position, SPACING as i32) > 0.0;
         let open = if is_seen && blocked(point + skin, sun) { 0.0 } else { 1.0 };
         Lit { sun: sun_left, open, sky: left(fogs, point, DVec3::y()) }
     };

@@ -136,9 +136,9 @@ mod tests {
 
     /// A slab of density 1 that is 16 voxels thick along x, and 64 wide: from (0, 0, 0) to (16, 64, 64).
     fn slab(ctx: &Context, density: &Values, mask: &Mask) -> Fog {
-        let places = (0..2).flat_map(|x| (0..8).flat_map(move |y| (0..8).map(move |z| [x, y, z])));
+        let positions = (0..2).flat_map(|x| (0..8).flat_map(move |y| (0..8).map(move |z| [x, y, z])));
         let part = |at: [i32; 3]| (at.map(|at| 8 * at), Part::Dense(density, mask));
-        fog(ctx, places.map(part).collect())
+        fog(ctx, positions.map(part).collect())
     }
 
     fn fog(ctx: &Context, parts: Vec<(Origin, Part<'_>)>) -> Fog {
@@ -175,8 +175,8 @@ mod tests {
     fn overlapping_fogs_add_up_and_even_blocks_are_as_others() {
         let ctx = ctx(1);
         let even = |density: f32| {
-            let places = (0..2).flat_map(|x| (0..8).flat_map(move |y| (0..8).map(move |z| [x, y, z])));
-            fog(&ctx, places.map(|at| (at.map(|at| 8 * at), Part::Even(density))).collect())
+            let positions = (0..2).flat_map(|x| (0..8).flat_map(move |y| (0..8).map(move |z| [x, y, z])));
+            fog(&ctx, positions.map(|at| (at.map(|at| 8 * at), Part::Even(density))).collect())
         };
         let one = [even(0.75)];
         let three = [even(0.25), slab(&ctx, &[0.25; 512], &[u64::MAX; 8]), even(0.25)];

@@ -7,11 +7,11 @@ use crate::numeric::blocks::DIM;
 /// A ray on its way through a fog.
 struct Walk<'a> {
     fog: &'a Fog,
-    /// Place at its beginning, in voxels, and voxels per metre along it.
+    /// Position at its beginning, in voxels, and voxels per metre along it.
     origin: DVec3,
     direction: DVec3,
     /// Block position.
-    place: [i32; 3],
+    position: [i32; 3],
     /// Where on the ray (m) it leaves the block through each side.
     sides: [f64; 3],
     /// Where it is (m), and where it ends.
@@ -49,7 +49,8 @@ impl<'a> Walk<'a> {
         if enter >= leave || low == high {
             return None;
         }
-        let mut walk = Self { fog, origin, direction, place: [0; 3], sides: [0.0; 3], at: enter, end: leave };
+        let mut walk =
+            Self { fog, origin, direction, position: [0; 3], sides: [0.0; 3], at: enter, end: leave };
         walk.settle([low, high.map(|at| at - 1)]);
         Some(walk)
     }
@@ -59,18 +60,18 @@ impl<'a> Walk<'a> {
         for axis in 0..3 {
             let at = (self.origin[axis] + self.direction[axis] * self.at) / DIM as f64;
             // A number that an i32 does not hold becomes its greatest or least.
-            self.place[axis] = (at.floor() as i32).clamp(low[axis], high[axis]);
-            self.sides[axis] = self.side(axis, self.place[axis], 1);
+            self.position[axis] = (at.floor() as i32).clamp(low[axis], high[axis]);
+            self.sides[axis] = self.side(axis, self.position[axis], 1);
         }
     }
 
     /// Where the ray (m) leaves the `count` block positions from one on along an axis.
-    fn side(&self, axis: usize, place: i32, count: i32) -> f64 {
+    fn side(&self, axis: usize, position: i32, count: i32) -> f64 {
         let direction = self.direction[axis];
         if direction == 0.0 {
             return f64::INFINITY;
         }
-        let plane = if direction > 0.0 { place + count } else { place };
+        let plane = if direction > 0.0 { position + count } else { position };
         (f64::from(plane) * DIM as f64 - self.origin[axis]) / direction
     }
 
@@ -78,13 +79,13 @@ impl<'a> Walk<'a> {
     fn step(&mut self) {
         let axis = least(self.sides);
         self.at = self.at.max(self.sides[axis]);
-        self.place[axis] += if self.direction[axis] > 0.0 { 1 } else { -1 };
-        self.sides[axis] = self.side(axis, self.place[axis], 1);
+        self.position[axis] += if self.direction[axis] > 0.0 { 1 } else { -1 };
+        self.sides[axis] = self.side(axis, self.position[axis], 1);
     }
 
     /// Beyond the node.
     fn leave_node(&mut self) {
-        let low = self.place.map(|at| at.div_euclid(NODE) * NODE);
+        let low = self.position.map(|at| at.div_euclid(NODE) * NODE);
         let sides = [0, 1, 2].map(|axis| self.side(axis, low[axis], NODE));
         let axis = least(sides);
         self.at = self.at.max(sides[axis]);
@@ -97,7 +98,7 @@ impl<'a> Walk<'a> {
     /// The next stretch in a block that is not empty.
     fn next(&mut self) -> Option<Stretch> {
         while self.at < self.end {
-            match self.fog.look(self.place) {
+            match self.fog.look(self.position) {
                 Look::Outside => return None,
                 Look::Empty => self.step(),
                 Look::EmptyNode => self.leave_node(),
@@ -116,7 +117,7 @@ fn least(sides: [f64; 3]) -> usize {
     (0..3).fold(0, |best, axis| if sides[axis] < sides[best] { axis } else { best })
 }
 
-/// A place in a fog.
+/// A position in a fog.
 #[derive(Clone, Copy)]
 pub(super) struct Here {
     /// Which fog.
@@ -147,7 +148,7 @@ impl InFog<'_> {
 }
 
 /// Goes along a ray from a point (m) in a direction (a unit vector), at most to `end` (m), through everything that is not
-/// empty, in steps of at most `stride` voxels. Calls `each` with the beginning and the end of a step (m) and the places in
+/// empty, in steps of at most `stride` voxels. Calls `each` with the beginning and the end of a step (m) and the positions in
 /// its middle, one for each fog that is there, until it returns false.
 pub(super) fn along(
     fogs: &[Fog],
@@ -240,15 +241,17 @@ mod tests {
     fn rays_pass_every_block_on_their_way_once() {
         let ctx = Context::new(Pool::new(1).unwrap());
         let mut number = numbers(100);
-        let mut places: Vec<[i32; 3]> = (0..80).map(|_| [0; 3].map(|_: i32| 8 * (number() - 50))).collect();
-        places.sort_unstable();
-        places.dedup();
-        let parts = places.iter().map(|at| (*at, Part::Even(1.0))).collect();
+        let mut positions: Vec<[i32; 3]> =
+            (0..80).map(|_| [0; 3].map(|_: i32| 8 * (number() - 50))).collect();
+        positions.sort_unstable();
+        positions.dedup();
+        let parts = positions.iter().map(|at| (*at, Part::Even(1.0))).collect();
         let axes = [DVec3::x(), DVec3::y(), DVec3::z()];
         let placement = Placement::new(DVec3::zeros(), axes).unwrap();
         let fogs = [Fog::of_parts(&ctx, placement, parts, 1.0).unwrap()];
         for n in 0..400 {
-            let target = places[n % places.len()].map(|at| f64::from(at) + 1.5 + f64::from(number()) * 0.05);
+            let target =
+                positions[n % positions.len()].map(|at| f64::from(at) + 1.5 + f64::from(number()) * 0.05);
             let mut origin = DVec3::from([0; 3].map(|_: i32| f64::from(12 * (number() - 50)) + 0.25));
             // Some rays run along one axis or in a plane.
             (0..n % 3).for_each(|axis| origin[(axis + n) % 3] = target[(axis + n) % 3]);

@@ -95,8 +95,9 @@ fn count(pictures: &[Picture]) -> Vec<Bin> {
     let shift = 8 - COUNTED_BITS;
     let mut bins = vec![([0u64; 3], 0u64); 1 << (3 * COUNTED_BITS)];
     for pixel in pictures.iter().flat_map(|picture| picture.rgb.as_chunks::<3>().0) {
-        let place = pixel.iter().fold(0, |place, value| place << COUNTED_BITS | usize::from(*value) >> shift);
-        let (sums, count) = &mut bins[place];
+        let position =
+            pixel.iter().fold(0, |position, value| position << COUNTED_BITS | usize::from(*value) >> shift);
+        let (sums, count) = &mut bins[position];
         sums.iter_mut().zip(pixel).for_each(|(sum, value)| *sum += u64::from(*value));
         *count += 1;
     }
@@ -194,8 +195,8 @@ fn look_up(ctx: &Context, colours: &[[u8; 3]]) -> Result<Vec<u8>> {
     let mut out = vec![0; edge * edge * edge];
     out.par_chunks_mut(edge * edge).enumerate().try_for_each(|(red, slice)| {
         ctx.check()?;
-        for (place, nearest) in slice.iter_mut().enumerate() {
-            let cell = [red, place / edge, place % edge];
+        for (position, nearest) in slice.iter_mut().enumerate() {
+            let cell = [red, position / edge, position % edge];
             let middle = cell.map(|at| ((2 * at + 1) << (7 - LOOKED_UP_BITS)) as i32);
             let mut best = (0, i32::MAX);
             for (index, colour) in colours.iter().enumerate() {

@@ -42,7 +42,7 @@ impl Plan<'_> {
         self.stages().map(|stage| stage.name()).collect()
     }
 
-    /// The stages with these names, by place; all without any.
+    /// The stages with these names, by position; all without any.
     fn chosen(&self, only: &[String]) -> Result<Vec<usize>> {
         if let Some(unknown) = only.iter().find(|name| !self.names().contains(&&name[..])) {
             let names = self.names().join(", ");
@@ -50,17 +50,22 @@ impl Plan<'_> {
             return Err(Error::file(&self.scene.path, what));
         }
         let wanted = |stage: &dyn Stage| only.is_empty() || only.iter().any(|name| name == stage.name());
-        Ok(self.stages().enumerate().filter(|(_, stage)| wanted(*stage)).map(|(place, _)| place).collect())
+        Ok(self
+            .stages()
+            .enumerate()
+            .filter(|(_, stage)| wanted(*stage))
+            .map(|(position, _)| position)
+            .collect())
     }
 
-    /// The stages that read the frames of some, or of those that do, by place.
+    /// The stages that read the frames of some, or of those that do, by position.
     fn downstream(&self, of: &[usize]) -> Vec<usize> {
-        let mut names: Vec<&str> = of.iter().map(|place| self.stages[*place].name()).collect();
+        let mut names: Vec<&str> = of.iter().map(|position| self.stages[*position].name()).collect();
         let mut out = Vec::new();
-        for (place, stage) in self.stages().enumerate() {
+        for (position, stage) in self.stages().enumerate() {
             if stage.upstream().iter().any(|upstream| names.contains(upstream)) {
                 names.push(stage.name());
-                out.push(place);
+                out.push(position);
             }
         }
         out
@@ -68,10 +73,12 @@ impl Plan<'_> {
 
     /// Refuses to read frames, of stages that are not among some, which this scene would not make as they are.
     fn refuse_stale(&self, chosen: &[usize], folder: &Path) -> Result<()> {
-        for reader in chosen.iter().map(|place| self.stages[*place].as_stage()) {
-            let is_read = |place: &usize| reader.upstream().contains(&self.stages[*place].name());
-            for place in (0..self.stages.len()).filter(|place| is_read(place) && !chosen.contains(place)) {
-                let stage = self.stages[place].as_stage();
+        for reader in chosen.iter().map(|position| self.stages[*position].as_stage()) {
+            let is_read = |position: &usize| reader.upstream().contains(&self.stages[*position].name());
+            for position in
+                (0..self.stages.len()).filter(|position| is_read(position) && !chosen.contains(position))
+            {
+                let stage = self.stages[position].as_stage();
                 let upstream = stage.upstream().iter().map(|name| Stored::read(folder, name));
                 let upstream: Vec<Stored> = upstream.collect::<Result<_>>()?;
                 let upstream: Vec<&Stored> = upstream.iter().collect();
@@ -135,7 +142,7 @@ impl<'a> Run<'a> {
         let chosen = plan.chosen(only)?;
         let asked = Asked { first: plan.scene.shot.frames.first, frames, from };
         // What is refused leaves no folder behind; what another run did meanwhile is looked at again below.
-        let of_run = || chosen.iter().map(|place| plan.stages[*place].as_stage());
+        let of_run = || chosen.iter().map(|position| plan.stages[*position].as_stage());
         for stage in of_run() {
             refuse_asked(stage, asked, &Stored::read(folder, stage.name())?)?;
         }
@@ -149,9 +156,9 @@ impl<'a> Run<'a> {
         plan.refuse_stale(&chosen, folder)?;
         let mut run = Self { plan, stages: Vec::new(), own, _lock: lock };
         let downstream = if from.is_some() { plan.downstream(&chosen) } else { Vec::new() };
-        for (place, stage) in plan.stages.iter().enumerate() {
-            let is_chosen = chosen.contains(&place);
-            let from = asked.from.filter(|_| !is_chosen && downstream.contains(&place));
+        for (position, stage) in plan.stages.iter().enumerate() {
+            let is_chosen = chosen.contains(&position);
+            let from = asked.from.filter(|_| !is_chosen && downstream.contains(&position));
             let own_stage = run.open(&**stage, folder, asked, is_chosen, from)?;
             run.stages.push(own_stage);
         }
@@ -233,14 +240,14 @@ impl<'a> Run<'a> {
         let first = self.plan.scene.shot.frames.first;
         let busy: Vec<&str> =
             self.stages.iter().filter(|run| !run.todo.is_empty()).map(|run| run.stage.name()).collect();
-        for place in 0..self.stages.len() {
-            let run = &self.stages[place];
+        for position in 0..self.stages.len() {
+            let run = &self.stages[position];
             let waits = run.stage.upstream().iter().any(|name| busy.contains(name));
             if let ([frame, ..], Some(cache), false) = (&run.todo[..], &run.cache, waits) {
                 let upstream = self.upstream(run.stage.as_stage(), self.own.folder())?;
                 let last = run.todo.last().copied().unwrap_or(*frame);
                 run.stage.looks_ahead(ctx, &upstream.iter().collect::<Vec<_>>(), last)?;
-                self.stages[place].start = Some(run.stage.before(ctx, *frame, cache.kept(first))?);
+                self.stages[position].start = Some(run.stage.before(ctx, *frame, cache.kept(first))?);
             }
         }
         Ok(())
@@ -283,12 +290,12 @@ impl<'a> Run<'a> {
         let mut failed = None;
         while let Some(ready) = self.ready() {
             let results = self.make_stages(ctx, &ready, &done)?;
-            for (place, result) in ready.into_iter().zip(results) {
+            for (position, result) in ready.into_iter().zip(results) {
                 let Err(error) = result else { continue };
                 if matches!(error, Error::Cancelled) {
                     return Err(error);
                 }
-                self.abandon(place, &error);
+                self.abandon(position, &error);
                 failed.get_or_insert(error);
             }
         }
@@ -304,23 +311,23 @@ impl<'a> Run<'a> {
         self.own.finish()
     }
 
-    /// The stages, by place, that have frames to make and wait for no other; none when all is done.
+    /// The stages, by position, that have frames to make and wait for no other; none when all is done.
     fn ready(&self) -> Option<Vec<usize>> {
         let busy: Vec<&str> =
             self.stages.iter().filter(|run| !run.todo.is_empty()).map(|run| run.stage.name()).collect();
         let waits = |run: &StageRun<'_>| run.stage.upstream().iter().any(|name| busy.contains(name));
-        let places = self.stages.iter().enumerate().filter(|(_, run)| !run.todo.is_empty() && !waits(run));
-        let ready: Vec<usize> = places.map(|(place, _)| place).collect();
+        let positions = self.stages.iter().enumerate().filter(|(_, run)| !run.todo.is_empty() && !waits(run));
+        let ready: Vec<usize> = positions.map(|(position, _)| position).collect();
         (!ready.is_empty()).then_some(ready)
     }
 
     /// Gives up the stages downstream of one that failed.
-    fn abandon(&mut self, place: usize, error: &Error) {
-        let gone = self.plan.downstream(&[place]);
+    fn abandon(&mut self, position: usize, error: &Error) {
+        let gone = self.plan.downstream(&[position]);
         let goes_on =
             self.stages.iter().enumerate().any(|(n, run)| !gone.contains(&n) && !run.todo.is_empty());
         if goes_on {
-            let name = self.stages[place].stage.name();
+            let name = self.stages[position].stage.name();
             log::warn!("stage {name} ends: {error}; stages that need nothing of it go on");
         }
         gone.into_iter().for_each(|n| self.stages[n].todo.clear());
@@ -338,10 +345,10 @@ impl<'a> Run<'a> {
         let folder = self.own.folder().to_path_buf();
         let upstream: Vec<Vec<Stored>> = ready
             .iter()
-            .map(|place| self.upstream(self.stages[*place].stage.as_stage(), &folder))
+            .map(|position| self.upstream(self.stages[*position].stage.as_stage(), &folder))
             .collect::<Result<_>>()?;
         let plan = self.plan;
-        let runs = self.stages.iter_mut().enumerate().filter(|(place, _)| ready.contains(place));
+        let runs = self.stages.iter_mut().enumerate().filter(|(position, _)| ready.contains(position));
         Ok(std::thread::scope(|scope| {
             let threads: Vec<_> = runs
                 .zip(&upstream)

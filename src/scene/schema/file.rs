@@ -52,7 +52,7 @@ impl Scene {
             document.error(offset, error.message().trim().replace('\n', ", "))
         })?;
         for (index, setting) in overrides.iter().enumerate() {
-            setting.apply(root.get_mut(), document.place_of(index), path)?;
+            setting.apply(root.get_mut(), document.position_of(index), path)?;
         }
         let system = System::of(&document, root.get_ref())?;
         let keys = keys_of(system);
@@ -100,8 +100,8 @@ impl Scene {
 impl System {
     /// The system whose table a scene has; of snow where it has none, whose absence is then told.
     fn of(document: &Document, root: &DeTable) -> Result<Self> {
-        let place = |system: &Self| root.iter().find(|(key, _)| key.get_ref() == system.name());
-        let span = |system: Self| Some((place(&system)?.0.span().start, system));
+        let position = |system: &Self| root.iter().find(|(key, _)| key.get_ref() == system.name());
+        let span = |system: Self| Some((position(&system)?.0.span().start, system));
         let mut there: Vec<(usize, Self)> = Self::ALL.into_iter().filter_map(span).collect();
         there.sort_by_key(|(start, _)| *start);
         match there[..] {

@@ -42,7 +42,7 @@ pub enum Kind {
     NumbersOrFile(usize, f64, &'static str, &'static [&'static str]),
     /// A table of numbers by names of the scene's own, each at most so far from 0.
     Named(f64),
-    /// Rigid poses at frames, each place at most so far from the origin (m).
+    /// Rigid poses at frames, each position at most so far from the origin (m).
     Poses(f64),
 }
 

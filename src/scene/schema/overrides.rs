@@ -35,12 +35,12 @@ impl Override {
         &self.text
     }
 
-    /// Puts the value into a document; `place` is where messages find it.
-    pub(super) fn apply<'i>(&'i self, root: &mut DeTable<'i>, place: usize, path: &Path) -> Result<()> {
+    /// Puts the value into a document; `position` is where messages find it.
+    pub(super) fn apply<'i>(&'i self, root: &mut DeTable<'i>, position: usize, path: &Path) -> Result<()> {
         // What is not TOML is taken as a text: names of files and choices need no quotes.
         let value = match DeValue::parse(&self.value) {
-            Ok(value) => moved(value.into_inner(), place),
-            Err(_) => Spanned::new(place..place, DeValue::String(self.value.as_str().into())),
+            Ok(value) => moved(value.into_inner(), position),
+            Err(_) => Spanned::new(position..position, DeValue::String(self.value.as_str().into())),
         };
         let refused =
             |what: String| Error::argument(format!("{}: --set {}: {what}", path.display(), self.text));
@@ -49,8 +49,8 @@ impl Override {
         let mut parts = parents.iter();
         while let Some(part) = parts.next() {
             let name: std::borrow::Cow<'i, str> = part.as_str().into();
-            let empty = || Spanned::new(place..place, DeValue::Table(DeTable::new()));
-            let entry = table.entry(Spanned::new(place..place, name)).or_insert_with(empty);
+            let empty = || Spanned::new(position..position, DeValue::Table(DeTable::new()));
+            let entry = table.entry(Spanned::new(position..position, name)).or_insert_with(empty);
             table = match entry.get_mut() {
                 DeValue::Table(inner) => inner,
                 DeValue::Array(items) => {
@@ -69,27 +69,30 @@ impl Override {
                 _ => return Err(refused(format!("`{part}` is not a table"))),
             };
         }
-        table.insert(Spanned::new(place..place, last.as_str().into()), value);
+        table.insert(Spanned::new(position..position, last.as_str().into()), value);
         Ok(())
     }
 }
 
-/// A value whose parts all lie at one place.
-fn moved(value: DeValue<'_>, place: usize) -> Spanned<DeValue<'_>> {
+/// A value whose parts all lie at one position.
+fn moved(value: DeValue<'_>, position: usize) -> Spanned<DeValue<'_>> {
     let value = match value {
         DeValue::Table(table) => {
             let mut out = DeTable::new();
             for (key, value) in table {
-                out.insert(Spanned::new(place..place, key.into_inner()), moved(value.into_inner(), place));
+                out.insert(
+                    Spanned::new(position..position, key.into_inner()),
+                    moved(value.into_inner(), position),
+                );
             }
             DeValue::Table(out)
         }
         DeValue::Array(items) => {
             let mut out = DeArray::new();
-            items.into_iter().for_each(|item| out.push(moved(item.into_inner(), place)));
+            items.into_iter().for_each(|item| out.push(moved(item.into_inner(), position)));
             DeValue::Array(out)
         }
         other => other,
     };
-    Spanned::new(place..place, value)
+    Spanned::new(position..position, value)
 }

@@ -17,7 +17,7 @@ pub struct Document<'a> {
     pub text: &'a str,
     /// The absolute folder that relative paths start from.
     pub folder: PathBuf,
-    /// Settings of the command line; the one of index i has its place behind the text, at [`Document::place_of`].
+    /// Settings of the command line; the one of index i has its position behind the text, at [`Document::place_of`].
     pub overrides: &'a [Override],
 }
 
@@ -32,7 +32,7 @@ impl Document<'_> {
     }
 
     /// Where the values of a setting of the command line lie.
-    pub fn place_of(&self, index: usize) -> usize {
+    pub fn position_of(&self, index: usize) -> usize {
         self.text.len() + 1 + index
     }
 
@@ -73,13 +73,13 @@ impl<'a, 'i> Table<'a, 'i> {
         match unknown.min_by_key(|key| key.span().start) {
             None => Ok(table),
             Some(key) => {
-                let place = if name.is_empty() { String::new() } else { format!(" in {name}") };
+                let position = if name.is_empty() { String::new() } else { format!(" in {name}") };
                 let hint = match nearest(key.get_ref(), known) {
                     Some(near) => format!("did you mean `{near}`?"),
                     None => format!("the keys are {}", listed(known)),
                 };
                 Err(document
-                    .error(key.span().start, format!("unknown key `{}`{place}; {hint}", key.get_ref())))
+                    .error(key.span().start, format!("unknown key `{}`{position}; {hint}", key.get_ref())))
             }
         }
     }
@@ -101,8 +101,8 @@ impl<'a, 'i> Table<'a, 'i> {
     /// An error about a key's value, at its line; about the table's own line when the key is not there.
     pub fn error(&self, key: &str, what: impl std::fmt::Display) -> Error {
         let offset = self.entry(key).map_or(self.offset, |value| value.span().start);
-        let place = if self.name.is_empty() { String::new() } else { format!(" in {}", self.name) };
-        self.document.error(offset, format!("`{key}`{place} {what}"))
+        let position = if self.name.is_empty() { String::new() } else { format!(" in {}", self.name) };
+        self.document.error(offset, format!("`{key}`{position} {what}"))
     }
 
     fn wrong_type(&self, key: &str, wanted: &str, found: &DeValue) -> Error {

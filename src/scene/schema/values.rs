@@ -44,7 +44,7 @@ pub enum Value {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
     keys: &'static [Key],
-    /// By the key's place in `keys` and the index of its table, where there may be many.
+    /// By the key's position in `keys` and the index of its table, where there may be many.
     values: BTreeMap<(Option<usize>, usize), Value>,
 }
 
@@ -108,7 +108,7 @@ impl Values {
     /// # Errors
     /// A key that is missing, a wrong type or a value outside its range, with file and line.
     pub(super) fn read(&mut self, name: &str, object: Option<usize>, table: &Table) -> Result<()> {
-        for (place, key) in self.keys.iter().enumerate().filter(|(_, key)| key.table == name) {
+        for (position, key) in self.keys.iter().enumerate().filter(|(_, key)| key.table == name) {
             let allowed = !key.of_characters || self.path_of(object, name, "file").is_some_and(is_gltf);
             if !allowed && table.has(key.name) {
                 return Err(table.error(key.name, "is for .glb and .gltf files: leave it out"));
@@ -120,7 +120,7 @@ impl Values {
                 None => None,
             };
             if let Some(value) = value {
-                self.values.insert((object, place), value);
+                self.values.insert((object, position), value);
             }
         }
         Ok(())
@@ -135,12 +135,12 @@ impl Values {
 
     /// Every value with its key and, of an object, its index: in the order of the keys, object by object.
     pub(in crate::scene) fn iter(&self) -> impl Iterator<Item = (&'static Key, Option<usize>, &Value)> {
-        self.values.iter().map(|((object, place), value)| (&self.keys[*place], *object, value))
+        self.values.iter().map(|((object, position), value)| (&self.keys[*position], *object, value))
     }
 
     fn of(&self, object: Option<usize>, table: &str, name: &str) -> Option<&Value> {
-        let place = self.keys.iter().position(|key| key.table == table && key.name == name)?;
-        self.values.get(&(object, place))
+        let position = self.keys.iter().position(|key| key.table == table && key.name == name)?;
+        self.values.get(&(object, position))
     }
 
     /// A value by its key: `snow.cell`.
@@ -194,8 +194,8 @@ impl Values {
 
     /// Puts a number in place of another.
     pub(in crate::scene) fn set_number(&mut self, key: &str, number: f64) {
-        let place = self.keys.iter().position(|declared| path(declared, None) == key);
-        let value = place.and_then(|place| self.values.get_mut(&(None, place)));
+        let position = self.keys.iter().position(|declared| path(declared, None) == key);
+        let value = position.and_then(|position| self.values.get_mut(&(None, position)));
         if let Some(value) = value {
             *value = Value::Number(number);
         }

@@ -40,7 +40,7 @@ pub struct Report {
     pub cells: [usize; 2],
     /// Least and greatest x and z of the cells (m).
     pub area_m: [f64; 4],
-    /// Columns: places for liquid in a cell, one above each solid.
+    /// Columns: positions for liquid in a cell, one above each solid.
     pub columns: usize,
     /// Most columns in a cell.
     pub layers: usize,

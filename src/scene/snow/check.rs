@@ -60,7 +60,7 @@ pub struct ObjectReport {
     pub contradictions: usize,
     /// Width, height and depth at the first frame (m).
     pub size_m: [f64; 3],
-    /// Least and greatest place over the shot (m).
+    /// Least and greatest position over the shot (m).
     pub bounds_m: [[f64; 3]; 2],
     /// Greatest speed of a vertex on its way from frame to frame (m/s), and the frame that ends that step.
     pub fastest_m_per_s: f64,
@@ -74,7 +74,7 @@ pub struct ObjectReport {
     pub walk: Option<Walk>,
 }
 
-/// The place of an object that lies lowest against the ground.
+/// The position of an object that lies lowest against the ground.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Deepest {
     /// Frame at which it is there.

@@ -29,8 +29,8 @@ const OTHER_SIZE: f64 = 0.01;
 
 /// Loose grains of a file.
 pub struct Drift {
-    /// Places (m).
-    pub places: Vec<DVec3>,
+    /// Positions (m).
+    pub positions: Vec<DVec3>,
     /// Velocities (m/s), of the attribute `v`; none where there is no such attribute.
     pub velocities: Vec<[f32; 3]>,
 }
@@ -44,13 +44,13 @@ impl Drift {
     /// Those of a scene with cells of this size (m); adds to the warnings what the file says that grains do not follow.
     ///
     /// # Errors
-    /// A file that is missing, cut or damaged; a `v` that is no vector; places or velocities that no grain can have.
+    /// A file that is missing, cut or damaged; a `v` that is no vector; positions or velocities that no grain can have.
     pub fn of(scene: &Scene, cell: f64, seen: &Seen, warnings: &mut Vec<String>) -> Result<Option<Self>> {
         let Some(path) = file(scene) else { return Ok(None) };
         seen.hash(path)?;
-        let (places, attributes) = if extension(path) == "ply" {
+        let (positions, attributes) = if extension(path) == "ply" {
             let cloud = ply::read(path)?;
-            (cloud.places, cloud.attributes)
+            (cloud.positions, cloud.attributes)
         } else {
             if let Some(since) = changes_since(path)? {
                 return Err(Error::file(path, partial(since)));
@@ -63,20 +63,20 @@ impl Drift {
             attribute.map(|attribute| &attribute.values)
         };
         let velocities = match values("v") {
-            Some(Values::Vector(column)) => (0..places.len()).map(|index| column.get(index)).collect(),
+            Some(Values::Vector(column)) => (0..positions.len()).map(|index| column.get(index)).collect(),
             Some(_) => return Err(Error::file(path, "has an attribute v that is no vector")),
             None => Vec::new(),
         };
         let params = params(scene, cell);
-        if let (Some(Values::Float(own)), false) = (values("pscale"), places.is_empty()) {
+        if let (Some(Values::Float(own)), false) = (values("pscale"), positions.is_empty()) {
             warnings.extend(other_size(path, own.stored(), params.radius));
         }
-        let drift = Self { places, velocities };
+        let drift = Self { positions, velocities };
         drift.check(params).map_err(|what| Error::file(path, what))?;
         Ok(Some(drift))
     }
 
-    /// Places (m) and velocities (m/s) of those that are not in a layer, nor below the ground; of grains with a radius (m).
+    /// Positions (m) and velocities (m/s) of those that are not in a layer, nor below the ground; of grains with a radius (m).
     ///
     /// # Errors
     /// What the grid reports; cancel.
@@ -89,24 +89,24 @@ impl Drift {
     ) -> Result<(Vec<DVec3>, Vec<[f32; 3]>)> {
         let deep = DEEP * 2.0 * radius;
         let mut distances = Vec::new();
-        layer.sample_linear(ctx, &self.places, &mut distances)?;
+        layer.sample_linear(ctx, &self.positions, &mut distances)?;
         let ground = inputs.ground().map(|mesh| (mesh, Bvh::new(mesh)));
-        let is_below = |place: &DVec3| {
-            inputs.floor().is_some_and(|floor| place.y < floor - deep)
-                || ground.as_ref().is_some_and(|(mesh, tree)| is_below(mesh, tree, *place, deep))
+        let is_below = |position: &DVec3| {
+            inputs.floor().is_some_and(|floor| position.y < floor - deep)
+                || ground.as_ref().is_some_and(|(mesh, tree)| is_below(mesh, tree, *position, deep))
         };
         let is_outside =
-            |point: &usize| f64::from(distances[*point]) >= -deep && !is_below(&self.places[*point]);
-        let kept: Vec<usize> = (0..self.places.len()).into_par_iter().filter(is_outside).collect();
-        let places = kept.iter().map(|point| self.places[*point]).collect();
+            |point: &usize| f64::from(distances[*point]) >= -deep && !is_below(&self.positions[*point]);
+        let kept: Vec<usize> = (0..self.positions.len()).into_par_iter().filter(is_outside).collect();
+        let positions = kept.iter().map(|point| self.positions[*point]).collect();
         let velocities = kept.iter().filter_map(|point| self.velocities.get(*point).copied()).collect();
-        Ok((places, velocities))
+        Ok((positions, velocities))
     }
 
     /// Checks that every point can be a grain.
     fn check(&self, params: Params) -> std::result::Result<(), String> {
-        let is_nan = |index: &usize| !self.places[*index].iter().all(|x| x.is_finite());
-        if let Some(point) = (0..self.places.len()).find(is_nan) {
+        let is_nan = |index: &usize| !self.positions[*index].iter().all(|x| x.is_finite());
+        if let Some(point) = (0..self.positions.len()).find(is_nan) {
             return Err(format!("the place of point {} is not finite", point + 1));
         }
         for (point, velocity) in self.velocities.iter().enumerate() {
@@ -122,10 +122,10 @@ impl Drift {
         }
         // How many there may be is another question.
         let params = Params { most: usize::MAX, ..params };
-        let fits = |places: &[DVec3]| Grains::new(params)?.emit(places, &[], 0);
-        for (run, places) in self.places.chunks(RUN).enumerate() {
-            let Err(error) = fits(places) else { continue };
-            return Err(match places.iter().position(|place| fits(&[*place]).is_err()) {
+        let fits = |positions: &[DVec3]| Grains::new(params)?.emit(positions, &[], 0);
+        for (run, positions) in self.positions.chunks(RUN).enumerate() {
+            let Err(error) = fits(positions) else { continue };
+            return Err(match positions.iter().position(|position| fits(&[*position]).is_err()) {
                 Some(point) => format!("point {} is too far from the origin", run * RUN + point + 1),
                 None => error.to_string(),
             });
@@ -134,9 +134,9 @@ impl Drift {
     }
 }
 
-/// Whether a place is more than a depth (m) below a mesh that is seen from above: the next triangle over it faces up.
-fn is_below(mesh: &TriMesh, tree: &Bvh, place: DVec3, deep: f64) -> bool {
-    let Some(hit) = tree.ray(place, DVec3::y(), f64::INFINITY) else { return false };
+/// Whether a position is more than a depth (m) below a mesh that is seen from above: the next triangle over it faces up.
+fn is_below(mesh: &TriMesh, tree: &Bvh, position: DVec3, deep: f64) -> bool {
+    let Some(hit) = tree.ray(position, DVec3::y(), f64::INFINITY) else { return false };
     let [a, b, c] = mesh.triangles[hit.triangle].map(|vertex| mesh.positions[vertex as usize]);
     hit.distance > deep && (b - a).cross(&(c - a)).y > 0.0
 }

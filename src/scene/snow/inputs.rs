@@ -338,8 +338,8 @@ fn far_meshes(snow: &Snow, source: &Source) -> Vec<String> {
 /// What to say of corners of a ground's or top's mesh that rounding does not decide.
 fn unclear_corners(snow: &Snow, source: &Source) -> Vec<String> {
     let told = |path: &Path, mesh: &TriMesh| {
-        let places: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
-        let what = Weld::of(&places, &mesh.triangles).warning();
+        let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
+        let what = Weld::of(&positions, &mesh.triangles).warning();
         what.map(|what| format!("{}: {what}", path.display()))
     };
     let ground = match (&snow.ground, source.ground()) {
@@ -407,7 +407,7 @@ fn motion(
     own.pose(f64::from(scene.shot.frames.first) / fps, &mut pose)?;
     // Meshes are read less the origin.
     let space = if is_gltf(&object.file) { object.space } else { object.space.without_origin() };
-    pose.iter_mut().for_each(|place| *place -= space.origin);
+    pose.iter_mut().for_each(|position| *position -= space.origin);
     let name = object.file.display().to_string();
     warnings.extend(far_mesh(&name, farthest(pose.iter()), space.scale, scene.snow()?.cell, BY_KEY));
     if scene.output.objects_usd || scene.output.objects_ply {

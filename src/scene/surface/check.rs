@@ -30,7 +30,7 @@ pub struct Report {
     pub has_ids: bool,
     /// See `has_ids`.
     pub has_velocities: bool,
-    /// Least and greatest place of a particle over the shot (m).
+    /// Least and greatest position of a particle over the shot (m).
     pub particles_bounds_m: [[f64; 3]; 2],
     /// Initial distance between particles (m).
     pub spacing_m: f64,
@@ -96,11 +96,11 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
                 has_warned = true;
             }
         }
-        let Particles { places, velocities, ids } = &particles;
-        (least, most) = (least.min(places.len()), most.max(places.len()));
-        has_ids &= !ids.is_empty() || places.is_empty();
-        has_velocities &= !velocities.is_empty() || places.is_empty();
-        bounds = places.iter().fold(bounds, |bounds, p| {
+        let Particles { positions, velocities, ids } = &particles;
+        (least, most) = (least.min(positions.len()), most.max(positions.len()));
+        has_ids &= !ids.is_empty() || positions.is_empty();
+        has_velocities &= !velocities.is_empty() || positions.is_empty();
+        bounds = positions.iter().fold(bounds, |bounds, p| {
             let [low, high] = bounds.unwrap_or([*p; 2]);
             Some([low.inf(p), high.sup(p)])
         });
@@ -119,7 +119,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
             "the mesh's edges are {edge:.4} m long, particles {spacing:.4} m apart: a mesh that coarse cannot follow them closely"
         ));
     }
-    if let Some(share) = outside(&inputs.particles.places, from, to, spacing) {
+    if let Some(share) = outside(&inputs.particles.positions, from, to, spacing) {
         warnings.push(format!(
             "{:.0} % of the first frame's particles lie outside of the mesh's bounds: are both in the same space and unit?",
             100.0 * share
@@ -152,13 +152,13 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     })
 }
 
-/// Share of places outside of a box by more than two spacings, where it is a tenth or more.
-fn outside(places: &[DVec3], low: DVec3, high: DVec3, spacing: f64) -> Option<f64> {
+/// Share of positions outside of a box by more than two spacings, where it is a tenth or more.
+fn outside(positions: &[DVec3], low: DVec3, high: DVec3, spacing: f64) -> Option<f64> {
     let margin = DVec3::repeat(2.0 * spacing);
-    let is_outside = |place: &&DVec3| {
-        let (below, above) = (low - margin - *place, *place - high - margin);
+    let is_outside = |position: &&DVec3| {
+        let (below, above) = (low - margin - *position, *position - high - margin);
         below.max() > 0.0 || above.max() > 0.0
     };
-    let share = places.iter().filter(is_outside).count() as f64 / places.len() as f64;
+    let share = positions.iter().filter(is_outside).count() as f64 / positions.len() as f64;
     (share >= 0.1).then_some(share)
 }

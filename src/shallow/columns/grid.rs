@@ -54,7 +54,7 @@ impl Grid {
     }
 
     /// The cell of an index.
-    pub fn place(&self, index: usize) -> [usize; 2] {
+    pub fn position(&self, index: usize) -> [usize; 2] {
         [index % self.size[0], index / self.size[0]]
     }
 
@@ -63,7 +63,7 @@ impl Grid {
         [self.origin[0] + (x as f64 + 0.5) * self.cell, self.origin[1] + (z as f64 + 0.5) * self.cell]
     }
 
-    /// The cell at a place (m), if it is within.
+    /// The cell at a position (m), if it is within.
     pub fn cell_at(&self, [x, z]: [f64; 2]) -> Option<[usize; 2]> {
         let at = [(x - self.origin[0]) / self.cell, (z - self.origin[1]) / self.cell].map(f64::floor);
         let within =

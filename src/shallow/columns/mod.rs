@@ -1,6 +1,6 @@
 //! Columns: the room for liquid above each solid of a cell, stored in strips (thesis 4.1.1, Fig. 4.2).
 //!
-//! A strip is 16 cells along x of one layer; a column's layer is its place from the bottom of its cell. Strips exist only where they have
+//! A strip is 16 cells along x of one layer; a column's layer is its position from the bottom of its cell. Strips exist only where they have
 //! a column, and are sorted by row, then layer, then x, so that a run of them is one array, and whatever a row needs lies together.
 
 pub mod grid;
@@ -23,13 +23,13 @@ pub const NONE: u32 = u32::MAX;
 pub struct Strip {
     /// Row (z).
     pub row: u32,
-    /// Place of its columns from the bottom of their cells.
+    /// Position of its columns from the bottom of their cells.
     pub layer: u32,
     /// First cell along x / 16.
     pub at: u32,
 }
 
-/// The columns of a terrain, by index: strip x 16 + place in the strip. Indices without a column have a ceiling on their base, which is 0.
+/// The columns of a terrain, by index: strip x 16 + position in the strip. Indices without a column have a ceiling on their base, which is 0.
 #[derive(Debug, PartialEq)]
 pub struct Columns {
     /// Cells.
@@ -42,7 +42,7 @@ pub struct Columns {
     /// The strips of the same layer and x in the rows before and behind, or [`NONE`].
     north: Vec<u32>,
     south: Vec<u32>,
-    /// Bit of each place that has a column.
+    /// Bit of each position that has a column.
     present: Vec<u16>,
     /// b (units): where the liquid stands.
     base: PerColumn<i32>,
@@ -132,12 +132,12 @@ impl Columns {
                 self.ceiling.resize(room, 0);
                 self.under.resize(room, 0);
                 let mut present = 0;
-                for (place, x) in cells.enumerate().filter(|(_, x)| cell(*x).len() > layer) {
+                for (position, x) in cells.enumerate().filter(|(_, x)| cell(*x).len() > layer) {
                     let solids = cell(x);
-                    present |= 1 << place;
-                    self.base[first + place] = solids[layer][1];
-                    self.under[first + place] = solids[layer][0];
-                    self.ceiling[first + place] = solids.get(layer + 1).map_or(TOP, |above| above[0]);
+                    present |= 1 << position;
+                    self.base[first + position] = solids[layer][1];
+                    self.under[first + position] = solids[layer][0];
+                    self.ceiling[first + position] = solids.get(layer + 1).map_or(TOP, |above| above[0]);
                 }
                 self.present.push(present);
                 self.strips.push(Strip { row: row as u32, layer: layer as u32, at: at as u32 });
@@ -161,9 +161,9 @@ impl Columns {
         for row in rows.start.saturating_sub(1)..rows.end.min(self.grid.size[1] - 1) {
             let mut below = self.row(row + 1).peekable();
             for strip in self.row(row) {
-                let place = |strip: usize| (self.strips[strip].layer, self.strips[strip].at);
-                while below.next_if(|other| place(*other) < place(strip)).is_some() {}
-                if let Some(other) = below.next_if(|other| place(*other) == place(strip)) {
+                let position = |strip: usize| (self.strips[strip].layer, self.strips[strip].at);
+                while below.next_if(|other| position(*other) < position(strip)).is_some() {}
+                if let Some(other) = below.next_if(|other| position(*other) == position(strip)) {
                     self.south[strip] = other as u32;
                     self.north[other] = strip as u32;
                 }
@@ -200,11 +200,11 @@ impl Columns {
     }
 
     /// Sets where a strip lies.
-    pub(super) fn place_strip(&mut self, strip: usize, place: Strip) {
-        self.strips[strip] = place;
+    pub(super) fn place_strip(&mut self, strip: usize, position: Strip) {
+        self.strips[strip] = position;
     }
 
-    /// Sets which places of a strip have a column; the caller writes its numbers, which are 0 for the others.
+    /// Sets which positions of a strip have a column; the caller writes its numbers, which are 0 for the others.
     pub(super) fn set_strip(&mut self, strip: usize, present: u16) -> StripMut<'_> {
         self.present[strip] = present;
         StripMut {
@@ -248,12 +248,12 @@ impl Columns {
         self.rows[row] as usize..self.rows[row + 1] as usize
     }
 
-    /// The strip at the same place of the row before, or [`NONE`].
+    /// The strip at the same position of the row before, or [`NONE`].
     pub fn north(&self, strip: usize) -> u32 {
         self.north[strip]
     }
 
-    /// The strip at the same place of the row behind, or [`NONE`].
+    /// The strip at the same position of the row behind, or [`NONE`].
     pub fn south(&self, strip: usize) -> u32 {
         self.south[strip]
     }
@@ -269,7 +269,7 @@ impl Columns {
         strip.checked_sub(1).filter(|&before| self.east(before) == Some(strip))
     }
 
-    /// Bit of each place of a strip that has a column.
+    /// Bit of each position of a strip that has a column.
     pub fn present(&self, strip: usize) -> u16 {
         self.present[strip]
     }
@@ -352,7 +352,7 @@ pub(super) fn strip_of<T>(numbers: &[T], strip: usize) -> &[T; STRIP] {
     &numbers.as_chunks().0[strip]
 }
 
-/// As many numbers as a strip has, from any place.
+/// As many numbers as a strip has, from any position.
 #[inline(always)]
 pub(super) fn strip_from<T>(numbers: &[T], at: usize) -> &[T; STRIP] {
     numbers[at..].first_chunk().expect("a strip")

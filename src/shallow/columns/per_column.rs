@@ -1,16 +1,16 @@
 //! Numbers by column index, placed in memory so that those of one column do not get into each other's way.
 //!
-//! A step reads and writes a dozen arrays at once. Where these begin at about the same place of a page, as large ones do that come from the system, they
+//! A step reads and writes a dozen arrays at once. Where these begin at about the same position of a page, as large ones do that come from the system, they
 //! compete for a few sets of the first cache, and a read is taken for one of what has just been written elsewhere: a step then takes up to a quarter longer.
 
 use std::ops::{Deref, DerefMut, Range};
 
-/// Bytes after which places in the first cache, and in the tests for reads of what has just been written, come again.
+/// Bytes after which positions in the first cache, and in the tests for reads of what has just been written, come again.
 const PAGE: usize = 4096;
 /// Bytes of a line of the cache.
 const LINE: usize = 64;
 
-/// What the numbers are: each array begins at a place of a page of its own.
+/// What the numbers are: each array begins at a position of a page of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Array {
     /// b.
@@ -38,7 +38,7 @@ pub enum Array {
 
 impl Array {
     /// Where in a page it begins (bytes).
-    const fn place(self) -> usize {
+    const fn position(self) -> usize {
         let count = Self::Under as usize + 1;
         self as usize * (PAGE / count / LINE * LINE)
     }
@@ -48,7 +48,7 @@ impl Array {
 #[derive(Debug)]
 pub struct PerColumn<T> {
     array: Array,
-    /// Others before the first, so that this one is at its place.
+    /// Others before the first, so that this one is at its position.
     before: usize,
     /// How many there is room for: arrays of one liquid grow in the same frame, and not again for long.
     room: usize,
@@ -93,7 +93,7 @@ impl<T: Copy> PerColumn<T> {
         self.room = len.max(2 * self.room);
         let mut list = Vec::with_capacity(self.room + PAGE / size_of::<T>());
         let at = <*const T>::addr(list.as_ptr());
-        let before = self.array.place().wrapping_sub(at) % PAGE / size_of::<T>();
+        let before = self.array.position().wrapping_sub(at) % PAGE / size_of::<T>();
         list.resize(before, fill);
         list.extend_from_slice(self);
         (self.before, self.list) = (before, list);
@@ -142,24 +142,24 @@ impl<T: PartialEq> PartialEq for PerColumn<T> {
 mod tests {
     use super::*;
 
-    fn place<T>(numbers: &PerColumn<T>) -> usize {
+    fn position<T>(numbers: &PerColumn<T>) -> usize {
         numbers.as_ptr().addr() % PAGE
     }
 
     #[test]
-    fn arrays_begin_at_places_of_their_own_however_they_grow() {
+    fn arrays_begin_at_positions_of_their_own_however_they_grow() {
         for array in [Array::Base, Array::FluxSouth, Array::Under] {
             let mut numbers = PerColumn::new(array, 100, 1.0_f32);
             for len in [101, 5000, 3, 100_000] {
                 numbers.resize(len, 2.0);
-                assert_eq!((numbers.len(), place(&numbers)), (len, array.place()));
+                assert_eq!((numbers.len(), position(&numbers)), (len, array.position()));
             }
             assert_eq!((numbers[2], numbers[3]), (1.0, 2.0));
             let copy = numbers.clone();
-            assert_eq!((place(&copy), copy == numbers), (array.place(), true));
+            assert_eq!((position(&copy), copy == numbers), (array.position(), true));
         }
-        let places = [Array::Base.place(), Array::Depth.place(), Array::Under.place()];
-        assert_eq!(places, [0, 320, 11 * 320]);
+        let positions = [Array::Base.position(), Array::Depth.position(), Array::Under.position()];
+        assert_eq!(positions, [0, 320, 11 * 320]);
     }
 
     #[test]

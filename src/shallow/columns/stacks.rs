@@ -31,9 +31,9 @@ impl Stacks {
         self.counts.resize(blocks, 0);
         self.strips.clear();
         self.strips.resize(blocks * self.layers, NONE);
-        for (strip, place) in range.zip(strips) {
-            self.counts[place.at as usize] = place.layer + 1;
-            self.strips[place.at as usize * self.layers + place.layer as usize] = strip as u32;
+        for (strip, position) in range.zip(strips) {
+            self.counts[position.at as usize] = position.layer + 1;
+            self.strips[position.at as usize * self.layers + position.layer as usize] = strip as u32;
         }
     }
 
@@ -59,9 +59,9 @@ impl Stacks {
         }
         for at in 0..self.counts.len() {
             let lowest = self.of(at).first().map(|&strip| strip as usize);
-            let sill = |place: usize| match lowest {
-                Some(strip) if columns.present(strip) >> place & 1 == 1 => {
-                    columns.unders()[strip * STRIP + place]
+            let sill = |position: usize| match lowest {
+                Some(strip) if columns.present(strip) >> position & 1 == 1 => {
+                    columns.unders()[strip * STRIP + position]
                 }
                 _ => i32::MAX,
             };

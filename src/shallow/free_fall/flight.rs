@@ -1,6 +1,6 @@
 //! The flight of packets: ballistics without drag, in closed form from cell to cell, and what a packet meets.
 //!
-//! Places are those of a cell and offsets from its centre, heights those of the lattice: a scene that is turned or mirrored has the same flights, bit
+//! Positions are those of a cell and offsets from its centre, heights those of the lattice: a scene that is turned or mirrored has the same flights, bit
 //! for bit. A packet is followed from one side of a cell to the next, and meets the surface of the column that it is over wherever it passes
 //! it: no step is so long that it goes through one.
 
@@ -48,7 +48,7 @@ impl Air<'_> {
         let mut stopped = [false; 2];
         packet.age += dt;
         loop {
-            let (floor, end) = match self.place(packet.cell, packet.height) {
+            let (floor, end) = match self.position(packet.cell, packet.height) {
                 Place::Solid(above) => return End::Lands(above),
                 Place::In(column) => (self.surface(column), End::Lands(column)),
                 Place::Void => (0.0, End::Leaves),
@@ -79,7 +79,7 @@ impl Air<'_> {
 
     /// What a packet is in, if that is solid: the column above it.
     pub fn above_solid(&self, packet: &Packet) -> Option<usize> {
-        match self.place(packet.cell, packet.height) {
+        match self.position(packet.cell, packet.height) {
             Place::Solid(above) => Some(above),
             _ => None,
         }
@@ -89,20 +89,20 @@ impl Air<'_> {
         f64::from(self.columns.bases()[column] + self.depth[column])
     }
 
-    fn place(&self, cell: [u32; 2], height: f64) -> Place {
-        let mut place = Place::Void;
+    fn position(&self, cell: [u32; 2], height: f64) -> Place {
+        let mut position = Place::Void;
         for column in self.columns.of_cell(cell.map(|at| at as usize)) {
             if height < f64::from(self.columns.bases()[column]) {
                 let is_below = height < f64::from(self.columns.unders()[column]);
                 // Below the ceiling of the column before it was found there.
                 return if is_below { Place::Void } else { Place::Solid(column) };
             }
-            place = Place::In(column);
+            position = Place::In(column);
             if height < f64::from(self.columns.ceilings()[column]) {
                 break;
             }
         }
-        place
+        position
     }
 
     /// The time (s) until a packet leaves its cell along an axis.
@@ -146,7 +146,7 @@ impl Air<'_> {
                 return Crossed::Out;
             }
             is_out
-        } else if matches!(self.place(cell, packet.height), Place::Solid(_)) {
+        } else if matches!(self.position(cell, packet.height), Place::Solid(_)) {
             crossed
         } else {
             packet.offset = offset;

@@ -114,9 +114,9 @@ impl Balls {
         self.strands.clear();
         self.sums.clear();
         self.sums.resize(drops.len(), [0.0; 3]);
-        for (place, &at) in self.order.iter().enumerate() {
+        for (position, &at) in self.order.iter().enumerate() {
             let drop = &drops[at as usize];
-            let next = self.order.get(place + 1).copied().filter(|&next| {
+            let next = self.order.get(position + 1).copied().filter(|&next| {
                 let next = &drops[next as usize];
                 drop.source == next.source && next.number - drop.number <= 1
             });
@@ -160,7 +160,7 @@ impl Balls {
                     *to = [0, 1, 2].map(|n| centre[n] + radius * normal[n]);
                 }
             }
-            self.each_corner(drops, strands, |_, place, _| turned(place));
+            self.each_corner(drops, strands, |_, position, _| turned(position));
         }
         if let Some(to) = &mut target.normals {
             let (balls, strands) = parts(to, drops.len());
@@ -189,7 +189,7 @@ impl Balls {
         Ok(counts)
     }
 
-    /// Writes a vector for each corner of the strands, of its normal, its place (m) and its drop.
+    /// Writes a vector for each corner of the strands, of its normal, its position (m) and its drop.
     fn each_corner(
         &self,
         drops: &[Droplet],
@@ -200,26 +200,26 @@ impl Balls {
         for strand in &self.strands {
             let first = &drops[strand.drop as usize];
             let own = self.radii[strand.drop as usize];
-            let (last, place, edge, axes) = match (strand.next.map(|next| next as usize), first.lip) {
+            let (last, position, edge, axes) = match (strand.next.map(|next| next as usize), first.lip) {
                 (Some(next), _) => (&drops[next], drops[next].position, None, [self.radii[next]; 2]),
                 (None, Some(lip)) => {
-                    (first, lip.place, Some(lip.edge), [FLARE * own, own.min(0.5 * lip.depth)])
+                    (first, lip.position, Some(lip.edge), [FLARE * own, own.min(0.5 * lip.depth)])
                 }
                 (None, None) => (first, first.position, None, [own; 2]),
             };
-            let way = between(first.position, place);
+            let way = between(first.position, position);
             let [aside, across] = edge.map_or_else(|| beside(way), |edge| beside_with(way, edge));
             // What has run into the drops is missing in the middle.
             let middle = [0, 1].map(|n| 0.5 * (own + axes[n]) * strand.whole);
             let halfway = along(first.position, way, 0.5);
-            for (drop, place, axes) in
-                [(first, first.position, [own; 2]), (first, halfway, middle), (last, place, axes)]
+            for (drop, position, axes) in
+                [(first, first.position, [own; 2]), (first, halfway, middle), (last, position, axes)]
             {
                 let axes = axes.map(|radius| radius * AROUND);
                 for ([cos, sin], to) in HEXAGON.into_iter().zip(&mut to) {
                     let off = [0, 1, 2].map(|n| axes[0] * cos * aside[n] + axes[1] * sin * across[n]);
                     let normal = [0, 1, 2].map(|n| cos * aside[n] + sin * across[n]);
-                    *to = vector(normal, along(place, off, 1.0), drop);
+                    *to = vector(normal, along(position, off, 1.0), drop);
                 }
             }
         }
@@ -255,11 +255,11 @@ impl Strand {
     /// That from a drop to the next one, or to its lip; none where it has broken.
     fn new(drops: &[Droplet], at: u32, next: Option<u32>) -> Option<Self> {
         let drop = &drops[at as usize];
-        let (place, volume) = match next.map(|next| &drops[next as usize]) {
+        let (position, volume) = match next.map(|next| &drops[next as usize]) {
             Some(next) => (next.position, 0.5 * (drop.volume + next.volume)),
-            None => (drop.lip?.place, drop.volume),
+            None => (drop.lip?.position, drop.volume),
         };
-        let long = length(between(drop.position, place));
+        let long = length(between(drop.position, position));
         if long <= 0.0 {
             return None;
         }

@@ -83,7 +83,7 @@ impl Falls {
 /// Liquid in the air, as a host sees it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Droplet {
-    /// Its place (m).
+    /// Its position (m).
     pub position: [f64; 3],
     /// Its velocity (m/s).
     pub velocity: [f64; 3],
@@ -107,7 +107,7 @@ pub struct Droplet {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Lip {
     /// The middle of the column that it comes from, half way up (m).
-    pub place: [f64; 3],
+    pub position: [f64; 3],
     /// How deep it is there (m).
     pub depth: f64,
     /// A unit vector along the edge.
@@ -155,6 +155,6 @@ impl Shallow {
         let depth = f64::from(self.flow.depth[column]) * unit;
         // Sides to the east and to the west are even.
         let edge = if packet.source >> 16 & 1 == 0 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
-        Some(Lip { place: [x, columns.heights.low + base + 0.5 * depth, z], depth, edge })
+        Some(Lip { position: [x, columns.heights.low + base + 0.5 * depth, z], depth, edge })
     }
 }

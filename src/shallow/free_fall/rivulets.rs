@@ -90,8 +90,8 @@ impl Threads {
                 self.order[first..].iter().take_while(|&&at| self.lips[at as usize].strength == strength);
             let end = first + same.count();
             if strength > 0 {
-                for place in first..end {
-                    let at = self.order[place];
+                for position in first..end {
+                    let at = self.order[position];
                     if self.lips[at as usize].into == OWN {
                         self.take_around(at, [reach, step], cells, grid.size);
                     }

@@ -39,10 +39,10 @@ impl Cliffs {
         if self == Self::NONE {
             return bits;
         }
-        for place in 0..STRIP {
-            let i = strip * STRIP + place;
+        for position in 0..STRIP {
+            let i = strip * STRIP + position;
             let is_cliff = |j: usize| columns.is_column(i) && columns.is_column(j) && self.has(columns, i, j);
-            bits |= u16::from(beside(columns, i, side).is_some_and(is_cliff)) << place;
+            bits |= u16::from(beside(columns, i, side).is_some_and(is_cliff)) << position;
         }
         bits
     }
@@ -50,12 +50,12 @@ impl Cliffs {
 
 /// The index of the same layer beyond a side.
 pub(in crate::shallow) fn beside(columns: &Columns, i: usize, side: Side) -> Option<usize> {
-    let (strip, place) = (i / STRIP, i % STRIP);
-    let at = |strip: u32| (strip != NONE).then(|| strip as usize * STRIP + place);
+    let (strip, position) = (i / STRIP, i % STRIP);
+    let at = |strip: u32| (strip != NONE).then(|| strip as usize * STRIP + position);
     match side {
-        Side::East if place + 1 < STRIP => Some(i + 1),
+        Side::East if position + 1 < STRIP => Some(i + 1),
         Side::East => columns.east(strip).map(|next| next * STRIP),
-        Side::West if place > 0 => Some(i - 1),
+        Side::West if position > 0 => Some(i - 1),
         Side::West => columns.west(strip).map(|before| before * STRIP + STRIP - 1),
         Side::South => at(columns.south(strip)),
         Side::North => at(columns.north(strip)),

@@ -167,7 +167,7 @@ impl<'a> Joiner<'a> {
         }
         let mut cells = 0;
         for (layer, (&strip, extent)) in own.0.iter().zip(own.1).enumerate() {
-            // Strips of other layers that have a column which meets one of this strip, unless their places are apart.
+            // Strips of other layers that have a column which meets one of this strip, unless their positions are apart.
             let others = |(strips, extents): (&'a [u32], &'a [[i32; 2]])| {
                 let all = strips.iter().zip(extents).enumerate();
                 all.filter(move |(other, (_, range))| {
@@ -195,11 +195,11 @@ impl<'a> Joiner<'a> {
         all.fold(0, |cells, more| cells | more)
     }
 
-    /// Bits of the columns of a strip that liquid can pass from to those of another strip, so many places behind theirs.
-    fn meeting(&self, strip: usize, other: usize, places: usize) -> u16 {
+    /// Bits of the columns of a strip that liquid can pass from to those of another strip, so many positions behind theirs.
+    fn meeting(&self, strip: usize, other: usize, positions: usize) -> u16 {
         let (bases, ceilings) = (self.columns.bases(), self.columns.ceilings());
         let (base, ceiling) = (strip_of(bases, strip), strip_of(ceilings, strip));
-        let first = other * STRIP + places;
+        let first = other * STRIP + positions;
         let (other_base, other_ceiling) = (&bases[first..first + STRIP], &ceilings[first..first + STRIP]);
         let (mut open, mut any) = ([0; STRIP], 0);
         for x in 0..STRIP {
@@ -219,13 +219,15 @@ impl<'a> Joiner<'a> {
         for &strip in self.own.of(block) {
             let present = self.columns.present(strip as usize);
             let base = strip_of(self.columns.bases(), strip as usize);
-            for (place, base) in base.iter().enumerate().filter(|(place, _)| present >> place & 1 == 1) {
-                let at = [block * STRIP + place, self.row];
+            for (position, base) in
+                base.iter().enumerate().filter(|(position, _)| present >> position & 1 == 1)
+            {
+                let at = [block * STRIP + position, self.row];
                 let falls = Side::ALL.into_iter().any(|side| {
                     let cell = side.cell(at, [nx, self.columns.grid.size[1]]);
                     cell.is_some_and(|cell| self.is_void(side, cell, *base))
                 });
-                cells |= u16::from(falls) << place;
+                cells |= u16::from(falls) << position;
             }
         }
         cells

@@ -96,7 +96,7 @@ impl Pipes {
 /// The ends of links by column; kept, so that nothing is allocated again.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Ends {
-    /// Bits of the places of each strip that have links.
+    /// Bits of the positions of each strip that have links.
     marks: Vec<u16>,
     /// Where the columns of each strip begin among those that have links.
     firsts: Vec<u32>,
@@ -107,8 +107,8 @@ pub(super) struct Ends {
 impl Ends {
     /// The rank of a column with links among all of them.
     fn rank(&self, column: u32) -> usize {
-        let (strip, place) = (column as usize / STRIP, column as usize % STRIP);
-        let before = self.marks[strip] & ((1 << place) - 1);
+        let (strip, position) = (column as usize / STRIP, column as usize % STRIP);
+        let before = self.marks[strip] & ((1 << position) - 1);
         self.firsts[strip] as usize + before.count_ones() as usize
     }
 }

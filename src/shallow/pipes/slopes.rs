@@ -130,11 +130,11 @@ fn rise_of<const WALLED: bool>(steps: [i32; 2], open: [i32; 2], steepest: i32) -
 #[inline(always)]
 fn rise<const WALLED: bool>(columns: &Columns, row: usize, rises: &mut Rises, steepest: i32) {
     let (bases, ceilings) = (columns.bases(), columns.ceilings());
-    for (place, strip) in columns.row(row).enumerate() {
+    for (position, strip) in columns.row(row).enumerate() {
         let beside = [columns.west(strip).is_some(), columns.east(strip).is_some()];
         let base = window(bases, strip, beside);
         let ceiling = window(ceilings, strip, beside);
-        let along = strip_mut(&mut rises.x, place);
+        let along = strip_mut(&mut rises.x, position);
         for x in 0..STRIP {
             let open_west = passes([base[x], base[x + 1]], [ceiling[x], ceiling[x + 1]]);
             let open_east = passes([base[x + 1], base[x + 2]], [ceiling[x + 1], ceiling[x + 2]]);
@@ -145,7 +145,7 @@ fn rise<const WALLED: bool>(columns: &Columns, row: usize, rises: &mut Rises, st
         let (north, south) = (columns.north(strip), columns.south(strip));
         let (north_base, north_ceiling) = (beyond(bases, north), beyond(ceilings, north));
         let (south_base, south_ceiling) = (beyond(bases, south), beyond(ceilings, south));
-        let across = strip_mut(&mut rises.z, place);
+        let across = strip_mut(&mut rises.z, position);
         for x in 0..STRIP {
             let open_north = passes([north_base[x], base[x]], [north_ceiling[x], ceiling[x]]);
             let open_south = passes([base[x], south_base[x]], [ceiling[x], south_ceiling[x]]);
@@ -159,12 +159,12 @@ fn rise<const WALLED: bool>(columns: &Columns, row: usize, rises: &mut Rises, st
 fn open_strips(columns: &Columns, row: usize, rises: [&Rises; 2], east: &mut [f32], south: &mut [f32]) {
     let (bases, ceilings, scale) = (columns.bases(), columns.ceilings(), scale(columns));
     let strips = columns.row(row);
-    for (place, strip) in strips.clone().enumerate() {
+    for (position, strip) in strips.clone().enumerate() {
         let (base, ceiling) = (strip_of(bases, strip), strip_of(ceilings, strip));
         let beside = [false, columns.east(strip).is_some()];
         let east_base = window(bases, strip, beside);
         let east_ceiling = window(ceilings, strip, beside);
-        let across = &rises[0].z[place * STRIP..][..=STRIP];
+        let across = &rises[0].z[position * STRIP..][..=STRIP];
         let open = strip_mut(east, strip);
         for x in 0..STRIP {
             let passes = passes([base[x], east_base[x + 2]], [ceiling[x], east_ceiling[x + 2]]);
@@ -180,7 +180,7 @@ fn open_strips(columns: &Columns, row: usize, rises: [&Rises; 2], east: &mut [f3
         }
         let behind = columns.south(strip) as usize;
         let (south_base, south_ceiling) = (strip_of(bases, behind), strip_of(ceilings, behind));
-        let along_own = strip_of(&rises[0].x, place);
+        let along_own = strip_of(&rises[0].x, position);
         let along_behind = strip_of(&rises[1].x, behind - strips.end);
         for x in 0..STRIP {
             let passes = passes([base[x], south_base[x]], [ceiling[x], south_ceiling[x]]);

@@ -61,7 +61,7 @@ impl Shallow {
     /// below a body is as the last step has found it: after [`Shallow::set_bodies`] a step comes first. Allocates nothing.
     ///
     /// # Errors
-    /// `Argument`: a density that is not positive and finite, not one velocity and one place for each body, a velocity that is not finite.
+    /// `Argument`: a density that is not positive and finite, not one velocity and one position for each body, a velocity that is not finite.
     pub fn loads(&self, density: f64, velocities: &[[f64; 3]], out: &mut [Load]) -> Result<()> {
         if !(density > 0.0 && density.is_finite()) {
             return Err(Error::argument(format!("density = {density} kg/m3 is not positive and finite")));

@@ -72,7 +72,7 @@ impl View<'_> {
     /// As [`View::volume`], of boxes of two corners each.
     ///
     /// # Errors
-    /// As [`View::volume`], naming the box; `Argument` also where there is not one place for each. Nothing is written.
+    /// As [`View::volume`], naming the box; `Argument` also where there is not one position for each. Nothing is written.
     pub fn volumes(&self, boxes: &[[[f64; 3]; 2]], out: &mut [f64]) -> Result<()> {
         check_room("volumes", out.len(), "boxes", boxes.len())?;
         for (at, [low, high]) in boxes.iter().enumerate() {
@@ -139,7 +139,7 @@ impl View<'_> {
     /// As [`View::at`], of each point.
     ///
     /// # Errors
-    /// `Argument`: there is not one place for each; nothing is written.
+    /// `Argument`: there is not one position for each; nothing is written.
     pub fn read(&self, points: &[[f64; 3]], out: &mut [Option<Reading>]) -> Result<()> {
         check_room("readings", out.len(), "points", points.len())?;
         out.iter_mut().zip(points).for_each(|(out, point)| *out = self.at(*point));
@@ -200,7 +200,7 @@ impl View<'_> {
     }
 }
 
-/// The cells along an axis (0: x, 1: z) whose centres lie within two places (m).
+/// The cells along an axis (0: x, 1: z) whose centres lie within two positions (m).
 fn cells(grid: &Grid, axis: usize, low: f64, high: f64) -> Range<usize> {
     let first = |is_before: &dyn Fn(f64) -> bool| {
         let (mut start, mut end) = (0, grid.size[axis]);

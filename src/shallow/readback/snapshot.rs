@@ -141,7 +141,7 @@ impl Shallow {
     /// As [`Shallow::velocity`], of every column index: the mean velocity over its depth (m/s), along x and z.
     ///
     /// # Errors
-    /// `Argument`: there is not one place for each index.
+    /// `Argument`: there is not one position for each index.
     pub fn velocities(&self, out: &mut [[f32; 2]]) -> Result<()> {
         let len = self.columns.len();
         if out.len() != len {
@@ -180,12 +180,15 @@ fn find_velocities(shallow: &Shallow, run: Range<usize>, out: &mut [[f32; 2]]) {
                 NONE => &[0.0; STRIP],
                 north => &south[north as usize],
             };
-            for place in 0..STRIP {
-                let depth = depth[strip][place];
+            for position in 0..STRIP {
+                let depth = depth[strip][position];
                 let each = if depth > 0 { scale / depth as f32 } else { 0.0 };
                 // Without a sign at 0, so that it is the same seen from the other side.
                 let mean = |before: f32, behind: f32| (behind + before) * each + 0.0;
-                out[place] = [mean(west[place], east[strip][place]), mean(north[place], south[strip][place])];
+                out[position] = [
+                    mean(west[position], east[strip][position]),
+                    mean(north[position], south[strip][position]),
+                ];
             }
         }
     }

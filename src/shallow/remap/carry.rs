@@ -85,16 +85,16 @@ impl Carry {
         let Some(old_from) = change.origins.column(from) else { return [0.0; 2] };
         let old_to = if to == NONE { Some(NONE) } else { change.origins.column(to) };
         let Some(old_to) = old_to else { return [0.0; 2] };
-        let place = change.old_strip(old_from);
-        let row = place.row as usize - self.rows.start;
-        let x = place.at * STRIP as u32 + old_from % STRIP as u32;
+        let position = change.old_strip(old_from);
+        let row = position.row as usize - self.rows.start;
+        let x = position.at * STRIP as u32 + old_from % STRIP as u32;
         let links = &self.old[self.starts[row] as usize..self.starts[row + 1] as usize];
         let first = links.partition_point(|link| link.x < x);
         let mut links = links[first..].iter().take_while(|link| link.x == x);
         let link = links.find(|link| (link.from, link.to, link.side) == (old_from, old_to, side));
         match link {
             Some(link) => link.carried,
-            None if old_to != NONE && change.old_strip(old_to).layer == place.layer => {
+            None if old_to != NONE && change.old_strip(old_to).layer == position.layer => {
                 change.regular(flow, old_from, side)
             }
             None => [0.0; 2],

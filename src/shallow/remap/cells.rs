@@ -35,7 +35,7 @@ pub(super) struct New {
     pub amounts: [i64; MOST],
 }
 
-/// Liquid that has to find a place.
+/// Liquid that has to find a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Parcel {
     /// It goes to the first column whose ceiling is over this.
@@ -59,11 +59,11 @@ pub(super) struct Cell {
     costs: Vec<i64>,
 }
 
-/// What finds no place in its cell.
+/// What finds no position in its cell.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Rest {
     pub units: i64,
-    /// The lowest place where it stood.
+    /// The lowest position where it stood.
     pub height: i32,
     /// Units that did not stay in their columns, the others included.
     pub displaced: i64,
@@ -94,7 +94,7 @@ impl Cell {
         for at in 0..self.parcels.len() {
             let mut parcel = self.parcels[at];
             rest.displaced += parcel.units;
-            self.place(&mut parcel);
+            self.position(&mut parcel);
             if parcel.units > 0 {
                 rest.units += parcel.units;
                 rest.height = rest.height.min(parcel.height);
@@ -163,8 +163,8 @@ impl Cell {
         }
     }
 
-    /// Fills columns with a parcel, from where it goes first up, then from there down; leaves what finds no place.
-    fn place(&mut self, parcel: &mut Parcel) {
+    /// Fills columns with a parcel, from where it goes first up, then from there down; leaves what finds no position.
+    fn position(&mut self, parcel: &mut Parcel) {
         if self.under != BOTTOMLESS && parcel.above < self.under {
             return;
         }

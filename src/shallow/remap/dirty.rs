@@ -70,8 +70,8 @@ impl Dirty {
         let blocks = self.rows().flat_map(move |row| (0..self.blocks).map(move |block| [block, row]));
         blocks.flat_map(move |[block, row]| {
             let cells = self.of(row, block);
-            let set = (0..STRIP).filter(move |place| cells >> place & 1 == 1);
-            set.map(move |place| [block * STRIP + place, row])
+            let set = (0..STRIP).filter(move |position| cells >> position & 1 == 1);
+            set.map(move |position| [block * STRIP + position, row])
         })
     }
 }

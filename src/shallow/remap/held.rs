@@ -231,14 +231,14 @@ impl Held {
 
 /// Whether a cell has no ground at a height, or it hangs over it.
 fn is_void(columns: &Columns, cell: u32, height: i32) -> bool {
-    let lowest = columns.of_cell(place(columns, cell)).next();
+    let lowest = columns.of_cell(position(columns, cell)).next();
     lowest.is_none_or(|lowest| {
         let under = columns.unders()[lowest];
         under != BOTTOMLESS && height < under
     })
 }
 
-fn place(columns: &Columns, cell: u32) -> [usize; 2] {
+fn position(columns: &Columns, cell: u32) -> [usize; 2] {
     let nx = columns.grid.size[0];
     [cell as usize % nx, cell as usize / nx]
 }
@@ -253,7 +253,7 @@ fn room(columns: &Columns, flow: &Flow, cell: u32, height: i32) -> i64 {
     if is_void(columns, cell, height) {
         return 0;
     }
-    columns.of_cell(place(columns, cell)).map(|column| room_of(columns, flow, column)).sum()
+    columns.of_cell(position(columns, cell)).map(|column| room_of(columns, flow, column)).sum()
 }
 
 /// Fills the columns of a cell, from that at the parcel's height up, then from there down; leaves what they do not take.
@@ -262,7 +262,7 @@ fn put(columns: &Columns, flow: &mut Flow, order: &mut Vec<u32>, parcel: &mut Pa
         return;
     }
     order.clear();
-    order.extend(columns.of_cell(place(columns, parcel.cell)).map(|column| column as u32));
+    order.extend(columns.of_cell(position(columns, parcel.cell)).map(|column| column as u32));
     let first = order.partition_point(|&column| columns.ceilings()[column as usize] <= parcel.height);
     let (below, above) = order.split_at(first);
     for &column in above.iter().chain(below.iter().rev()) {

@@ -67,7 +67,7 @@ impl Layout {
         }
     }
 
-    /// Makes the new columns, for which there is room, and gives them the liquid that has a place in its cell; the rest goes to `held`. Returns how much
+    /// Makes the new columns, for which there is room, and gives them the liquid that has a position in its cell; the rest goes to `held`. Returns how much
     /// did not stay in its column (units).
     pub fn lay<'s>(
         &mut self,
@@ -105,9 +105,9 @@ impl Layout {
                 next += cells.count_ones() as usize;
                 let mut moves = block.keep(columns, liquid, self.cell.reach as i32);
                 while moves != 0 {
-                    let place = moves.trailing_zeros() as usize;
+                    let position = moves.trailing_zeros() as usize;
                     moves &= moves - 1;
-                    block.remap(columns, liquid, place, &mut self.cell, |cell, rest| {
+                    block.remap(columns, liquid, position, &mut self.cell, |cell, rest| {
                         displaced += rest.displaced;
                         held.add(grid.index(cell), rest.height, rest.units, rest.amounts);
                     });
@@ -130,7 +130,7 @@ fn place_strips(columns: &mut Columns, row: usize, layers: &[u32]) {
     }
 }
 
-/// Bits of the places for which something holds.
+/// Bits of the positions for which something holds.
 fn bits(holds: impl Fn(usize) -> bool) -> u16 {
     (0..STRIP).fold(0, |bits, x| bits | u16::from(holds(x)) << x)
 }
@@ -189,8 +189,8 @@ impl Block<'_> {
     fn lay<'s>(&self, columns: &mut Columns, cast: impl Fn(usize) -> &'s [Solid]) {
         let mut solids = [&[][..]; STRIP];
         let mut rank = 0;
-        for (place, solids) in solids.iter_mut().enumerate() {
-            if self.cells >> place & 1 == 1 {
+        for (position, solids) in solids.iter_mut().enumerate() {
+            if self.cells >> position & 1 == 1 {
                 *solids = cast(rank);
                 rank += 1;
             }
@@ -198,21 +198,21 @@ impl Block<'_> {
         for (layer, &strip) in self.new.iter().enumerate() {
             let (mut base, mut ceiling, mut under) = ([0; STRIP], [0; STRIP], [0; STRIP]);
             let mut present = 0;
-            for (place, solids) in solids.iter().enumerate() {
+            for (position, solids) in solids.iter().enumerate() {
                 if let Some(solid) = solids.get(layer) {
-                    present |= 1 << place;
-                    (under[place], base[place]) = (solid[0], solid[1]);
-                    ceiling[place] = solids.get(layer + 1).map_or(TOP, |above| above[0]);
+                    present |= 1 << position;
+                    (under[position], base[position]) = (solid[0], solid[1]);
+                    ceiling[position] = solids.get(layer + 1).map_or(TOP, |above| above[0]);
                 }
             }
             if let Some(&old) = self.old.get(layer).filter(|_| self.cells != u16::MAX) {
                 let stays = self.band.present[old as usize] & !self.cells;
                 present |= stays;
-                for place in (0..STRIP).filter(|place| stays >> place & 1 == 1) {
-                    let index = old as usize * STRIP + place;
-                    base[place] = self.band.base[index];
-                    ceiling[place] = self.band.ceiling[index];
-                    under[place] = self.band.under[index];
+                for position in (0..STRIP).filter(|position| stays >> position & 1 == 1) {
+                    let index = old as usize * STRIP + position;
+                    base[position] = self.band.base[index];
+                    ceiling[position] = self.band.ceiling[index];
+                    under[position] = self.band.under[index];
                 }
             }
             let strip = columns.set_strip(strip as usize, present);
@@ -267,19 +267,20 @@ impl Block<'_> {
         moves & any
     }
 
-    /// Gives the liquid of a cell to its new columns; `see` receives the cell and what finds no place.
+    /// Gives the liquid of a cell to its new columns; `see` receives the cell and what finds no position.
     fn remap(
         &mut self,
         columns: &Columns,
         liquid: &mut Liquid,
-        place: usize,
+        position: usize,
         cell: &mut Cell,
         see: impl FnOnce([usize; 2], super::cells::Rest),
     ) {
         let band = self.band;
         cell.old.clear();
-        for &strip in self.old.iter().take_while(|&&strip| band.present[strip as usize] >> place & 1 == 1) {
-            let index = strip as usize * STRIP + place;
+        for &strip in self.old.iter().take_while(|&&strip| band.present[strip as usize] >> position & 1 == 1)
+        {
+            let index = strip as usize * STRIP + position;
             let amount = |of: &Vec<f64>| of.get(index).map_or(0, |&amount| amount as i64);
             let amounts = band.amounts.each_ref().map(amount);
             let (base, depth) = (band.base[index], band.depth[index]);
@@ -287,9 +288,10 @@ impl Block<'_> {
         }
         cell.new.clear();
         cell.under = BOTTOMLESS;
-        for &strip in self.new.iter().take_while(|&&strip| columns.present(strip as usize) >> place & 1 == 1)
+        for &strip in
+            self.new.iter().take_while(|&&strip| columns.present(strip as usize) >> position & 1 == 1)
         {
-            let index = strip as usize * STRIP + place;
+            let index = strip as usize * STRIP + position;
             if cell.new.is_empty() {
                 cell.under = columns.unders()[index];
             }
@@ -306,6 +308,6 @@ impl Block<'_> {
             self.origins.set(new.index, new.from);
         }
         let strip = band.strips[self.old[0] as usize];
-        see([strip.at as usize * STRIP + place, strip.row as usize], rest);
+        see([strip.at as usize * STRIP + position, strip.row as usize], rest);
     }
 }

@@ -32,19 +32,19 @@ impl Origins {
     }
 
     /// Says that some columns of a strip were in a strip of the band.
-    pub fn keep(&mut self, strip: usize, old: u32, places: u16) {
-        self.strips[strip - self.first] = (old, places);
+    pub fn keep(&mut self, strip: usize, old: u32, positions: u16) {
+        self.strips[strip - self.first] = (old, positions);
     }
 
     /// Says which column of the band one was, or [`NONE`].
     pub fn set(&mut self, index: u32, old: u32) {
-        let (strip, place) = (index as usize / STRIP, index as usize % STRIP);
-        let (from, places) = &mut self.strips[strip - self.first];
+        let (strip, position) = (index as usize / STRIP, index as usize % STRIP);
+        let (from, positions) = &mut self.strips[strip - self.first];
         if old == NONE {
             return;
         }
         if old / STRIP as u32 == *from {
-            *places |= 1 << place;
+            *positions |= 1 << position;
         } else {
             self.odd.push([index, old]);
         }
@@ -73,17 +73,17 @@ impl Origins {
         } else if strip >= self.first + self.counts[1] {
             (strip - self.counts[1] + self.counts[0], u16::MAX)
         } else {
-            let (old, places) = self.strips[strip - self.first];
-            (self.first.wrapping_add(old as usize), places)
+            let (old, positions) = self.strips[strip - self.first];
+            (self.first.wrapping_add(old as usize), positions)
         }
     }
 
     /// The index that a column had, among all.
     pub fn column(&self, index: u32) -> Option<u32> {
-        let place = index as usize % STRIP;
-        let (strip, places) = self.strip(index as usize / STRIP);
-        if places >> place & 1 == 1 {
-            return Some((strip * STRIP + place) as u32);
+        let position = index as usize % STRIP;
+        let (strip, positions) = self.strip(index as usize / STRIP);
+        if positions >> position & 1 == 1 {
+            return Some((strip * STRIP + position) as u32);
         }
         let at = self.odd.binary_search_by_key(&index, |[index, _]| *index).ok()?;
         Some(self.odd[at][1] + (self.first * STRIP) as u32)

@@ -58,22 +58,22 @@ fn params(border: Border) -> Params {
 /// The state of every pipe by its ends, as cells and layers, and side: flux and what truncation left, in order.
 fn carried(shallow: &Shallow) -> Vec<([usize; 7], [u32; 2])> {
     let (columns, flow, links) = (&shallow.columns, &shallow.flow, &shallow.pipes.links);
-    let place = |index: usize| {
+    let position = |index: usize| {
         let [x, z] = columns.cell(index);
         [x, z, columns.layer(index)]
     };
     let mut all = Vec::new();
     let mut add = |from: usize, to: Option<usize>, side: usize, carried: [f32; 2]| {
-        let ([a, b, c], [d, e, f]) = (place(from), to.map_or([usize::MAX; 3], place));
+        let ([a, b, c], [d, e, f]) = (position(from), to.map_or([usize::MAX; 3], position));
         all.push(([a, b, c, d, e, f, side], carried.map(f32::to_bits)));
     };
     for i in columns.indices() {
-        let (strip, place) = (i / STRIP, i % STRIP);
+        let (strip, position) = (i / STRIP, i % STRIP);
         if shallow.pipes.east[i] > 0.0 {
             add(i, Some(i + 1), 0, [flow.flux[0][i], flow.left[0][i]]);
         }
         if shallow.pipes.south[i] > 0.0 {
-            let j = columns.south(strip) as usize * STRIP + place;
+            let j = columns.south(strip) as usize * STRIP + position;
             add(i, Some(j), 1, [flow.flux[1][i], flow.left[1][i]]);
         }
     }

@@ -87,7 +87,7 @@ impl Shallow {
     /// Puts a saved state in place of the liquid's: from here it flows as the saved one did, to the same bytes, with the same parameters.
     ///
     /// Where the saved liquid had flow points, the same ones are set first ([`Shallow::set_flows`]): what each of them waits for and has
-    /// moved is restored in their order. Their places and rates are not compared; the terrain is, by a hash, and the border.
+    /// moved is restored in their order. Their positions and rates are not compared; the terrain is, by a hash, and the border.
     /// The same scalars are set first, too; what sources and pours carry is not restored. [`Shallow::last_steps`] is empty behind it. Nothing is
     /// allocated.
     ///
@@ -387,9 +387,9 @@ fn has_bad_columns(saved: &Saved<'_>, columns: &Columns) -> bool {
         for (strip, depths) in run.zip(depth) {
             let row_depth = i32::from_le_bytes(saved.row_depths[columns.strips()[strip].row as usize]);
             let (base, ceiling) = (&bases[strip], &ceilings[strip]);
-            for (place, depth) in depths.as_chunks().0.iter().enumerate() {
+            for (position, depth) in depths.as_chunks().0.iter().enumerate() {
                 let depth = i32::from_le_bytes(*depth);
-                let room = ceiling[place] - base[place];
+                let room = ceiling[position] - base[position];
                 bad |= depth | room.wrapping_sub(depth) | row_depth.wrapping_sub(depth);
             }
         }

@@ -100,11 +100,11 @@ impl Amounts {
     /// None of each scalar in so many indices.
     pub fn new(scalars: Vec<Scalar>, len: usize) -> Self {
         // Where the arrays begin that a step does not need at the same time.
-        let places = [Array::Under, Array::Ceiling, Array::Head, Array::Light];
+        let positions = [Array::Under, Array::Ceiling, Array::Head, Array::Light];
         let count = scalars.len();
         Self {
             amounts: std::array::from_fn(|at| {
-                PerColumn::new(places[at], if at < count { len } else { 0 }, 0.0)
+                PerColumn::new(positions[at], if at < count { len } else { 0 }, 0.0)
             }),
             scalars,
             sums: [[0; ACCOUNTS]; MOST],

@@ -180,7 +180,7 @@ impl Shallow {
     /// As [`Shallow::concentration`], of every column index.
     ///
     /// # Errors
-    /// `Argument`: there is no such scalar, or not one place for each index.
+    /// `Argument`: there is no such scalar, or not one position for each index.
     pub fn concentrations(&self, scalar: usize, out: &mut [f32]) -> Result<()> {
         check_scalar(scalar, self.scalars().len())?;
         let len = self.columns.len();

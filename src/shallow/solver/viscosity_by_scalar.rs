@@ -108,16 +108,16 @@ impl Thick {
                 mean([from, to].map(|end| flow.depth[end] as f32), [from, to].map(|end| self.times[end]));
             self.links[link] = pipes.links.open[link] / mean;
         }
-        self.change_places(pipes);
+        self.change_positions(pipes);
         Ok(())
     }
 
     /// Puts the pipes' own openness back.
     pub fn end(&mut self, pipes: &mut Pipes) {
-        self.change_places(pipes);
+        self.change_positions(pipes);
     }
 
-    fn change_places(&mut self, pipes: &mut Pipes) {
+    fn change_positions(&mut self, pipes: &mut Pipes) {
         std::mem::swap(&mut self.east, &mut pipes.east);
         std::mem::swap(&mut self.south, &mut pipes.south);
         std::mem::swap(&mut self.links, &mut pipes.links.open);

@@ -295,13 +295,13 @@ impl Flows {
 
 /// Points on their columns, of which one may have none.
 fn placed(columns: &Columns, points: &[FlowPoint], which: &impl Fn(usize) -> String) -> Result<Vec<Placed>> {
-    let place = |(at, point): (usize, &FlowPoint)| {
+    let position = |(at, point): (usize, &FlowPoint)| {
         point.validate().map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
         let mut found = Vec::new();
         point.find_columns(columns, &mut found);
         Ok(Placed { point: point.clone(), columns: found, waiting: 0.0, moved: 0, levels: [0; MOST] })
     };
-    points.iter().enumerate().map(place).collect()
+    points.iter().enumerate().map(position).collect()
 }
 
 impl Placed {
@@ -320,7 +320,7 @@ impl Placed {
             return 0;
         }
         let count = self.columns.len() as f64;
-        // Nothing is owed for long; a drain over a dry place does not make up for it either.
+        // Nothing is owed for long; a drain over a dry position does not make up for it either.
         self.waiting = self.waiting.min(asked.max(OWED * count)) + asked;
         let mut share = (self.waiting / count).floor().min(1e18) as i64;
         if let Kind::Absorber(capacity) = self.point.kind {
@@ -338,7 +338,7 @@ impl Placed {
         self.moved += moved;
         self.waiting -= moved as f64;
         if sign < 0 {
-            // A drain over a dry place does not make up for it later.
+            // A drain over a dry position does not make up for it later.
             self.waiting = self.waiting.min(count);
         }
         moved

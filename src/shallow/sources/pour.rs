@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::shallow::system::Shallow;
 
 impl Shallow {
-    /// Pours a volume (m3; negative: takes it) into the columns that a source at a place (m) would act on, an equal share into each, between dry and its
+    /// Pours a volume (m3; negative: takes it) into the columns that a source at a position (m) would act on, an equal share into each, between dry and its
     /// ceiling; returns what came in (m3).
     ///
     /// # Errors

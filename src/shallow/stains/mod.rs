@@ -207,7 +207,7 @@ impl Stains {
     /// How stained each vertex is now, 0 to 1.
     ///
     /// # Errors
-    /// `Argument`: there is not one place for each vertex.
+    /// `Argument`: there is not one position for each vertex.
     pub fn stains(&self, out: &mut [f32]) -> Result<()> {
         self.check_room(out.len())?;
         out.iter_mut().zip(self.each()).for_each(|(out, stain)| *out = stain);

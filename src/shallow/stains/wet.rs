@@ -36,8 +36,8 @@ impl Wet {
             if bits == 0 {
                 continue;
             }
-            let place = columns.strips()[strip];
-            let first = &mut self.first[place.row as usize * blocks + place.at as usize];
+            let position = columns.strips()[strip];
+            let first = &mut self.first[position.row as usize * blocks + position.at as usize];
             self.strips.push(WetStrip { strip: strip as u32, bits, next: *first });
             *first = self.strips.len() as u32 - 1;
         }
@@ -48,19 +48,19 @@ impl Wet {
         self.strips.is_empty()
     }
 
-    /// The column of a place's cell that wets it: one that is within a cell of it, from the base to the surface. Of several the nearest, of two
+    /// The column of a position's cell that wets it: one that is within a cell of it, from the base to the surface. Of several the nearest, of two
     /// as near the lower one.
     #[inline(always)]
-    pub fn column_at(&self, columns: &Columns, depth: &[i32], place: &Vec3) -> Option<usize> {
-        let place = place.cast::<f64>();
-        let [x, z] = columns.grid.cell_at([place.x, place.z])?;
+    pub fn column_at(&self, columns: &Columns, depth: &[i32], position: &Vec3) -> Option<usize> {
+        let position = position.cast::<f64>();
+        let [x, z] = columns.grid.cell_at([position.x, position.z])?;
         let blocks = columns.grid.size[0].div_ceil(STRIP);
         let mut at = self.first[z * blocks + x / STRIP];
         if at == NONE {
             return None;
         }
         let heights = &columns.heights;
-        let height = (place.y - heights.low) / heights.unit;
+        let height = (position.y - heights.low) / heights.unit;
         let (mut nearest, mut least) = (None, columns.grid.cell / heights.unit);
         while at != NONE {
             let WetStrip { strip, bits, next } = self.strips[at as usize];

@@ -264,9 +264,9 @@ impl Sum {
         if value == 0 {
             return;
         }
-        let place = (exponent + Self::LAST) as usize;
-        let wide = value << (place % 32);
-        let digits = &mut self.0[place / 32..place / 32 + 4];
+        let position = (exponent + Self::LAST) as usize;
+        let wide = value << (position % 32);
+        let digits = &mut self.0[position / 32..position / 32 + 4];
         for (turn, digit) in digits.iter_mut().enumerate() {
             let rest = wide >> (32 * turn);
             *digit += if turn == 3 { rest as i64 } else { rest as i64 & 0xffff_ffff };
@@ -325,11 +325,11 @@ mod tests {
     /// Corners on a ring around a line, some of them beside it or on it exactly.
     #[test]
     fn a_fan_is_crossed_once_even_at_its_hub_and_its_spokes() {
-        let lines = |places: &[f64]| Lines::new(places.iter().copied(), 0.5, 4.0);
+        let lines = |positions: &[f64]| Lines::new(positions.iter().copied(), 0.5, 4.0);
         let ring =
             [[2, 0], [2, 1], [2, 2], [1, 2], [0, 2], [-2, 2], [-2, 0], [-2, -2], [-1, -2], [0, -2], [2, -2]];
-        let places = [-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5].map(|place| 0.25 + place);
-        let lines = [lines(&places), lines(&places)];
+        let positions = [-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5].map(|position| 0.25 + position);
+        let lines = [lines(&positions), lines(&positions)];
         let corner = |[x, z]: [i32; 2]| [f64::from(x) + 0.25, 0.3, f64::from(z) + 0.25];
         let mut counts = [[0; 7]; 7];
         for (turn, spoke) in ring.iter().enumerate() {
@@ -375,7 +375,7 @@ mod tests {
             let sides = [[0, 1], [1, 2], [2, 0]].map(|edge| {
                 let [a, b] = edge.map(|corner| [corners[corner][0], corners[corner][2]]);
                 let rounded = cross([a[0] - at[0], a[1] - at[1]], [b[0] - at[0], b[1] - at[1]]);
-                let [[ax, az], [bx, bz], [x, z]] = [a, b, at].map(|place| place.map(exact));
+                let [[ax, az], [bx, bz], [x, z]] = [a, b, at].map(|position| position.map(exact));
                 let side = ((ax - x) * (bz - z) - (az - z) * (bx - x)).signum();
                 wrong += i32::from((rounded > 0.0) != (side > 0) || (rounded < 0.0) != (side < 0));
                 side
@@ -391,12 +391,12 @@ mod tests {
     fn an_edge_has_the_same_height_in_both_of_its_triangles() {
         let [a, b] = [[-1.0, 0.1, -1.0], [3.0, 0.7, 3.0]];
         let sides = [[[3.0, 0.35, -1.7], a, b], [b, a, [-1.3, 0.9, 2.0]]];
-        for place in [0.1, 0.3, 1.7, 2.9] {
+        for position in [0.1, 0.3, 1.7, 2.9] {
             let heights = sides.map(|corners| {
                 let facet = Facet::new(corners, 1e-9);
-                facet.cross_exactly([place; 2], [0.0; 3]).map(|(height, _)| height)
+                facet.cross_exactly([position; 2], [0.0; 3]).map(|(height, _)| height)
             });
-            let height = 0.1 + (place + 1.0) / 4.0 * (0.7 - 0.1);
+            let height = 0.1 + (position + 1.0) / 4.0 * (0.7 - 0.1);
             // One of the two has the edge.
             assert_eq!(heights.map(|height| height.is_some()).iter().filter(|has| **has).count(), 1);
             assert!(heights.iter().flatten().all(|found| *found == height), "{heights:?}, {height}");

@@ -80,8 +80,8 @@ impl Image<'_> {
         Ok(())
     }
 
-    /// Height (m) at a place, bilinear between the centres of pixels; beyond the outermost centres it is theirs. An image that is
-    /// mirrored or turned by 90 degrees about its middle, place and all, gives the same bits.
+    /// Height (m) at a position, bilinear between the centres of pixels; beyond the outermost centres it is theirs. An image that is
+    /// mirrored or turned by 90 degrees about its middle, position and all, gives the same bits.
     pub fn height(&self, at: [f64; 2]) -> f64 {
         let [x, z] = [0, 1].map(|axis| self.beside(axis, at[axis]));
         let grey = |x: usize, z: usize| f64::from(self.greys[z * self.size[0] + x]);
@@ -95,16 +95,16 @@ impl Image<'_> {
     }
 
     /// The two pixels along an axis between whose centres a coordinate lies, and their weights; one that has all of it twice.
-    fn beside(&self, axis: usize, place: f64) -> [(usize, f64); 2] {
+    fn beside(&self, axis: usize, position: f64) -> [(usize, f64); 2] {
         let (count, last) = (self.size[axis] as f64, self.size[axis] - 1);
         let pixel = self.extent[axis] / count;
         // From the middle of the image, about which a mirror exchanges first and last.
-        let place = place - (self.corner[axis] + self.extent[axis] / 2.0);
+        let position = position - (self.corner[axis] + self.extent[axis] / 2.0);
         let centre = |index: usize| (index as f64 + 0.5 - count / 2.0) * pixel;
-        let first = (place / pixel + (count - 1.0) / 2.0).floor().clamp(0.0, last as f64) as usize;
+        let first = (position / pixel + (count - 1.0) / 2.0).floor().clamp(0.0, last as f64) as usize;
         let next = (first + 1).min(last);
-        let [behind, ahead] =
-            [place - centre(first), centre(next) - place].map(|length| (length / pixel).clamp(0.0, 1.0));
+        let [behind, ahead] = [position - centre(first), centre(next) - position]
+            .map(|length| (length / pixel).clamp(0.0, 1.0));
         if behind == 0.0 {
             [(first, 1.0), (first, 0.0)]
         } else if ahead == 0.0 {
@@ -178,7 +178,7 @@ mod tests {
         let turned = Image { size: [2, 3], corner: [-1.0, -1.5], extent: [2.0, 3.0], ..image(&turned) };
         for x in -20..=20 {
             for z in -20..=20 {
-                let [x, z] = [x, z].map(|place| f64::from(place) * 0.0813);
+                let [x, z] = [x, z].map(|position| f64::from(position) * 0.0813);
                 let height = image(&greys).height([x, z]).to_bits();
                 assert_eq!(image(&mirrored).height([-x, z]).to_bits(), height, "({x}, {z}) mirrored");
                 assert_eq!(turned.height([z, -x]).to_bits(), height, "({x}, {z}) turned");

@@ -2,7 +2,7 @@
 
 use super::crossings::Corner;
 
-/// Places that are asked for together.
+/// Positions that are asked for together.
 pub const LANES: usize = 4;
 
 /// Unit roundoff of f64.
@@ -11,7 +11,7 @@ pub(super) const ROUNDOFF: f64 = f64::EPSILON / 2.0;
 /// The coordinates of the lines through the cells of one axis.
 pub struct Lines {
     /// Ascending, between an infinity at one end and some at the other.
-    places: Vec<f64>,
+    positions: Vec<f64>,
     /// Count of lines.
     count: usize,
     /// 1 / cell (1/m).
@@ -23,40 +23,40 @@ pub struct Lines {
 impl Lines {
     /// Lines at strictly ascending coordinates; `reach` bounds them and the origin that they are counted from.
     pub fn new(centres: impl Iterator<Item = f64>, cell: f64, reach: f64) -> Self {
-        let mut places = vec![f64::NEG_INFINITY];
-        places.extend(centres);
-        let count = places.len() - 1;
-        places.extend([f64::INFINITY; LANES]);
-        Self { places, count, inverse: 1.0 / cell, reach }
+        let mut positions = vec![f64::NEG_INFINITY];
+        positions.extend(centres);
+        let count = positions.len() - 1;
+        positions.extend([f64::INFINITY; LANES]);
+        Self { positions, count, inverse: 1.0 / cell, reach }
     }
 
     /// Coordinate of a line.
     pub fn at(&self, line: u32) -> f64 {
-        self.places[line as usize + 1]
+        self.positions[line as usize + 1]
     }
 
     /// Coordinates of a line and those behind it; infinity behind the last.
     #[inline(always)]
     pub fn from(&self, line: u32) -> &[f64; LANES] {
-        self.places[line as usize + 1..].first_chunk().expect("infinities follow the last line")
+        self.positions[line as usize + 1..].first_chunk().expect("infinities follow the last line")
     }
 
     /// A coordinate in lines, with rounding errors.
-    fn lines_to(&self, place: f64) -> f64 {
-        (place - self.places[1]) * self.inverse
+    fn lines_to(&self, position: f64) -> f64 {
+        (position - self.positions[1]) * self.inverse
     }
 
     /// Count of lines left of a coordinate after the shift, exactly. A triangle can only cross the lines from the least rank of its
     /// corners to the line before the greatest.
     #[inline]
-    pub fn rank(&self, place: f64) -> u32 {
+    pub fn rank(&self, position: f64) -> u32 {
         // Mostly it is right.
-        let guess = lesser(greater(self.lines_to(place) + 1.0, 0.0), self.count as f64);
+        let guess = lesser(greater(self.lines_to(position) + 1.0, 0.0), self.count as f64);
         let mut rank = guess as i32 as usize;
-        while self.places[rank + 1] < place {
+        while self.positions[rank + 1] < position {
             rank += 1;
         }
-        while self.places[rank] >= place {
+        while self.positions[rank] >= position {
             rank -= 1;
         }
         rank as u32
@@ -66,14 +66,14 @@ impl Lines {
 /// The edges of a triangle, to find the lines of a row that may cross it.
 pub struct Outline {
     edges: [Edge; 3],
-    /// How far (lines) a computed place may be from the true one.
+    /// How far (lines) a computed position may be from the true one.
     error: f64,
 }
 
 /// An edge between two coordinates z (m); no row where it has one z only.
 struct Edge {
     range: [f64; 2],
-    /// At the place of its first end: z (m) and x (lines).
+    /// At the position of its first end: z (m) and x (lines).
     from: [f64; 2],
     /// Change of x (lines) with z (m).
     slope: f64,
@@ -98,7 +98,7 @@ impl Outline {
             Edge { range, from: [a[2], x.lines_to(a[0])], slope }
         };
         let reach = corners.iter().fold(x.reach, |reach, corner| greater(reach, corner[0].abs()));
-        // A place has seen 11 roundings of at most 2 reach, that of a line 6 of at most 1: 28 in all, and as much
+        // A position has seen 11 roundings of at most 2 reach, that of a line 6 of at most 1: 28 in all, and as much
         // again is room for more.
         Self { edges: [edge(0), edge(1), edge(2)], error: 128.0 * ROUNDOFF * reach * x.inverse }
     }
@@ -110,16 +110,16 @@ impl Outline {
         let [first, last] = [first, last].map(|line| f64::from(line as i32));
         for lane in 0..LANES {
             let z = z[lane];
-            let place = |edge: &Edge, none: f64| {
-                let place = edge.from[1] + edge.slope * (z - edge.from[0]);
-                let place = if z < edge.range[0] { none } else { place };
-                if z > edge.range[1] { none } else { place }
+            let position = |edge: &Edge, none: f64| {
+                let position = edge.from[1] + edge.slope * (z - edge.from[0]);
+                let position = if z < edge.range[0] { none } else { position };
+                if z > edge.range[1] { none } else { position }
             };
-            let least = |edge: &Edge| place(edge, f64::INFINITY);
-            let greatest = |edge: &Edge| place(edge, f64::NEG_INFINITY);
+            let least = |edge: &Edge| position(edge, f64::INFINITY);
+            let greatest = |edge: &Edge| position(edge, f64::NEG_INFINITY);
             let start = lesser(lesser(least(a), least(b)), least(c)) - self.error;
             let end = greater(greater(greatest(a), greatest(b)), greatest(c)) + self.error;
-            // Half a line on, the nearest line is the first behind a place; the error is larger than what this rounds.
+            // Half a line on, the nearest line is the first behind a position; the error is larger than what this rounds.
             out.first[lane] = whole(lesser(greater(start + 0.5, first), last));
             out.last[lane] = whole(lesser(greater(end + 0.5, first), last));
         }

@@ -64,8 +64,8 @@ impl Piles {
     pub fn memory(&self) -> [usize; 6] {
         let Self { crossings, ends, sorted } = self;
         let sizes = [crossings.capacity(), ends.capacity(), sorted.capacity()];
-        let places = [crossings.as_ptr() as usize, ends.as_ptr() as usize, sorted.as_ptr() as usize];
-        [sizes[0], sizes[1], sizes[2], places[0], places[1], places[2]]
+        let positions = [crossings.as_ptr() as usize, ends.as_ptr() as usize, sorted.as_ptr() as usize];
+        [sizes[0], sizes[1], sizes[2], positions[0], positions[1], positions[2]]
     }
 
     /// Keeps room for half as many crossings again: frames that find a little more allocate nothing.

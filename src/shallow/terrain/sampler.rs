@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights, TOP};
 
-/// Places of a batch.
+/// Positions of a batch.
 const BATCH: u64 = 1 << 14;
 /// Most samples on a line, but for its ends.
 const MOST_SAMPLES: f64 = (1 << 24) as f64;
@@ -20,11 +20,11 @@ const MOST_STEPS: f64 = 1e15;
 /// Below and above the heights `between` (m) distances keep their sign: there only the ends of the lines are sampled, and a level set may lie in a range of any
 /// length.
 ///
-/// `sample` gets places (m), at most 16,384 at a time, and puts their distances (m) into its second argument, whatever that held.
+/// `sample` gets positions (m), at most 16,384 at a time, and puts their distances (m) into its second argument, whatever that held.
 ///
 /// # Errors
 /// `Argument`: a grid that [`Grid::validate`] refuses, a voxel that is not a positive length or too small for the heights, another count
-/// of distances than of places, a distance that is not finite. And those of `sample`.
+/// of distances than of positions, a distance that is not finite. And those of `sample`.
 pub fn solids(
     grid: Grid,
     heights: Heights,
@@ -35,25 +35,25 @@ pub fn solids(
     grid.validate()?;
     let ladder = Ladder::new(heights, voxel, between)?;
     let mut out = Solids::empty(grid, heights);
-    let (mut places, mut distances) = (Vec::new(), Vec::new());
+    let (mut positions, mut distances) = (Vec::new(), Vec::new());
     let mut line = Line::default();
     let count = grid.cells() as u64 * ladder.count;
     let mut next = 0;
     while next < count {
         let end = count.min(next + BATCH);
-        places.clear();
-        places.extend((next..end).map(|index| ladder.place(&grid, index)));
-        sample(&places, &mut distances)?;
-        if distances.len() != places.len() {
-            let (got, wanted) = (distances.len(), places.len());
+        positions.clear();
+        positions.extend((next..end).map(|index| ladder.position(&grid, index)));
+        sample(&positions, &mut distances)?;
+        if distances.len() != positions.len() {
+            let (got, wanted) = (distances.len(), positions.len());
             return Err(Error::argument(format!("the sampler returned {got} distances for {wanted} places")));
         }
-        for ((place, distance), index) in places.iter().zip(&distances).zip(next..) {
+        for ((position, distance), index) in positions.iter().zip(&distances).zip(next..) {
             if !distance.is_finite() {
-                let [x, y, z] = [place.x, place.y, place.z];
+                let [x, y, z] = [position.x, position.y, position.z];
                 return Err(Error::argument(format!("the sampler returned {distance} m at ({x}, {y}, {z})")));
             }
-            line.climb(place.y, f64::from(*distance), &heights);
+            line.climb(position.y, f64::from(*distance), &heights);
             if (index + 1) % ladder.count == 0 {
                 line.finish();
                 out.push(&line.solids);
@@ -94,7 +94,7 @@ impl Ladder {
     }
 
     /// A sample of all cells' lines, one line after another.
-    fn place(&self, grid: &Grid, index: u64) -> DVec3 {
+    fn position(&self, grid: &Grid, index: u64) -> DVec3 {
         let (cell, step) = ((index / self.count) as usize, index % self.count);
         let [x, z] = grid.centre([cell % grid.size[0], cell / grid.size[0]]);
         let y = match step {
@@ -163,10 +163,10 @@ mod tests {
 
     fn of(voxel: f64, distance: impl Fn(DVec3) -> f64) -> Result<Solids> {
         let mut largest = 0;
-        let found = solids(GRID, heights(), voxel, [-1.0, 1.0], |places, out| {
-            largest = largest.max(places.len());
+        let found = solids(GRID, heights(), voxel, [-1.0, 1.0], |positions, out| {
+            largest = largest.max(positions.len());
             out.clear();
-            out.extend(places.iter().map(|place| distance(*place) as f32));
+            out.extend(positions.iter().map(|position| distance(*position) as f32));
             Ok(())
         });
         assert!(largest <= 1 << 14, "{largest}");
@@ -175,9 +175,9 @@ mod tests {
 
     #[test]
     fn a_shell_over_ground_has_three_solids_a_line() {
-        let ground = |place: DVec3| place.y + 0.8;
-        let shell = |place: DVec3| ((place - DVec3::new(0.0, 0.1, 0.0)).norm() - 0.5).abs() - 0.1;
-        let found = of(0.03, |place| ground(place).min(shell(place))).unwrap();
+        let ground = |position: DVec3| position.y + 0.8;
+        let shell = |position: DVec3| ((position - DVec3::new(0.0, 0.1, 0.0)).norm() - 0.5).abs() - 0.1;
+        let found = of(0.03, |position| ground(position).min(shell(position))).unwrap();
         let mut layers = [0; 4];
         for z in 0..20 {
             for x in 0..20 {
@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn what_is_solid_at_both_ends_of_the_range_goes_on_there() {
-        let found = of(0.3, |place| 0.25 - place.y.abs()).unwrap();
+        let found = of(0.3, |position| 0.25 - position.y.abs()).unwrap();
         let units = |metres: f64| heights().round(metres);
         let [low, high] = [found.cell(7)[0], found.cell(7)[1]];
         assert_eq!((low[0], high[1], found.cell(7).len()), (BOTTOMLESS, TOP, 2));
@@ -216,14 +216,14 @@ mod tests {
 
     #[test]
     fn a_range_of_any_length_has_samples_where_distances_change_only() {
-        let ball = |place: DVec3| (place.norm() - 0.55) as f32;
+        let ball = |position: DVec3| (position.norm() - 0.55) as f32;
         let count = std::cell::Cell::new(0);
         let of = |heights: Heights, between: [f64; 2]| {
             count.set(0);
-            let found = solids(GRID, heights, 0.1, between, |places, out| {
-                count.set(count.get() + places.len());
+            let found = solids(GRID, heights, 0.1, between, |positions, out| {
+                count.set(count.get() + positions.len());
                 out.clear();
-                out.extend(places.iter().map(|place| ball(*place)));
+                out.extend(positions.iter().map(|position| ball(*position)));
                 Ok(())
             });
             found.unwrap()
@@ -253,7 +253,7 @@ mod tests {
 
     #[test]
     fn long_lines_are_sampled_in_several_batches() {
-        let found = of(0.00005, |place| (place.y - 0.3).abs() - 0.2).unwrap();
+        let found = of(0.00005, |position| (position.y - 0.3).abs() - 0.2).unwrap();
         for cell in [0, 1, 399] {
             let [[bottom, top]] = *found.cell(cell) else { panic!("{:?}", found.cell(cell)) };
             let metres = [bottom, top].map(|units| heights().metres(units));
@@ -267,7 +267,7 @@ mod tests {
         assert_eq!(message(of(0.0, |_| 1.0)), "a voxel of 0 m is not a positive length");
         let what = "a voxel of 0.00000001 m is too small for heights from -1 to 1 m";
         assert_eq!(message(of(1e-8, |_| 1.0)), what);
-        let nan = of(0.5, |place| if place.y == 0.0 { f64::NAN } else { 1.0 });
+        let nan = of(0.5, |position| if position.y == 0.0 { f64::NAN } else { 1.0 });
         assert_eq!(message(nan), "the sampler returned NaN m at (-0.95, 0, -0.95)");
         let few = solids(GRID, heights(), 0.5, [-1.0, 1.0], |_, out| {
             *out = vec![1.0; 3];

@@ -20,7 +20,7 @@ pub enum Shape {
         /// Its radius.
         radius: f64,
     },
-    /// All places within a distance of a line segment.
+    /// All positions within a distance of a line segment.
     Capsule {
         /// The ends of the segment.
         ends: [DVec3; 2],
@@ -42,16 +42,18 @@ impl Shape {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// `Argument`: a place that is not finite, a length that is not positive and finite, axes that are not perpendicular unit vectors
+    /// `Argument`: a position that is not finite, a length that is not positive and finite, axes that are not perpendicular unit vectors
     /// (within 1e-6).
     pub fn validate(&self) -> Result<()> {
-        let (places, lengths): (&[DVec3], &[f64]) = match self {
+        let (positions, lengths): (&[DVec3], &[f64]) = match self {
             Self::Sphere { centre, radius } => (std::slice::from_ref(centre), std::slice::from_ref(radius)),
             Self::Capsule { ends, radius } => (ends, std::slice::from_ref(radius)),
             Self::Cuboid { centre, half, .. } => (std::slice::from_ref(centre), half),
         };
-        if let Some(place) = places.iter().find(|place| !place.iter().all(|value| value.is_finite())) {
-            let [x, y, z] = [place.x, place.y, place.z];
+        if let Some(position) =
+            positions.iter().find(|position| !position.iter().all(|value| value.is_finite()))
+        {
+            let [x, y, z] = [position.x, position.y, position.z];
             return Err(Error::argument(format!("an obstacle at ({x}, {y}, {z}) is not finite")));
         }
         if let Some(length) = lengths.iter().find(|length| !(**length > 0.0 && length.is_finite())) {
@@ -81,7 +83,7 @@ impl Shape {
             let count = grid.size[axis] as f64;
             // In cells, from the centre of the first.
             let [first, last] =
-                bounds[axis].map(|place| ((place - grid.origin[axis]) / grid.cell - 0.5).floor());
+                bounds[axis].map(|position| ((position - grid.origin[axis]) / grid.cell - 0.5).floor());
             let start = first.clamp(0.0, count) as usize;
             start..((last + 2.0).clamp(0.0, count) as usize).max(start)
         })
@@ -140,7 +142,7 @@ fn root(square: f64) -> Option<f64> {
     (square >= 0.0).then(|| square.sqrt())
 }
 
-/// A capsule is what a sphere sweeps on its way from end to end; the highest and the lowest place on the line are each touched by one of
+/// A capsule is what a sphere sweeps on its way from end to end; the highest and the lowest position on the line are each touched by one of
 /// those spheres.
 fn of_capsule([from, to]: &[DVec3; 2], radius: f64, at: [f64; 2]) -> Option<[f64; 2]> {
     let way = to - from;
@@ -171,14 +173,14 @@ fn of_cuboid(centre: &DVec3, axes: &[DVec3; 3], half: &[f64; 3], at: [f64; 2]) -
     let [x, z] = [at[0] - centre.x, at[1] - centre.z];
     let (mut bottom, mut top) = (f64::NEG_INFINITY, f64::INFINITY);
     for (axis, half) in axes.iter().zip(half) {
-        let place = axis.x * x + axis.z * z;
+        let position = axis.x * x + axis.z * z;
         if axis.y == 0.0 {
-            if place.abs() > *half {
+            if position.abs() > *half {
                 return None;
             }
             continue;
         }
-        let ends = [(-half - place) / axis.y, (half - place) / axis.y];
+        let ends = [(-half - position) / axis.y, (half - position) / axis.y];
         bottom = bottom.max(ends[0].min(ends[1]));
         top = top.min(ends[0].max(ends[1]));
     }
@@ -203,29 +205,29 @@ mod tests {
     }
 
     fn shapes() -> [Shape; 7] {
-        let place = DVec3::new;
+        let position = DVec3::new;
         let capsule = |a: DVec3, b: DVec3, radius: f64| Shape::Capsule { ends: [a, b], radius };
         let upright = [DVec3::z(), DVec3::x(), DVec3::y()];
         [
-            Shape::Sphere { centre: place(0.1, 0.2, -0.3), radius: 0.4 },
-            capsule(place(-0.5, 0.1, -0.4), place(0.4, 0.6, 0.3), 0.2),
-            capsule(place(0.2, -0.7, 0.1), place(0.2, 0.8, 0.1), 0.3),
-            capsule(place(0.2, -0.7, 0.1), place(0.2 + 1e-9, 0.8, 0.1), 0.3),
-            capsule(place(-0.9, 0.3, 0.2), place(1.3, 0.3, 0.2), 0.1),
-            cuboid(place(0.1, -0.2, 0.05), [0.5, 0.2, 0.3]),
-            Shape::Cuboid { centre: place(0.0, 0.5, 0.0), axes: upright, half: [0.31, 0.42, 0.53] },
+            Shape::Sphere { centre: position(0.1, 0.2, -0.3), radius: 0.4 },
+            capsule(position(-0.5, 0.1, -0.4), position(0.4, 0.6, 0.3), 0.2),
+            capsule(position(0.2, -0.7, 0.1), position(0.2, 0.8, 0.1), 0.3),
+            capsule(position(0.2, -0.7, 0.1), position(0.2 + 1e-9, 0.8, 0.1), 0.3),
+            capsule(position(-0.9, 0.3, 0.2), position(1.3, 0.3, 0.2), 0.1),
+            cuboid(position(0.1, -0.2, 0.05), [0.5, 0.2, 0.3]),
+            Shape::Cuboid { centre: position(0.0, 0.5, 0.0), axes: upright, half: [0.31, 0.42, 0.53] },
         ]
     }
 
-    fn is_within(shape: &Shape, place: DVec3) -> bool {
+    fn is_within(shape: &Shape, position: DVec3) -> bool {
         match shape {
-            Shape::Sphere { centre, radius } => (place - centre).norm() <= *radius,
+            Shape::Sphere { centre, radius } => (position - centre).norm() <= *radius,
             Shape::Capsule { ends: [a, b], radius } => {
-                let part = ((place - a).dot(&(b - a)) / (b - a).dot(&(b - a))).clamp(0.0, 1.0);
-                (place - (a + (b - a) * part)).norm() <= *radius
+                let part = ((position - a).dot(&(b - a)) / (b - a).dot(&(b - a))).clamp(0.0, 1.0);
+                (position - (a + (b - a) * part)).norm() <= *radius
             }
             Shape::Cuboid { centre, axes, half } => {
-                axes.iter().zip(half).all(|(axis, half)| axis.dot(&(place - centre)).abs() <= *half)
+                axes.iter().zip(half).all(|(axis, half)| axis.dot(&(position - centre)).abs() <= *half)
             }
         }
     }

@@ -68,7 +68,7 @@ impl Caster {
     pub fn new(grid: Grid, heights: Heights) -> Result<Self> {
         grid.validate()?;
         let Grid { cell, origin, size } = grid;
-        if let Some(far) = origin.into_iter().find(|place| place.abs() > 1e30) {
+        if let Some(far) = origin.into_iter().find(|position| position.abs() > 1e30) {
             return Err(Error::argument(format!("an origin at {far:e} m is beyond 1e30 m")));
         }
         if !(heights.low.is_finite() && heights.unit.is_finite() && heights.unit > 0.0) {
@@ -81,9 +81,9 @@ impl Caster {
         for axis in [0, 1] {
             let merges = |index: &usize| centre(axis, *index) >= centre(axis, *index + 1);
             if let Some(index) = (0..size[axis] - 1).find(merges) {
-                let place = centre(axis, index);
+                let position = centre(axis, index);
                 return Err(Error::argument(format!(
-                    "a cell of {cell} m is too fine for places at {place:e} m"
+                    "a cell of {cell} m is too fine for places at {position:e} m"
                 )));
             }
         }
@@ -264,8 +264,8 @@ impl Work<'_> {
             if let Some(outline) = &outline {
                 outline.spans(z, columns, &mut near.spans);
             }
-            for (place, row) in (some..rows[1]).take(LANES).enumerate() {
-                let [start, end] = if is_wide { near.spans.lines(place) } else { columns };
+            for (position, row) in (some..rows[1]).take(LANES).enumerate() {
+                let [start, end] = if is_wide { near.spans.lines(position) } else { columns };
                 let first = (row - self.first[1]) * self.width + (start - self.first[0]);
                 let mut column = start;
                 loop {
@@ -273,7 +273,7 @@ impl Work<'_> {
                         self.add_all(&facet, near);
                     }
                     let count = end.saturating_sub(column);
-                    near.add(along_x.from(column), z[place], first + (column - start), count);
+                    near.add(along_x.from(column), z[position], first + (column - start), count);
                     if count <= LANES as u32 {
                         break;
                     }
@@ -323,14 +323,14 @@ impl Near {
     /// Adds the first of a count of lines side by side, at most [`LANES`].
     #[inline(always)]
     fn add(&mut self, x: &[f64; LANES], z: f64, cell: u32, count: u32) {
-        let place = self.count.min(ROOM - LANES);
+        let position = self.count.min(ROOM - LANES);
         // What is too much, the next ones overwrite.
-        self.x[place..][..LANES].copy_from_slice(x);
-        self.z[place..][..LANES].fill(z);
-        for (lane, out) in (0..).zip(&mut self.cells[place..][..LANES]) {
+        self.x[position..][..LANES].copy_from_slice(x);
+        self.z[position..][..LANES].fill(z);
+        for (lane, out) in (0..).zip(&mut self.cells[position..][..LANES]) {
             *out = cell.wrapping_add(lane);
         }
-        self.count = place + count.min(LANES as u32) as usize;
+        self.count = position + count.min(LANES as u32) as usize;
     }
 }
 

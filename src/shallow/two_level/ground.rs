@@ -18,7 +18,7 @@ impl Ground {
         let Grid { cell, origin, size: [nx, nz] } = solids.grid;
         let grid = Grid { cell: 2.0 * cell, origin, size: [nx / 2, nz / 2] };
         let cells = (0..grid.cells()).map(|index| {
-            let [x, z] = grid.place(index);
+            let [x, z] = grid.position(index);
             let four = [[0, 0], [1, 0], [0, 1], [1, 1]];
             mean(four.map(|[dx, dz]| solids.cell(solids.grid.index([2 * x + dx, 2 * z + dz]))))
         });
@@ -28,7 +28,7 @@ impl Ground {
     /// The fine ground of the near cells.
     pub fn fine_solids(&self, near: &Cells) -> Solids {
         let grid = self.fine.grid;
-        let cell = |index: usize| self.fine_cell(near, grid.place(index));
+        let cell = |index: usize| self.fine_cell(near, grid.position(index));
         let mut out = Solids::empty(grid, self.fine.heights);
         (0..grid.cells()).for_each(|index| out.push(cell(index)));
         out
@@ -37,7 +37,7 @@ impl Ground {
     /// The coarse ground of all others.
     pub fn coarse_solids(&self, near: &Cells) -> Solids {
         let grid = self.coarse.grid;
-        let cell = |index: usize| self.coarse_cell(near, grid.place(index));
+        let cell = |index: usize| self.coarse_cell(near, grid.position(index));
         let mut out = Solids::empty(grid, self.coarse.heights);
         (0..grid.cells()).for_each(|index| out.push(cell(index)));
         out

@@ -149,9 +149,10 @@ impl Detail {
         // One of them may have no ground.
         let all = |liquid: &Shallow| liquid.columns.grid.size.map(|count| 0..count);
         let moved = [
-            fine.update_cells(all(fine), |cell| ground.fine_cell(near, ground.fine.grid.place(cell)))?,
-            coarse
-                .update_cells(all(coarse), |cell| ground.coarse_cell(near, ground.coarse.grid.place(cell)))?,
+            fine.update_cells(all(fine), |cell| ground.fine_cell(near, ground.fine.grid.position(cell)))?,
+            coarse.update_cells(all(coarse), |cell| {
+                ground.coarse_cell(near, ground.coarse.grid.position(cell))
+            })?,
         ];
         Ok(self.after(moved))
     }
@@ -230,7 +231,7 @@ impl Detail {
         Ok(())
     }
 
-    /// Pours a volume (m3; negative: takes it) as [`Shallow::pour_at`], into the cells of the size that the place lies in; returns what came in (m3).
+    /// Pours a volume (m3; negative: takes it) as [`Shallow::pour_at`], into the cells of the size that the position lies in; returns what came in (m3).
     ///
     /// # Errors
     /// As [`Shallow::pour_at`].
@@ -262,7 +263,7 @@ impl Detail {
         self.holds(point.at)
     }
 
-    /// Whether a place lies over near cells.
+    /// Whether a position lies over near cells.
     fn holds(&self, [x, _, z]: [f64; 3]) -> bool {
         let grid = self.fine.columns.grid;
         let within = |axis: usize, at: f64| {
@@ -276,10 +277,10 @@ impl Detail {
     fn route(&mut self) {
         for at in 0..self.points.len() {
             let is_near = self.is_near(&self.points[at]);
-            let place = self.points[at].at;
+            let position = self.points[at].at;
             let [own, other] =
                 if is_near { [&mut self.fine, &mut self.coarse] } else { [&mut self.coarse, &mut self.fine] };
-            own.flows.move_to(&own.columns, at, place);
+            own.flows.move_to(&own.columns, at, position);
             let (waiting, moved) = other.flows.rest(at);
             let (own_waiting, own_moved) = own.flows.waiting_and_moved(at);
             // In units of its own.

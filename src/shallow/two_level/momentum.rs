@@ -111,12 +111,12 @@ fn side(detail: &Detail, near: &Cells, cell: [usize; 2], layer: usize, axis: usi
 
 /// The column whose regular pipe along an axis leads to another.
 fn before(liquid: &Shallow, column: usize, axis: usize) -> Option<usize> {
-    let (strip, place) = (column / STRIP, column % STRIP);
+    let (strip, position) = (column / STRIP, column % STRIP);
     if axis == 0 {
-        return (place > 0 || liquid.columns.west(strip).is_some()).then(|| column - 1);
+        return (position > 0 || liquid.columns.west(strip).is_some()).then(|| column - 1);
     }
     let north = liquid.columns.north(strip) as usize;
-    (north < liquid.columns.strips().len()).then(|| north * STRIP + place)
+    (north < liquid.columns.strips().len()).then(|| north * STRIP + position)
 }
 
 /// Calls `see` with each fine cell of a box, layer and axis.

@@ -47,9 +47,9 @@ pub(in crate::shallow) struct Seam {
     pipes: Vec<Pipe>,
     /// The pipes before.
     old: Vec<Pipe>,
-    /// Columns of both liquids that have such pipes, each once, and the place among them of each pipe's ends.
+    /// Columns of both liquids that have such pipes, each once, and the position among them of each pipe's ends.
     columns: [Vec<u32>; 2],
-    places: Vec<[u32; 2]>,
+    positions: Vec<[u32; 2]>,
     /// What each of these gives, and takes (fine units), then by which factor it does so.
     gives: [Vec<f64>; 2],
     takes: [Vec<f64>; 2],
@@ -108,11 +108,11 @@ impl Seam {
         self.has_ceilings = ![fine, coarse].into_iter().zip(&self.columns).all(is_open);
         self.cells.clear();
         self.cells.extend(self.columns[1].iter().map(cell));
-        let place =
+        let position =
             |end: usize, column: u32| self.columns[end].partition_point(|&other| other < column) as u32;
-        self.places.clear();
-        let places = self.pipes.iter().map(|pipe| [place(0, pipe.ends[0]), place(1, pipe.ends[1])]);
-        self.places.extend(places);
+        self.positions.clear();
+        let positions = self.pipes.iter().map(|pipe| [position(0, pipe.ends[0]), position(1, pipe.ends[1])]);
+        self.positions.extend(positions);
         if self.last == 0.0 {
             self.last = 1.0;
         }
@@ -236,9 +236,9 @@ impl Seam {
     fn drive<K: Kind>(&mut self, step: &Step, fine: &Shallow, coarse: &Shallow) -> bool {
         let (bases, coarse_bases) = (fine.columns.bases(), coarse.columns.bases());
         let (depths, coarse_depths) = (fine.flow.depths(), coarse.flow.depths());
-        let Self { pipes, places, gives, takes, .. } = self;
+        let Self { pipes, positions, gives, takes, .. } = self;
         let mut any = false;
-        for (pipe, place) in pipes.iter_mut().zip(places) {
+        for (pipe, position) in pipes.iter_mut().zip(positions) {
             let [i, j] = pipe.ends.map(|end| end as usize);
             let depth = [depths[i], coarse_depths[j]];
             if depth == [0; 2] {
@@ -269,7 +269,7 @@ impl Seam {
             [pipe.transfer, pipe.left] = split(pipe.flux, pipe.left);
             if pipe.transfer != 0.0 {
                 any = true;
-                add(gives, takes, place, pipe.transfer);
+                add(gives, takes, position, pipe.transfer);
             }
         }
         any
@@ -301,16 +301,16 @@ impl Seam {
 
     /// Multiplies transfers by the factors of the columns that give, or of those that take.
     fn scale(&mut self, gives: bool) {
-        let Self { pipes, places, gives: given, takes: taken, factors, .. } = self;
+        let Self { pipes, positions, gives: given, takes: taken, factors, .. } = self;
         given.iter_mut().chain(&mut *taken).for_each(|sums| sums.fill(0.0));
-        for (pipe, places) in pipes.iter_mut().zip(places) {
+        for (pipe, positions) in pipes.iter_mut().zip(positions) {
             let end = usize::from((pipe.transfer > 0.0) != gives);
-            let factor = factors[end][places[end] as usize];
+            let factor = factors[end][positions[end] as usize];
             if factor < 1.0 {
                 pipe.transfer = (pipe.transfer * factor).trunc();
                 pipe.flux *= factor;
             }
-            add(given, taken, places, pipe.transfer);
+            add(given, taken, positions, pipe.transfer);
         }
     }
 
@@ -318,15 +318,15 @@ impl Seam {
     fn move_units(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut Rests) {
         self.find_amounts(fine, coarse);
         let Self { gives, takes, columns, cells, amounts, .. } = self;
-        let net = |end: usize, place: usize| Load {
-            units: (takes[end][place] - gives[end][place]) as i64,
-            amounts: amounts[end].get(place).copied().unwrap_or_default(),
+        let net = |end: usize, position: usize| Load {
+            units: (takes[end][position] - gives[end][position]) as i64,
+            amounts: amounts[end].get(position).copied().unwrap_or_default(),
         };
-        for (place, &column) in columns[0].iter().enumerate() {
-            change(fine, column as usize, &net(0, place));
+        for (position, &column) in columns[0].iter().enumerate() {
+            change(fine, column as usize, &net(0, position));
         }
-        for (place, (&column, &cell)) in columns[1].iter().zip(&*cells).enumerate() {
-            let net = net(1, place);
+        for (position, (&column, &cell)) in columns[1].iter().zip(&*cells).enumerate() {
+            let net = net(1, position);
             if net != Load::default() {
                 // All of the column, and what waits.
                 let own = of_column(coarse, column as usize);
@@ -342,7 +342,7 @@ impl Seam {
 
     /// Finds how much of each scalar every column takes (less what it gives): of what a pipe moves, by the concentration of the column that gives.
     fn find_amounts(&mut self, fine: &Shallow, coarse: &Shallow) {
-        let Self { pipes, places, columns, amounts, .. } = self;
+        let Self { pipes, positions, columns, amounts, .. } = self;
         let count = fine.flow.amounts.count();
         for (amounts, columns) in amounts.iter_mut().zip(columns) {
             amounts.clear();
@@ -351,23 +351,23 @@ impl Seam {
         if count == 0 {
             return;
         }
-        for (pipe, places) in pipes.iter().zip(places).filter(|(pipe, _)| pipe.transfer != 0.0) {
+        for (pipe, positions) in pipes.iter().zip(positions).filter(|(pipe, _)| pipe.transfer != 0.0) {
             let end = usize::from(pipe.transfer < 0.0);
             let (liquid, column) = ([fine, coarse][end], pipe.ends[end] as usize);
             let (depth, units) = (liquid.flow.depths()[column], f64::from(pipe.transfer.abs()));
             let carried = liquid.flow.amounts.amounts.iter().take(count);
             for (at, own) in carried.enumerate() {
                 let moved = (level(own[column], depth) * units).round_ties_even() as i64;
-                amounts[end][places[end] as usize][at] -= moved;
-                amounts[1 - end][places[1 - end] as usize][at] += moved;
+                amounts[end][positions[end] as usize][at] -= moved;
+                amounts[1 - end][positions[1 - end] as usize][at] += moved;
             }
         }
     }
 }
 
 /// Adds a transfer to the sums of both ends: whole numbers, whose sums do not depend on their order.
-fn add(gives: &mut [Vec<f64>; 2], takes: &mut [Vec<f64>; 2], places: &[u32; 2], transfer: f32) {
-    let [fine, coarse] = places.map(|place| place as usize);
+fn add(gives: &mut [Vec<f64>; 2], takes: &mut [Vec<f64>; 2], positions: &[u32; 2], transfer: f32) {
+    let [fine, coarse] = positions.map(|position| position as usize);
     let units = f64::from(transfer.abs());
     if transfer > 0.0 {
         gives[0][fine] += units;

@@ -78,9 +78,9 @@ impl Detail {
         let [fine_held, held] = out;
         fine_held.clear();
         held.clear();
-        let is_far = |cell| !is_near(fine_grid.place(cell).map(|at| at / 2));
+        let is_far = |cell| !is_near(fine_grid.position(cell).map(|at| at / 2));
         fine.remap.held.take_out(is_far, |parcel| fine_held.push(parcel));
-        coarse.remap.held.take_out(|cell| is_near(grid.place(cell)), |parcel| held.push(parcel));
+        coarse.remap.held.take_out(|cell| is_near(grid.position(cell)), |parcel| held.push(parcel));
     }
 
     /// Lets it wait in the other liquid's cells.
@@ -88,13 +88,13 @@ impl Detail {
         let Self { fine, coarse, rest, .. } = self;
         let (fine_grid, grid) = (fine.columns.grid, coarse.columns.grid);
         for parcel in fine_held {
-            let cell = grid.index(fine_grid.place(parcel.cell as usize).map(|at| at / 2));
+            let cell = grid.index(fine_grid.position(parcel.cell as usize).map(|at| at / 2));
             let whole = rest.whole(cell, &Load { units: parcel.units, amounts: parcel.amounts });
             coarse.remap.held.add(cell, parcel.height, whole.units, whole.amounts);
         }
         for parcel in held {
             // A coarse unit is one of each of the four.
-            for cell in quarters(grid.place(parcel.cell as usize)) {
+            for cell in quarters(grid.position(parcel.cell as usize)) {
                 fine.remap.held.add(fine_grid.index(cell), parcel.height, parcel.units, parcel.amounts);
             }
         }

@@ -104,7 +104,7 @@ pub fn heights(surface: &FloatGrid, [x, z]: [i32; 2], low: i32, high: i32) -> Re
 
 /// The blocks in which the snow differs from that before the first step.
 pub fn changed(initial: &FloatGrid, now: &FloatGrid) -> Result<HashSet<Origin>> {
-    let mut places = HashSet::new();
+    let mut positions = HashSet::new();
     for [one, other] in [[initial, now], [now, initial]] {
         let leaves = one.leaves()?;
         let origins: Vec<Origin> = leaves.iter().map(|leaf| leaf.origin).collect();
@@ -114,17 +114,18 @@ pub fn changed(initial: &FloatGrid, now: &FloatGrid) -> Result<HashSet<Origin>> 
             Probe::Tile { .. } => true,
         });
         let differs: Vec<bool> = differs.collect();
-        places.extend(origins.iter().zip(differs).filter(|(_, differs)| *differs).map(|(origin, _)| *origin));
+        positions
+            .extend(origins.iter().zip(differs).filter(|(_, differs)| *differs).map(|(origin, _)| *origin));
     }
-    Ok(places)
+    Ok(positions)
 }
 
 /// The column blocks of blocks that changed.
 pub fn touched(initial: &FloatGrid, changed: &HashSet<Origin>, low: i32, high: i32) -> Result<Columns> {
-    let places: BTreeSet<[i32; 2]> = changed.iter().map(|[x, _, z]| [*x, *z]).collect();
-    places
+    let positions: BTreeSet<[i32; 2]> = changed.iter().map(|[x, _, z]| [*x, *z]).collect();
+    positions
         .into_iter()
-        .map(|place| Ok((place, Column { original: heights(initial, place, low, high)? })))
+        .map(|position| Ok((position, Column { original: heights(initial, position, low, high)? })))
         .collect()
 }
 

@@ -24,13 +24,13 @@ type Voxel = [i32; 3];
 /// The snow as it will be after a step's edits.
 struct After<'a> {
     edits: &'a [Edit],
-    places: HashMap<Origin, usize>,
+    positions: HashMap<Origin, usize>,
     surface: &'a FloatGrid,
 }
 
 impl After<'_> {
     fn value(&self, voxel: Voxel) -> f32 {
-        match self.places.get(&voxel.map(|at| at & !7)).map(|&index| &self.edits[index].surface) {
+        match self.positions.get(&voxel.map(|at| at & !7)).map(|&index| &self.edits[index].surface) {
             Some(BlockEdit::Constant(_, value)) => *value,
             Some(BlockEdit::Dense(block)) => block.values[index_of(voxel)],
             None => self.surface.value(voxel),
@@ -82,8 +82,8 @@ pub fn remove(
     scale: Scale,
     least: usize,
 ) -> Result<usize> {
-    let places = edits.iter().enumerate().map(|(index, edit)| (edit.surface.origin(), index)).collect();
-    let after = After { edits, places, surface };
+    let positions = edits.iter().enumerate().map(|(index, edit)| (edit.surface.origin(), index)).collect();
+    let after = After { edits, positions, surface };
     let seeds: Vec<Vec<Voxel>> = edits.par_iter().map(|edit| small_parts(&edit.surface, least)).collect();
     let (mut islands, mut voxels) = (Vec::new(), HashSet::new());
     for seed in seeds.concat() {
@@ -103,9 +103,9 @@ pub fn remove(
             cleared.entry(voxel.map(|at| at & !7)).or_default().insert(index_of(voxel), value);
         }
     }
-    let places = after.places;
+    let positions = after.positions;
     for (origin, values) in cleared {
-        let index = match places.get(&origin) {
+        let index = match positions.get(&origin) {
             Some(&index) => index,
             None => {
                 edits.push(untouched(origin, surface)?);
@@ -176,7 +176,7 @@ fn without(after: &After<'_>, island: &[Voxel], gone: &HashSet<Voxel>, scale: Sc
     let cleared = |voxel: Voxel| {
         let [to_gone, to_rest] = near.bounds(voxel, scale);
         let value = near.value(voxel);
-        if value < 0.0 && !near.gone[near.place(voxel)] {
+        if value < 0.0 && !near.gone[near.position(voxel)] {
             return None;
         }
         // At least half a cell outside, so that no part of its cell counts as filled.
@@ -209,13 +209,13 @@ impl Near {
         Self { low, size, values, gone }
     }
 
-    fn place(&self, voxel: Voxel) -> usize {
+    fn position(&self, voxel: Voxel) -> usize {
         let [x, y, z] = [0, 1, 2].map(|axis| (voxel[axis] - self.low[axis]) as usize);
         (x * self.size[1] + y) * self.size[2] + z
     }
 
     fn value(&self, voxel: Voxel) -> f32 {
-        self.values[self.place(voxel)]
+        self.values[self.position(voxel)]
     }
 
     /// Upper bounds on a voxel's distances (m) to islands and to the rest, from the snow in reach: a distance field
@@ -223,12 +223,12 @@ impl Near {
     fn bounds(&self, voxel: Voxel, scale: Scale) -> [f32; 2] {
         let mut bounds = [f32::INFINITY; 2];
         for other in cube(voxel) {
-            let place = self.place(other);
-            let value = self.values[place];
+            let position = self.position(other);
+            let value = self.values[position];
             if value < 0.0 {
                 let squared: i32 =
                     (0..3).map(|axis| (voxel[axis] - other[axis]) * (voxel[axis] - other[axis])).sum();
-                let bound = &mut bounds[usize::from(!self.gone[place])];
+                let bound = &mut bounds[usize::from(!self.gone[position])];
                 *bound = bound.min(value + (squared as f32).sqrt() * scale.cell);
             }
         }

@@ -70,13 +70,14 @@ impl Reach {
         for part in moments {
             ctx.check()?;
             body.motion().pose(from + (to - from) * part, &mut pose)?;
-            pose.iter_mut().for_each(|place| *place = self.lattice.to_cells(*place));
-            for (place, before) in pose.iter().zip(&before) {
-                let step: DVec3 = place - before;
+            pose.iter_mut().for_each(|position| *position = self.lattice.to_cells(*position));
+            for (position, before) in pose.iter().zip(&before) {
+                let step: DVec3 = position - before;
                 moved = moved.max(step.norm());
             }
-            (low, high) =
-                pose.iter().fold((low, high), |(low, high), place| (low.inf(place), high.sup(place)));
+            (low, high) = pose
+                .iter()
+                .fold((low, high), |(low, high), position| (low.inf(position), high.sup(position)));
             std::mem::swap(&mut pose, &mut before);
         }
         // Between two samples nothing is farther from both than it moves from one to the other.

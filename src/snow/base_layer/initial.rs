@@ -291,9 +291,9 @@ fn level(
     lattice: &Lattice,
     topology: &Topology,
     sheet: &Sheet,
-    place: impl Fn(DVec3) -> DVec3,
+    position: impl Fn(DVec3) -> DVec3,
 ) -> Result<Vec<Fixed>> {
-    let mut pose: Vec<DVec3> = sheet.positions.iter().map(|&p| lattice.to_cells(place(p))).collect();
+    let mut pose: Vec<DVec3> = sheet.positions.iter().map(|&p| lattice.to_cells(position(p))).collect();
     topology.complete(&mut pose);
     pose.into_iter().map(|cells| lattice.fix(cells)).collect()
 }

@@ -22,12 +22,12 @@ pub struct Mark<'a> {
 impl BaseLayer {
     /// Heights of the column blocks that these changed blocks touch for the first time.
     pub(super) fn new_columns(&self, origins: impl Iterator<Item = Origin>) -> Result<Columns> {
-        let places: BTreeSet<[i32; 2]> = origins.map(column_of).collect();
+        let positions: BTreeSet<[i32; 2]> = origins.map(column_of).collect();
         let new: Vec<[i32; 2]> =
-            places.into_iter().filter(|place| !self.columns.contains_key(place)).collect();
-        let column = |place: [i32; 2]| {
-            let original = columns::heights(&self.grids.surface, place, self.low[1], self.high[1])?;
-            Ok((place, Column { original }))
+            positions.into_iter().filter(|position| !self.columns.contains_key(position)).collect();
+        let column = |position: [i32; 2]| {
+            let original = columns::heights(&self.grids.surface, position, self.low[1], self.high[1])?;
+            Ok((position, Column { original }))
         };
         new.into_par_iter().map(column).collect()
     }
@@ -67,7 +67,7 @@ impl BaseLayer {
             .zip(touched)
             .map(|(surface, touched)| (surface.origin(), (*surface, touched)))
             .collect();
-        let places: BTreeSet<[i32; 2]> = now.keys().map(|origin| column_of(*origin)).collect();
+        let positions: BTreeSet<[i32; 2]> = now.keys().map(|origin| column_of(*origin)).collect();
         let cell = self.grids.surface.voxel_size() as f32;
         let levels = columns::levels(self.low[1], self.high[1]);
         let column_edits = |&[x, z]: &[i32; 2]| -> Result<Vec<BlockEdit>> {
@@ -97,8 +97,8 @@ impl BaseLayer {
             }
             Ok(out)
         };
-        let places: Vec<[i32; 2]> = places.into_iter().collect();
-        let parts: Vec<Vec<BlockEdit>> = places.par_iter().map(column_edits).collect::<Result<_>>()?;
+        let positions: Vec<[i32; 2]> = positions.into_iter().collect();
+        let parts: Vec<Vec<BlockEdit>> = positions.par_iter().map(column_edits).collect::<Result<_>>()?;
         Ok(parts.into_iter().flatten().collect())
     }
 }

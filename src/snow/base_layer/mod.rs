@@ -461,10 +461,10 @@ fn united(mut pieces: Vec<Piece>, others: Vec<Piece>) -> Vec<Piece> {
     if pieces.is_empty() {
         return others;
     }
-    let places: HashMap<Origin, usize> =
+    let positions: HashMap<Origin, usize> =
         pieces.iter().enumerate().map(|(index, p)| (p.origin(), index)).collect();
     for other in others {
-        match places.get(&other.origin()) {
+        match positions.get(&other.origin()) {
             None => pieces.push(other),
             Some(&index) => match (&mut pieces[index], other) {
                 (Piece::Near(_, values), Piece::Near(_, others)) => {

@@ -55,12 +55,12 @@ impl Displacement {
     /// Voxels are integers, and the noise takes the integer part of a position and its fraction separately, both from
     /// 64 bits: the pattern is as fine 100 km from the origin as near it.
     fn at(&self, voxel: [i32; 3]) -> f32 {
-        let mut place = voxel.map(|index| f64::from(index) * self.step);
+        let mut position = voxel.map(|index| f64::from(index) * self.step);
         let mut sum = 0.0;
         for (noise, strength) in &self.octaves {
-            let [x, y, z] = place.map(|along| along - PERIOD * (along / PERIOD).round());
+            let [x, y, z] = position.map(|along| along - PERIOD * (along / PERIOD).round());
             sum += noise.get_noise_3d(x, y, z) * strength;
-            place = place.map(|along| 2.0 * along);
+            position = position.map(|along| 2.0 * along);
         }
         self.amplitude * sum.clamp(0.0, 1.0)
     }
@@ -153,12 +153,12 @@ fn near_origin(ctx: &Context, grid: &FloatGrid) -> Result<(Option<FloatGrid>, [i
 
 /// Divides each value by the gradient there, so that values near the surface are distances again.
 fn normalise(pieces: &mut [Piece]) {
-    let places: HashMap<Origin, usize> =
+    let positions: HashMap<Origin, usize> =
         pieces.iter().enumerate().map(|(index, piece)| (piece.origin(), index)).collect();
     let scaled: Vec<Option<Box<Values>>> = pieces
         .par_iter()
         .map(|piece| match piece {
-            Piece::Near(origin, values) => Some(Box::new(divided(*origin, values, pieces, &places))),
+            Piece::Near(origin, values) => Some(Box::new(divided(*origin, values, pieces, &positions))),
             Piece::Inside(_) => None,
         })
         .collect();
@@ -169,11 +169,11 @@ fn normalise(pieces: &mut [Piece]) {
     }
 }
 
-fn divided(origin: Origin, values: &Values, pieces: &[Piece], places: &HashMap<Origin, usize>) -> Values {
+fn divided(origin: Origin, values: &Values, pieces: &[Piece], positions: &HashMap<Origin, usize>) -> Values {
     let beside = |axis: usize, step: i32| {
-        let mut place = origin;
-        place[axis] += step * 8;
-        places.get(&place).and_then(|&index| match &pieces[index] {
+        let mut position = origin;
+        position[axis] += step * 8;
+        positions.get(&position).and_then(|&index| match &pieces[index] {
             Piece::Near(_, values) => Some(values),
             Piece::Inside(_) => None,
         })
@@ -186,8 +186,8 @@ fn divided(origin: Origin, values: &Values, pieces: &[Piece], places: &HashMap<O
         let mut squared = 0.0;
         for axis in 0..3 {
             let value = |coordinate: i32| {
-                let mut place = at;
-                place[axis] = (coordinate & 7) as usize;
+                let mut position = at;
+                position[axis] = (coordinate & 7) as usize;
                 let block = match coordinate {
                     -1 => neighbours[axis][0].map_or(values, |block| block),
                     8 => neighbours[axis][1].map_or(values, |block| block),
@@ -195,7 +195,7 @@ fn divided(origin: Origin, values: &Values, pieces: &[Piece], places: &HashMap<O
                 };
                 let outside = (coordinate == -1 && neighbours[axis][0].is_none())
                     || (coordinate == 8 && neighbours[axis][1].is_none());
-                if outside { values[index] } else { block[offset(place[0], place[1], place[2])] }
+                if outside { values[index] } else { block[offset(position[0], position[1], position[2])] }
             };
             let here = values[index];
             let (below, above) = (here - value(at[axis] as i32 - 1), value(at[axis] as i32 + 1) - here);
@@ -239,7 +239,7 @@ mod tests {
         assert!(f64::from(steepest) > STEEPEST * 0.6, "the bound is far from tight: {steepest}");
     }
 
-    /// Values along x at voxels around a place, of clumps of 100 cells: neighbours differ by little, and always.
+    /// Values along x at voxels around a position, of clumps of 100 cells: neighbours differ by little, and always.
     fn line(at: i32) -> Vec<f32> {
         let cell = 0.0075;
         let params = NoiseParams { amplitude: 2.0 * cell, size: 100.0 * cell, octaves: 1, seed: 0 };

@@ -25,9 +25,9 @@ pub fn snow_masks(surface: &FloatGrid, blocks: &[Origin], rim: bool) -> Result<V
     // Each block, then its neighbours below and above along each axis.
     let around = |origin: &Origin| {
         let beside = |axis: usize, step: i32| {
-            let mut place = *origin;
-            place[axis] += step;
-            place
+            let mut position = *origin;
+            position[axis] += step;
+            position
         };
         [*origin, beside(0, -8), beside(0, 8), beside(1, -8), beside(1, 8), beside(2, -8), beside(2, 8)]
     };

@@ -88,15 +88,15 @@ impl Heap {
     ///
     /// # Errors
     /// A position out of range; too many grains.
-    pub fn add(&mut self, id: u32, place: DVec3, velocity: V) -> Result<()> {
-        let (at, place) = locate(place, self.diameter);
+    pub fn add(&mut self, id: u32, position: DVec3, velocity: V) -> Result<()> {
+        let (at, position) = locate(position, self.diameter);
         if !holds(at) {
             return Err(Error::argument("a grain is too far from the origin"));
         }
         if self.rows.len() >= MOST_GRAINS {
             return Err(Error::argument(format!("there are more than {MOST_GRAINS} grains")));
         }
-        self.rows.push(Row { place, hold: 1.0, velocity, since: place, ..Row::default() });
+        self.rows.push(Row { position, hold: 1.0, velocity, since: position, ..Row::default() });
         self.ids.push(id);
         self.at.push(at);
         Ok(())
@@ -106,7 +106,7 @@ impl Heap {
     pub fn retain(&mut self, keeps: impl Fn(u32, DVec3) -> bool + Sync) {
         let is_kept = |slot: &u32| {
             let slot = *slot as usize;
-            keeps(self.ids[slot], world(self.at[slot], self.rows[slot].place, self.diameter))
+            keeps(self.ids[slot], world(self.at[slot], self.rows[slot].position, self.diameter))
         };
         let kept: Vec<u32> = (0..self.rows.len() as u32).into_par_iter().filter(is_kept).collect();
         if kept.len() < self.rows.len() {
@@ -118,14 +118,14 @@ impl Heap {
     pub fn wake(&mut self, wakes: impl Fn(DVec3) -> bool + Sync) {
         let diameter = self.diameter;
         self.rows.par_iter_mut().zip(&self.at).for_each(|(row, at)| {
-            if wakes(world(*at, row.place, diameter)) {
+            if wakes(world(*at, row.position, diameter)) {
                 rest::wake(row);
                 rest::begin_again(row);
             }
         });
     }
 
-    /// Identities, in the order of [`Heap::places`].
+    /// Identities, in the order of [`Heap::positions`].
     pub fn ids(&self) -> &[u32] {
         &self.ids
     }
@@ -136,23 +136,25 @@ impl Heap {
     }
 
     /// Positions (m).
-    pub fn places(&self) -> impl Iterator<Item = DVec3> + '_ {
-        self.rows.iter().zip(&self.at).map(|(row, at)| world(*at, row.place, self.diameter))
+    pub fn positions(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.rows.iter().zip(&self.at).map(|(row, at)| world(*at, row.position, self.diameter))
     }
 
     /// Bounding box (m) of all positions, plus a diameter; least over greatest if there are none.
     pub fn bounds(&self) -> [DVec3; 2] {
         let room = DVec3::repeat(self.diameter);
         let none = || [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
-        let places = self.rows.par_iter().zip(&self.at).map(|(row, at)| world(*at, row.place, self.diameter));
-        let with =
-            |[low, high]: [DVec3; 2], place: DVec3| [low.inf(&(place - room)), high.sup(&(place + room))];
-        places.fold(none, with).reduce(none, |[low, high], [l, h]| [low.inf(&l), high.sup(&h)])
+        let positions =
+            self.rows.par_iter().zip(&self.at).map(|(row, at)| world(*at, row.position, self.diameter));
+        let with = |[low, high]: [DVec3; 2], position: DVec3| {
+            [low.inf(&(position - room)), high.sup(&(position + room))]
+        };
+        positions.fold(none, with).reduce(none, |[low, high], [l, h]| [low.inf(&l), high.sup(&h)])
     }
 
     /// Positions as a block and a position within it (diameters).
     pub fn located(&self) -> impl Iterator<Item = (At, V)> + '_ {
-        self.rows.iter().zip(&self.at).map(|(row, at)| (*at, row.place))
+        self.rows.iter().zip(&self.at).map(|(row, at)| (*at, row.position))
     }
 
     /// Whether each grain is awake.
@@ -250,7 +252,7 @@ impl Heap {
                 settle(row, at);
             }
         });
-        let is_finite = |row: &Row| row.place.iter().chain(&row.velocity).all(|x| x.is_finite());
+        let is_finite = |row: &Row| row.position.iter().chain(&row.velocity).all(|x| x.is_finite());
         if !self.rows.par_iter().all(is_finite) {
             return Err(Error::argument(
                 "a grain would move infinitely fast: the base layer or an object is not as it should be",
@@ -359,7 +361,7 @@ impl Floor {
             (self.height / diameter - f64::from(block.at[1]) * f64::from(super::solver::layout::EDGE)) as f32;
         let near = block.members.iter().filter(|slot| {
             let row = &rows[**slot as usize];
-            row.place[1] - height - 0.5 < super::solver::contacts::SKIN + norm(row.velocity) * reach
+            row.position[1] - height - 0.5 < super::solver::contacts::SKIN + norm(row.velocity) * reach
         });
         let touch = |&grain: &u32| Touch {
             grain,

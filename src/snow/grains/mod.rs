@@ -181,17 +181,20 @@ impl Grains {
     ///
     /// # Errors
     /// Too many grains; a position out of range; a velocity that is not finite or over [`FASTEST`].
-    pub fn emit(&mut self, places: &[DVec3], velocities: &[[f32; 3]], frame: i32) -> Result<u32> {
-        if !velocities.is_empty() && velocities.len() != places.len() {
-            let text =
-                format!("velocities: {} elements, but there are {} places", velocities.len(), places.len());
+    pub fn emit(&mut self, positions: &[DVec3], velocities: &[[f32; 3]], frame: i32) -> Result<u32> {
+        if !velocities.is_empty() && velocities.len() != positions.len() {
+            let text = format!(
+                "velocities: {} elements, but there are {} places",
+                velocities.len(),
+                positions.len()
+            );
             return Err(Error::argument(text));
         }
-        let is_out = |place: &DVec3| {
-            !place.iter().all(|x| x.is_finite())
-                || !solver::layout::holds(locate(*place, self.heap.diameter).0)
+        let is_out = |position: &DVec3| {
+            !position.iter().all(|x| x.is_finite())
+                || !solver::layout::holds(locate(*position, self.heap.diameter).0)
         };
-        if let Some(at) = places.iter().position(is_out) {
+        if let Some(at) = positions.iter().position(is_out) {
             return Err(Error::argument(format!("positions: element {at} is too far from the origin")));
         }
         let is_fast = |velocity: &[f32; 3]| velocity.iter().any(|x| !(-FASTEST..=FASTEST).contains(x));
@@ -201,10 +204,10 @@ impl Grains {
             );
             return Err(Error::argument(text));
         }
-        self.room_for(places.len(), frame)?;
+        self.room_for(positions.len(), frame)?;
         let first = self.next_id;
-        for (at, place) in places.iter().enumerate() {
-            self.add(*place, velocities.get(at).copied().unwrap_or_default(), frame)?;
+        for (at, position) in positions.iter().enumerate() {
+            self.add(*position, velocities.get(at).copied().unwrap_or_default(), frame)?;
         }
         Ok(first)
     }
@@ -220,9 +223,9 @@ impl Grains {
         Ok(())
     }
 
-    fn add(&mut self, place: DVec3, velocity: [f32; 3], frame: i32) -> Result<()> {
-        self.heap.add(self.next_id, place, velocity)?;
-        self.births.push(Birth { rest: [place.x as f32, place.y as f32, place.z as f32], frame });
+    fn add(&mut self, position: DVec3, velocity: [f32; 3], frame: i32) -> Result<()> {
+        self.heap.add(self.next_id, position, velocity)?;
+        self.births.push(Birth { rest: [position.x as f32, position.y as f32, position.z as f32], frame });
         self.next_id += 1;
         Ok(())
     }
@@ -317,14 +320,14 @@ impl Grains {
         let sourcing = Sourcing { diameter: self.heap.diameter, claims, seed: self.params.seed, frame };
         ctx.allow("finding places for grains", sourcing.bytes(removals.len(), after.voxel_size()))?;
         let cell = after.voxel_size();
-        let behind = |place: DVec3| around.is_behind(place, 2.0 * cell);
-        let places = sourcing.places([before.grid(), after], &removals, &mut self.owed, behind)?;
-        self.room_for(places.len(), frame)?;
-        ctx.allow("the grains", memory(self.heap.count() + places.len()))?;
-        for place in &places {
-            self.add(*place, [0.0; 3], frame)?;
+        let behind = |position: DVec3| around.is_behind(position, 2.0 * cell);
+        let positions = sourcing.positions([before.grid(), after], &removals, &mut self.owed, behind)?;
+        self.room_for(positions.len(), frame)?;
+        ctx.allow("the grains", memory(self.heap.count() + positions.len()))?;
+        for position in &positions {
+            self.add(*position, [0.0; 3], frame)?;
         }
-        Ok((places.len(), removals.iter().map(|removal| removal.volume).sum::<f64>() + 0.0))
+        Ok((positions.len(), removals.iter().map(|removal| removal.volume).sum::<f64>() + 0.0))
     }
 
     /// The colliders of the step; wakes all grains if a mesh has jumped since the last step.
@@ -350,10 +353,10 @@ impl Grains {
             self.heap.retain(|id, _| age(id) < lifetime);
         }
         let expired = all - self.heap.count();
-        self.heap.retain(|_, place| place.y >= lowest);
+        self.heap.retain(|_, position| position.y >= lowest);
         let fell = all - expired - self.heap.count();
         if let Some([low, high]) = keep_box {
-            self.heap.retain(|_, place| low <= place && place <= high);
+            self.heap.retain(|_, position| low <= position && position <= high);
         }
         [expired, fell]
     }
@@ -362,9 +365,10 @@ impl Grains {
     fn wake_near(&mut self, removals: &[Removal], cell: f64) {
         let changed: HashSet<Origin> = removals.iter().map(|removal| removal.origin).collect();
         let reach = 1.0 + self.heap.diameter / cell;
-        self.heap.wake(|place| {
-            let leaf =
-                |axis: usize, off: f64| ((place[axis] / cell + 0.5 + off).floor() as i32) & !(DIM as i32 - 1);
+        self.heap.wake(|position| {
+            let leaf = |axis: usize, off: f64| {
+                ((position[axis] / cell + 0.5 + off).floor() as i32) & !(DIM as i32 - 1)
+            };
             let ends = [0, 1, 2].map(|axis| [leaf(axis, -reach), leaf(axis, reach)]);
             let mut corners =
                 (0..8).map(|corner| [0, 1, 2].map(|axis: usize| ends[axis][corner >> axis & 1]));
@@ -374,8 +378,8 @@ impl Grains {
     }
 
     /// Positions (m), in the order of [`Grains::points`], like all that follow.
-    pub fn places(&self) -> impl Iterator<Item = DVec3> + '_ {
-        self.heap.places()
+    pub fn positions(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.heap.positions()
     }
 
     /// Velocities (m/s).
@@ -423,14 +427,14 @@ impl Grains {
     /// `rest` (position of birth, m).
     pub fn points(&self) -> Points {
         let (mut cells, mut offsets) = (Vec::new(), Vec::new());
-        for (at, place) in self.heap.located() {
+        for (at, position) in self.heap.located() {
             // An offset is relative to the centre of its voxel, at most half a voxel.
-            let place = place.map(|x| x / VOXEL);
-            let voxel = place.map(|x| (x + 0.5).floor());
+            let position = position.map(|x| x / VOXEL);
+            let voxel = position.map(|x| (x + 0.5).floor());
             cells.push(
                 [0, 1, 2].map(|axis| at[axis] * (solver::layout::EDGE / VOXEL) as i32 + voxel[axis] as i32),
             );
-            offsets.push([0, 1, 2].map(|axis| place[axis] - voxel[axis]));
+            offsets.push([0, 1, 2].map(|axis| position[axis] - voxel[axis]));
         }
         let trapped = match self.trapped() {
             [] => Column::Uniform(false),

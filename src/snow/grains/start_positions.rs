@@ -21,7 +21,7 @@ pub(super) struct Starts {
 impl Starts {
     /// Those of a step that begins now, with the next identity to be given.
     pub fn of(heap: &Heap, next_id: u32) -> Self {
-        let all = heap.ids().iter().copied().zip(heap.places().zip(heap.velocities()));
+        let all = heap.ids().iter().copied().zip(heap.positions().zip(heap.velocities()));
         let mut grains: Vec<(u32, Start)> = all.collect();
         grains.par_sort_unstable_by_key(|(id, _)| *id);
         Self { grains, born: [next_id; 2] }
@@ -71,7 +71,7 @@ mod tests {
         assert!(grains.starts().all(|start| start.is_none()));
         let by_id = |grains: &Grains| {
             let mut all: Vec<(u32, Start)> =
-                grains.ids().iter().copied().zip(grains.places().zip(grains.velocities())).collect();
+                grains.ids().iter().copied().zip(grains.positions().zip(grains.velocities())).collect();
             all.sort_by_key(|(id, _)| *id);
             all
         };

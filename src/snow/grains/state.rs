@@ -32,7 +32,7 @@ pub fn save(grains: &Grains) -> Vec<u8> {
     for ((row, id), at) in heap.rows.iter().zip(&heap.ids).zip(&heap.at) {
         to.u32(*id);
         to.i32s(at);
-        to.f32s(&row.place);
+        to.f32s(&row.position);
         to.f32s(&row.velocity);
         to.f32s(&row.since);
         to.f32s(&[row.hold, row.still]);
@@ -94,12 +94,12 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
         if !heap.at.last().is_some_and(|at| holds(*at)) {
             return Err(wrong("has a grain that is too far from the origin"));
         }
-        let (place, velocity, since) = (from.f32s()?, from.f32s()?, from.f32s()?);
+        let (position, velocity, since) = (from.f32s()?, from.f32s()?, from.f32s()?);
         let [hold, still] = from.f32s()?;
-        if ![0.0, 1.0, 2.0, 3.0].contains(&hold) || place.iter().any(|x| !(0.0..=EDGE).contains(x)) {
+        if ![0.0, 1.0, 2.0, 3.0].contains(&hold) || position.iter().any(|x| !(0.0..=EDGE).contains(x)) {
             return Err(wrong("has a grain that lies in no block"));
         }
-        heap.rows.push(Row { place, hold, velocity, still, since, ..Row::default() });
+        heap.rows.push(Row { position, hold, velocity, still, since, ..Row::default() });
         let birth = grains.births.get_mut(id as usize).ok_or_else(|| wrong("has a grain without birth"))?;
         (birth.rest, [birth.frame]) = (from.f32s()?, from.i32s()?);
     }

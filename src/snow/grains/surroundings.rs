@@ -84,9 +84,9 @@ impl<'a> Surroundings<'a> {
     }
 
     /// Whether a position (m) is below the floor, or at most `within` (m) behind ground.
-    pub fn is_behind(&self, place: DVec3, within: f64) -> bool {
-        self.floor.is_some_and(|floor| place.y < floor)
-            || self.ground.iter().any(|ground| ground.is_behind(place, within))
+    pub fn is_behind(&self, position: DVec3, within: f64) -> bool {
+        self.floor.is_some_and(|floor| position.y < floor)
+            || self.ground.iter().any(|ground| ground.is_behind(position, within))
     }
 
     /// The colliders near grains within a box (m), from `from` to `to` (s).
@@ -135,7 +135,7 @@ impl<'a> Surroundings<'a> {
             colliders.shells.push((shell, Box::new(pose)));
         }
         for mesh in self.statics {
-            let pose: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast::<f64>()).collect();
+            let pose: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast::<f64>()).collect();
             boxes.iter_mut().for_each(|boxes| boxes.push(bounds(&pose)));
             let shell = Shell::new(FRICTION, mesh.triangles.clone(), false, pose.clone());
             let rests = move |_: f64, out: &mut Vec<DVec3>| {
@@ -162,9 +162,9 @@ fn speed(first: &[DVec3], last: &[DVec3], dt: f64) -> f64 {
 }
 
 /// Bounding box of positions.
-pub fn bounds(places: &[DVec3]) -> Bounds {
+pub fn bounds(positions: &[DVec3]) -> Bounds {
     let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
-    places.iter().fold(none, |[low, high], place| [low.inf(place), high.sup(place)])
+    positions.iter().fold(none, |[low, high], position| [low.inf(position), high.sup(position)])
 }
 
 /// Displacement of a vertex if it may come near a box, else 0; its path may bend aside by as much as the displacement.

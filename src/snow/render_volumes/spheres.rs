@@ -18,7 +18,7 @@ pub struct Spheres {
     reach: f32,
     /// The cubes that a centre is within reach of, ascending: their indices, and the index after their last member.
     cubes: Vec<([i32; 3], usize)>,
-    /// Places (voxels) relative to the least voxel of the cube, one cube after another.
+    /// Positions (voxels) relative to the least voxel of the cube, one cube after another.
     members: Vec<[f32; 3]>,
 }
 
@@ -62,11 +62,11 @@ impl Spheres {
             let mut pairs: Vec<([i32; 3], u32)> = centres.par_iter().enumerate().flat_map_iter(of).collect();
             // No two pairs are the same: the order is.
             pairs.par_sort_unstable();
-            let place = |(cube, index): &([i32; 3], u32)| {
+            let position = |(cube, index): &([i32; 3], u32)| {
                 let at: [f64; 3] = (centres[*index as usize] / voxel).into();
                 [0, 1, 2].map(|axis| (at[axis] - f64::from(cube[axis]) * f64::from(width)) as f32)
             };
-            let members = pairs.par_iter().map(place).collect();
+            let members = pairs.par_iter().map(position).collect();
             let mut cubes: Vec<([i32; 3], usize)> = Vec::new();
             for (index, (cube, _)) in pairs.iter().enumerate() {
                 match cubes.last_mut() {
@@ -83,7 +83,7 @@ impl Spheres {
         self.cubes.iter().map(|(cube, _)| *cube)
     }
 
-    /// The blocks of a cube that a centre is within reach of, by place.
+    /// The blocks of a cube that a centre is within reach of, by position.
     pub fn squares(&self, cube: [i32; 3]) -> Vec<Squares> {
         let Ok(index) = self.cubes.binary_search_by_key(&cube, |(cube, _)| *cube) else { return Vec::new() };
         let begin = if index == 0 { 0 } else { self.cubes[index - 1].1 };

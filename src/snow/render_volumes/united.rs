@@ -92,9 +92,9 @@ impl Fine {
         let all = 0..self.division;
         for (x, y) in all.clone().flat_map(|x| all.clone().map(move |y| (x, y))) {
             for block in all.clone().map(|z| [x, y, z]) {
-                let place =
+                let position =
                     |axis: usize| (cube[axis] * self.division as i32 + block[axis] as i32) * DIM as i32;
-                let origin = [0, 1, 2].map(place);
+                let origin = [0, 1, 2].map(position);
                 let of_grains = squares.next_if(|squares| squares.origin == origin);
                 out.extend(self.block(origin, block, &cells, of_grains));
             }
@@ -146,7 +146,7 @@ impl Cells {
         Self(values)
     }
 
-    /// The values along z at a place.
+    /// The values along z at a position.
     fn row(&self, x: usize, y: usize) -> &[f32] {
         &self.0[(x * SIDE + y) * SIDE..][..SIDE]
     }

@@ -97,8 +97,8 @@ impl Distances {
             let (patch, triangles) = runs[run];
             triangles.iter().map(move |triangle| {
                 triangle.map(|vertex| {
-                    let (owner, place) = surface.place(phi, vertex);
-                    [0, 1, 2].map(|axis| place[axis] + ((owner[axis] - patch[axis]) * SIDE) as f32)
+                    let (owner, position) = surface.position(phi, vertex);
+                    [0, 1, 2].map(|axis| position[axis] + ((owner[axis] - patch[axis]) * SIDE) as f32)
                 })
             })
         };

@@ -22,7 +22,7 @@ pub const SIDE: i32 = 4;
 pub const NODES: usize = 64;
 /// Particles in a cube of two spacings, of which there are 8 in a liquid, from which on it is full.
 const FULL: u32 = 4;
-/// Bytes of an evaluated patch: its values while they are made and then, and its places in lists and tables.
+/// Bytes of an evaluated patch: its values while they are made and then, and its positions in lists and tables.
 const BYTES: usize = 2 * 4 * NODES + 100;
 /// What needs the memory, for messages.
 const WHAT: &str = "the particles' surface (larger cells need less)";
@@ -49,11 +49,11 @@ enum State {
 }
 
 impl Implicit {
-    /// Evaluates the function of particles at places (m), whose spacing is `spacing` (m), on cells of `cell` (m).
+    /// Evaluates the function of particles at positions (m), whose spacing is `spacing` (m), on cells of `cell` (m).
     ///
     /// # Errors
     /// A spacing that is not positive, a cell that is not within 1/8 to 2 spacings; particles too far apart; more memory than the context allows; cancel.
-    pub fn new(ctx: &Context, places: &[DVec3], spacing: f64, cell: f64) -> Result<Self> {
+    pub fn new(ctx: &Context, positions: &[DVec3], spacing: f64, cell: f64) -> Result<Self> {
         if !(spacing > 0.0 && spacing.is_finite()) {
             return Err(Error::argument(format!(
                 "the spacing of particles must be above 0, not {spacing} m"
@@ -64,7 +64,7 @@ impl Implicit {
                 "a cell of {cell} m is not within 1/8 to 2 spacings of {spacing} m"
             )));
         }
-        let cells = Cells::new(places, 2.0 * spacing, |_| 0)?;
+        let cells = Cells::new(positions, 2.0 * spacing, |_| 0)?;
         let mut implicit = Self { cell, patches: Vec::new(), values: Vec::new(), states: HashMap::new() };
         let around = Around { cells: &cells, spacing, cell };
         let (near, full) = around.patches();
@@ -209,15 +209,15 @@ impl Around<'_> {
         let size = [0, 1, 2].map(|axis| (high[axis] - low[axis] + 1) as usize);
         counts.clear();
         counts.resize(size.iter().product(), 0);
-        let place = |at: [usize; 3]| (at[0] * size[1] + at[1]) * size[2] + at[2];
+        let position = |at: [usize; 3]| (at[0] * size[1] + at[1]) * size[2] + at[2];
         self.cells.counts(low.map(|x| x >> 1), high.map(|x| x >> 1), |octant, count| {
             let at = [0, 1, 2].map(|axis| octant[axis].wrapping_sub(low[axis]) as usize);
             if (0..3).all(|axis| at[axis] < size[axis]) {
-                counts[place(at)] = u32::from(count);
+                counts[position(at)] = u32::from(count);
             }
         });
         let window = |x: usize, y: usize, z: usize| -> u32 {
-            (0..8).map(|n| counts[place([x + (n >> 2), y + (n >> 1 & 1), z + (n & 1)])]).sum()
+            (0..8).map(|n| counts[position([x + (n >> 2), y + (n >> 1 & 1), z + (n & 1)])]).sum()
         };
         let on = |axis: usize| 0..size[axis] - 1;
         on(0).all(|x| on(1).all(|y| on(2).all(|z| window(x, y, z) >= FULL)))
@@ -236,21 +236,21 @@ impl Around<'_> {
                 as f32
         });
         let (scale, radius) = (scale as f32, (radius / self.cell) as f32);
-        of_patch.places.clear();
+        of_patch.positions.clear();
         self.cells.near(low, high, from, |_, offset| {
-            let place = [0, 1, 2].map(|axis| offset[axis] * scale + shift[axis]);
-            if is_near(place, [0.0; 3], (SIDE - 1) as f32, radius) {
-                of_patch.places.push(place);
+            let position = [0, 1, 2].map(|axis| offset[axis] * scale + shift[axis]);
+            if is_near(position, [0.0; 3], (SIDE - 1) as f32, radius) {
+                of_patch.positions.push(position);
             }
         });
         let mut out = [0.0; NODES];
         for group in 0..8 {
             let first = [group >> 2, group >> 1 & 1, group & 1].map(|half| 2 * half);
             let corner = first.map(|x| x as f32);
-            of_group.places.clear();
-            of_group
-                .places
-                .extend(of_patch.places.iter().filter(|place| is_near(**place, corner, 1.0, radius)));
+            of_group.positions.clear();
+            of_group.positions.extend(
+                of_patch.positions.iter().filter(|position| is_near(**position, corner, 1.0, radius)),
+            );
             let part = |axis: usize| -> [f32; LANES] {
                 std::array::from_fn(|lane| corner[axis] + (lane >> (2 - axis) & 1) as f32)
             };
@@ -264,11 +264,11 @@ impl Around<'_> {
     }
 }
 
-/// Whether a place is within a radius of a cube at `corner`.
-fn is_near(place: [f32; 3], corner: [f32; 3], edge: f32, radius: f32) -> bool {
+/// Whether a position is within a radius of a cube at `corner`.
+fn is_near(position: [f32; 3], corner: [f32; 3], edge: f32, radius: f32) -> bool {
     let mut square = 0.0;
     for axis in 0..3 {
-        let at = place[axis] - corner[axis];
+        let at = position[axis] - corner[axis];
         let off = at - at.clamp(0.0, edge);
         square += off * off;
     }

@@ -20,8 +20,8 @@ const STEPS: usize = 6;
 pub struct Isosurface {
     /// For each evaluated patch, its first vertex; then the count of all.
     first: Vec<u32>,
-    /// Places of vertices, in cells from the first node of the patch that has them.
-    places: Vec<[f32; 3]>,
+    /// Positions of vertices, in cells from the first node of the patch that has them.
+    positions: Vec<[f32; 3]>,
     /// The evaluated patch that has each vertex.
     owners: Vec<u32>,
     /// The patch of each run of triangles, and the end of the run.
@@ -33,7 +33,7 @@ pub struct Isosurface {
 struct Crossings {
     /// Number of the vertex on the edge from a node along an axis, or [`NONE`].
     index: [[u8; NODES]; 3],
-    places: Vec<[f32; 3]>,
+    positions: Vec<[f32; 3]>,
 }
 
 impl Isosurface {
@@ -42,18 +42,18 @@ impl Isosurface {
         let crossings: Vec<Crossings> =
             (0..phi.patches().len()).into_par_iter().with_min_len(16).map(|at| crossings(phi, at)).collect();
         let mut first = vec![0];
-        let (mut places, mut owners) = (Vec::new(), Vec::new());
+        let (mut positions, mut owners) = (Vec::new(), Vec::new());
         for (crossings, owner) in crossings.iter().zip(0..) {
-            places.extend_from_slice(&crossings.places);
-            owners.resize(places.len(), owner);
-            first.push(places.len() as u32);
+            positions.extend_from_slice(&crossings.positions);
+            owners.resize(positions.len(), owner);
+            first.push(positions.len() as u32);
         }
         let mut patches = with_lower(phi.patches());
         patches.par_sort_unstable();
         patches.dedup();
         let run = |patch: &Coord| triangles(phi, *patch, &crossings, &first);
         let parts: Vec<Vec<[u32; 3]>> = patches.par_iter().with_min_len(16).map(run).collect();
-        let mut out = Self { first, places, owners, ..Self::default() };
+        let mut out = Self { first, positions, owners, ..Self::default() };
         for (patch, part) in patches.into_iter().zip(parts) {
             if !part.is_empty() {
                 out.triangles.extend(part);
@@ -70,7 +70,7 @@ impl Isosurface {
 
     /// Count of vertices.
     pub fn vertices(&self) -> usize {
-        self.places.len()
+        self.positions.len()
     }
 
     /// Each patch in which cubes with triangles begin, with these, ascending.
@@ -82,25 +82,25 @@ impl Isosurface {
             .map(|((patch, end), start)| (*patch, &self.triangles[start as usize..*end as usize]))
     }
 
-    /// The place of a vertex: cells from the first node of a patch, which it gives too.
-    pub fn place(&self, phi: &Implicit, vertex: u32) -> (Coord, [f32; 3]) {
+    /// The position of a vertex: cells from the first node of a patch, which it gives too.
+    pub fn position(&self, phi: &Implicit, vertex: u32) -> (Coord, [f32; 3]) {
         let owner = self.owners[vertex as usize];
-        (phi.patches()[owner as usize], self.places[vertex as usize])
+        (phi.patches()[owner as usize], self.positions[vertex as usize])
     }
 
-    /// The place of a vertex (cells).
+    /// The position of a vertex (cells).
     pub fn in_cells(&self, phi: &Implicit, vertex: u32) -> DVec3 {
-        let (patch, at) = self.place(phi, vertex);
+        let (patch, at) = self.position(phi, vertex);
         DVec3::from(patch.map(|x| f64::from(x * SIDE))) + DVec3::from(at.map(f64::from))
     }
 
     /// As a mesh (m).
     pub fn mesh(&self, phi: &Implicit) -> TriMesh {
         let cell = phi.cell();
-        let mut positions = Vec::with_capacity(self.places.len());
+        let mut positions = Vec::with_capacity(self.positions.len());
         for (patch, ends) in phi.patches().iter().zip(self.first.windows(2)) {
             let corner = DVec3::from(patch.map(|at| f64::from(at * SIDE)));
-            let places = &self.places[ends[0] as usize..ends[1] as usize];
+            let places = &self.positions[ends[0] as usize..ends[1] as usize];
             positions
                 .extend(places.iter().map(|at| ((corner + DVec3::from(at.map(f64::from))) * cell).cast()));
         }
@@ -116,7 +116,7 @@ fn with_lower(patches: &[Coord]) -> Vec<Coord> {
 
 fn crossings(phi: &Implicit, patch: usize) -> Crossings {
     let values = phi.values(patch);
-    let mut out = Crossings { index: [[NONE; NODES]; 3], places: Vec::new() };
+    let mut out = Crossings { index: [[NONE; NODES]; 3], positions: Vec::new() };
     for axis in 0..3 {
         let [before, next] = [-1, 1].map(|by| {
             let mut beside = phi.patches()[patch];
@@ -141,10 +141,10 @@ fn crossings(phi: &Implicit, patch: usize) -> Crossings {
                 0 => before.map(|before| before[node + 3 * step]),
                 _ => Some(values[node - step]),
             };
-            let mut place = [node >> 4, node >> 2 & 3, node & 3].map(|x| x as f32);
-            place[axis] += zero([last, value(2)], here, there);
-            out.index[axis][node] = out.places.len() as u8;
-            out.places.push(place);
+            let mut position = [node >> 4, node >> 2 & 3, node & 3].map(|x| x as f32);
+            position[axis] += zero([last, value(2)], here, there);
+            out.index[axis][node] = out.positions.len() as u8;
+            out.positions.push(position);
         }
     }
     out

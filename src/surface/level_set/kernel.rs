@@ -16,7 +16,7 @@ const RATES: [f64; 2] = [0.4, 3.5];
 /// Particles around some nodes, in cells from a common corner.
 #[derive(Debug, Default)]
 pub struct Near {
-    pub places: Vec<[f32; 3]>,
+    pub positions: Vec<[f32; 3]>,
 }
 
 /// Sums over the particles around eight nodes, d being the displacement from a node to a particle and q = 1 - (d / R)^2:
@@ -32,22 +32,22 @@ struct Sums {
 /// Axes of the six different products of two components.
 const PAIRS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [0, 1], [0, 2], [1, 2]];
 
-fn sums(places: &[[f32; 3]], nodes: &[[f32; LANES]; 3], inverse: f32) -> Sums {
+fn sums(positions: &[[f32; 3]], nodes: &[[f32; LANES]; 3], inverse: f32) -> Sums {
     // Eight lanes fill 256 bits: with AVX-512 the compiler joins halves, which takes a fifth longer.
-    dispatch!(at most avx2: sums_body(places: &[[f32; 3]], nodes: &[[f32; LANES]; 3], inverse: f32) -> Sums)
+    dispatch!(at most avx2: sums_body(positions: &[[f32; 3]], nodes: &[[f32; LANES]; 3], inverse: f32) -> Sums)
 }
 
 #[inline(always)]
-fn sums_body(places: &[[f32; 3]], nodes: &[[f32; LANES]; 3], inverse: f32) -> Sums {
+fn sums_body(positions: &[[f32; 3]], nodes: &[[f32; LANES]; 3], inverse: f32) -> Sums {
     let zero = Lanes::all(0.0);
     let (one, inverse) = (Lanes::all(1.0), Lanes::all(inverse));
     let nodes = [Lanes(nodes[0]), Lanes(nodes[1]), Lanes(nodes[2])];
     let mut out = Sums { weight: zero, mean: [zero; 3], slope: [zero; 3], square: [zero; 6] };
-    for place in places {
+    for position in positions {
         let d = [
-            Lanes::all(place[0]) - nodes[0],
-            Lanes::all(place[1]) - nodes[1],
-            Lanes::all(place[2]) - nodes[2],
+            Lanes::all(position[0]) - nodes[0],
+            Lanes::all(position[1]) - nodes[1],
+            Lanes::all(position[2]) - nodes[2],
         ];
         let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
         let q = (one - square * inverse).max(zero);
@@ -69,7 +69,7 @@ fn sums_body(places: &[[f32; 3]], nodes: &[[f32; LANES]; 3], inverse: f32) -> Su
 /// The function at eight nodes, in cells; `spacing` is r in cells. Where no particle is near, it is [`SUPPORT`] spacings.
 pub fn values(near: &Near, nodes: &[[f32; LANES]; 3], spacing: f32) -> [f32; LANES] {
     let radius = SUPPORT as f32 * spacing;
-    let sums = sums(&near.places, nodes, 1.0 / (radius * radius));
+    let sums = sums(&near.positions, nodes, 1.0 / (radius * radius));
     std::array::from_fn(|lane| value(&sums, lane, f64::from(spacing)) as f32)
 }
 
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn a_single_particle_is_a_sphere_of_about_its_volume() {
-        let near = Near { places: vec![[0.5, 0.25, 0.0]] };
+        let near = Near { positions: vec![[0.5, 0.25, 0.0]] };
         let mut nodes = [[0.0; LANES]; 3];
         nodes[0] = [0.5, 1.0, 1.6, 2.1, 2.5, 8.0, 9.0, 20.0];
         nodes[1] = [0.25; LANES];

@@ -4,7 +4,7 @@ use super::band::Distances;
 use crate::geometry::Coord;
 use crate::geometry::DVec3;
 
-/// Reads distances near one place after the other; nodes are kept while the place stays in its cell.
+/// Reads distances near one position after the other; nodes are kept while the position stays in its cell.
 pub struct Sampler<'a> {
     distances: &'a Distances,
     /// The cell whose nodes are kept.
@@ -45,9 +45,9 @@ impl<'a> Sampler<'a> {
         Self { distances, cell: nowhere, block: (nowhere, None), nodes: [[[0.0; 4]; 4]; 4] }
     }
 
-    /// Distance and gradient (cells) at a place (cells); none outside the band's blocks.
-    pub fn at(&mut self, place: DVec3) -> Option<(f32, [f32; 3])> {
-        let cell = [0, 1, 2].map(|axis| place[axis].floor() as i32);
+    /// Distance and gradient (cells) at a position (cells); none outside the band's blocks.
+    pub fn at(&mut self, position: DVec3) -> Option<(f32, [f32; 3])> {
+        let cell = [0, 1, 2].map(|axis| position[axis].floor() as i32);
         if cell != self.cell {
             self.cell = cell;
             let block = cell.map(|x| x >> 3);
@@ -57,7 +57,7 @@ impl<'a> Sampler<'a> {
             self.gather();
         }
         self.block.1?;
-        let part = [0, 1, 2].map(|axis| (place[axis] - f64::from(cell[axis])) as f32);
+        let part = [0, 1, 2].map(|axis| (position[axis] - f64::from(cell[axis])) as f32);
         let [[wx, dx], [wy, dy], [wz, dz]] = part.map(weights);
         // Along z, then y, then x.
         let mut planes = [[0.0f32; 4]; 3];

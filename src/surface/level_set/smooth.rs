@@ -33,20 +33,20 @@ const PIECE: usize = 1024;
 pub fn smooth(ctx: &Context, mesh: &mut TriMesh, passes: u32) -> Result<()> {
     let rings = Rings::of(mesh);
     let parts = Parts::of(mesh);
-    let mut places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
-    let volumes = parts.volumes(&places, &mesh.triangles, &parts.centres(&places));
-    let reaches = parts.reaches(&places);
+    let mut positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
+    let volumes = parts.volumes(&positions, &mesh.triangles, &parts.centres(&positions));
+    let reaches = parts.reaches(&positions);
     let mut is_done = vec![false; reaches.len()];
     for _ in 0..passes {
         ctx.check()?;
-        let mut moved = rings.moved(&rings.moved(&places, SHRINK), GROW);
+        let mut moved = rings.moved(&rings.moved(&positions, SHRINK), GROW);
         parts.restore(&mut moved, &mesh.triangles, &volumes);
         for (is_done, (now, first)) in is_done.iter_mut().zip(parts.reaches(&moved).iter().zip(&reaches)) {
             *is_done |= *now > FARTHEST * first;
         }
-        parts.take(&mut places, &moved, &is_done);
+        parts.take(&mut positions, &moved, &is_done);
     }
-    mesh.positions = places.iter().map(|place| place.cast()).collect();
+    mesh.positions = positions.iter().map(|position| position.cast()).collect();
     Ok(())
 }
 
@@ -76,17 +76,17 @@ impl Rings {
         Self { starts, neighbours }
     }
 
-    /// Places after a step of a share of the way toward the means of the neighbours.
-    fn moved(&self, places: &[DVec3], share: f64) -> Vec<DVec3> {
+    /// Positions after a step of a share of the way toward the means of the neighbours.
+    fn moved(&self, positions: &[DVec3], share: f64) -> Vec<DVec3> {
         let step = |(vertex, here): (usize, &DVec3)| {
             let ring = &self.neighbours[self.starts[vertex] as usize..self.starts[vertex + 1] as usize];
             if ring.is_empty() {
                 return *here;
             }
-            let sum: DVec3 = ring.iter().map(|&at| places[at as usize]).sum();
+            let sum: DVec3 = ring.iter().map(|&at| positions[at as usize]).sum();
             here + (sum / ring.len() as f64 - here) * share
         };
-        places.par_iter().enumerate().with_min_len(PIECE).map(step).collect()
+        positions.par_iter().enumerate().with_min_len(PIECE).map(step).collect()
     }
 }
 
@@ -118,59 +118,59 @@ impl Parts {
     }
 
     /// The mean of each part's vertices.
-    fn centres(&self, places: &[DVec3]) -> Vec<DVec3> {
+    fn centres(&self, positions: &[DVec3]) -> Vec<DVec3> {
         let mut sums = vec![(DVec3::zeros(), 0.0); self.count];
-        for (place, &part) in places.iter().zip(&self.of) {
+        for (position, &part) in positions.iter().zip(&self.of) {
             let (sum, count) = &mut sums[part as usize];
-            *sum += place;
+            *sum += position;
             *count += 1.0;
         }
         sums.into_iter().map(|(sum, count)| sum / count).collect()
     }
 
     /// Greatest distance (m) of each part's vertices from its centre.
-    fn reaches(&self, places: &[DVec3]) -> Vec<f64> {
-        let centres = self.centres(places);
+    fn reaches(&self, positions: &[DVec3]) -> Vec<f64> {
+        let centres = self.centres(positions);
         let mut squares = vec![0.0f64; centres.len()];
-        for (place, &part) in places.iter().zip(&self.of) {
+        for (position, &part) in positions.iter().zip(&self.of) {
             let square = &mut squares[part as usize];
-            *square = square.max((place - centres[part as usize]).norm_squared());
+            *square = square.max((position - centres[part as usize]).norm_squared());
         }
         squares.into_iter().map(f64::sqrt).collect()
     }
 
     /// Moves the parts that are not done.
-    fn take(&self, places: &mut [DVec3], moved: &[DVec3], is_done: &[bool]) {
-        for ((place, moved), &part) in places.iter_mut().zip(moved).zip(&self.of) {
+    fn take(&self, positions: &mut [DVec3], moved: &[DVec3], is_done: &[bool]) {
+        for ((position, moved), &part) in positions.iter_mut().zip(moved).zip(&self.of) {
             if !is_done[part as usize] {
-                *place = *moved;
+                *position = *moved;
             }
         }
     }
 
     /// Volume that each part encloses (m3), by the divergence theorem about its centre; that of a cavity is below 0.
-    fn volumes(&self, places: &[DVec3], triangles: &[[u32; 3]], centres: &[DVec3]) -> Vec<f64> {
+    fn volumes(&self, positions: &[DVec3], triangles: &[[u32; 3]], centres: &[DVec3]) -> Vec<f64> {
         let mut volumes = vec![0.0; self.count];
         for triangle in triangles {
             let part = self.of[triangle[0] as usize] as usize;
-            let [a, b, c] = triangle.map(|vertex| places[vertex as usize] - centres[part]);
+            let [a, b, c] = triangle.map(|vertex| positions[vertex as usize] - centres[part]);
             volumes[part] += a.dot(&b.cross(&c)) / 6.0;
         }
         volumes
     }
 
     /// Scales each part about its centre to a volume (m3).
-    fn restore(&self, places: &mut [DVec3], triangles: &[[u32; 3]], volumes: &[f64]) {
-        let centres = self.centres(places);
-        let now = self.volumes(places, triangles, &centres);
+    fn restore(&self, positions: &mut [DVec3], triangles: &[[u32; 3]], volumes: &[f64]) {
+        let centres = self.centres(positions);
+        let now = self.volumes(positions, triangles, &centres);
         let scale = |(before, now): (&f64, &f64)| {
             let scale = libm::cbrt(before / now);
             if (1.0 / MOST..=MOST).contains(&scale) { scale } else { 1.0 }
         };
         let scales: Vec<f64> = volumes.iter().zip(&now).map(scale).collect();
-        for (place, &part) in places.iter_mut().zip(&self.of) {
+        for (position, &part) in positions.iter_mut().zip(&self.of) {
             let centre = centres[part as usize];
-            *place = centre + (*place - centre) * scales[part as usize];
+            *position = centre + (*position - centre) * scales[part as usize];
         }
     }
 }
@@ -228,7 +228,7 @@ mod tests {
             assert!(mesh.is_closed() && mesh.positions.len() == corners);
             let far = |mesh: &TriMesh| {
                 let middle = mesh.positions.iter().sum::<Vec3>() / corners as f32;
-                mesh.positions.iter().map(|place| (place - middle).norm()).fold(0.0, f32::max)
+                mesh.positions.iter().map(|position| (position - middle).norm()).fold(0.0, f32::max)
             };
             let (reach, volume) = (far(&mesh), mesh.volume());
             smooth(&ctx, &mut mesh, 100).unwrap();

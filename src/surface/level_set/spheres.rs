@@ -28,40 +28,40 @@ pub fn is_sphere_radius(radius: f64, cell: f64) -> bool {
     (LEAST * (1.0 - ROUNDING)..=MOST).contains(&(radius / cell))
 }
 
-/// Level set (m) of the union of spheres of a radius (m) around places (m), on cells of `cell` (m), with a band of three of them on
+/// Level set (m) of the union of spheres of a radius (m) around positions (m), on cells of `cell` (m), with a band of three of them on
 /// each side. Where spheres overlap, values inside are nearer to 0 than the true distance.
 ///
 /// # Errors
-/// A radius that is not within 1.5 to 100 cells; a place that is not finite or too far from the origin; more memory than the
+/// A radius that is not within 1.5 to 100 cells; a position that is not finite or too far from the origin; more memory than the
 /// context allows; cancel.
-pub fn spheres(ctx: &Context, places: &[DVec3], radius: f64, cell: f64) -> Result<FloatGrid> {
+pub fn spheres(ctx: &Context, positions: &[DVec3], radius: f64, cell: f64) -> Result<FloatGrid> {
     let cells = radius / cell;
     if !is_sphere_radius(radius, cell) {
         return Err(Error::argument(format!(
             "spheres of {radius} m have a radius of {cells:.3} cells of {cell} m: it must be 1.5 to 100"
         )));
     }
-    let is_near = |place: &DVec3| place.iter().all(|x| x.abs() + radius < FARTHEST * cell);
-    if let Some(far) = places.iter().position(|place| !is_near(place)) {
+    let is_near = |position: &DVec3| position.iter().all(|x| x.abs() + radius < FARTHEST * cell);
+    if let Some(far) = positions.iter().position(|position| !is_near(position)) {
         return Err(Error::argument(format!(
             "particle {} is not finite, or too far from the origin for cells of {cell} m",
             far + 1
         )));
     }
-    ctx.allow(WHAT, most_blocks(places, cells + f64::from(HALF_WIDTH), cell).saturating_mul(BYTES))?;
+    ctx.allow(WHAT, most_blocks(positions, cells + f64::from(HALF_WIDTH), cell).saturating_mul(BYTES))?;
     let radius = radius.max(LEAST * cell * (1.0 + ROUNDING)) as f32;
-    let mut grid = from_particles(ctx, places, &vec![radius; places.len()], cell, HALF_WIDTH)?;
+    let mut grid = from_particles(ctx, positions, &vec![radius; positions.len()], cell, HALF_WIDTH)?;
     grid.set_name("surface")?;
     Ok(grid)
 }
 
-/// At most so many blocks are within `reach` (cells) of places (m): cubes of whole blocks that are as long as that, and those
+/// At most so many blocks are within `reach` (cells) of positions (m): cubes of whole blocks that are as long as that, and those
 /// beside them.
-fn most_blocks(places: &[DVec3], reach: f64, cell: f64) -> u64 {
+fn most_blocks(positions: &[DVec3], reach: f64, cell: f64) -> u64 {
     let blocks = (reach / DIM as f64).ceil();
     let edge = blocks * DIM as f64 * cell;
-    let cube = |place: &DVec3| [0, 1, 2].map(|axis| (place[axis] / edge).floor() as i32);
-    let mut cubes: Vec<[i32; 3]> = places.par_iter().map(cube).collect();
+    let cube = |position: &DVec3| [0, 1, 2].map(|axis| (position[axis] / edge).floor() as i32);
+    let mut cubes: Vec<[i32; 3]> = positions.par_iter().map(cube).collect();
     cubes.par_sort_unstable();
     cubes.dedup();
     let around =
@@ -86,10 +86,10 @@ mod tests {
     fn a_sphere_has_its_volume_and_two_apart_have_twice_that() {
         let ctx = context();
         let ball = 4.0 / 3.0 * std::f64::consts::PI * 0.2f64.powi(3);
-        for (places, count) in
+        for (positions, count) in
             [(vec![DVec3::repeat(0.013)], 1.0), (vec![DVec3::zeros(), DVec3::new(0.5, 0.0, 0.0)], 2.0)]
         {
-            let grid = spheres(&ctx, &places, 0.2, 0.0125).unwrap();
+            let grid = spheres(&ctx, &positions, 0.2, 0.0125).unwrap();
             let volumes =
                 [measure(&ctx, &grid).unwrap().volume, to_mesh(&ctx, &grid, 0.0, 0.0).unwrap().volume()];
             for volume in volumes {
@@ -106,8 +106,8 @@ mod tests {
             let grid = spheres(&ctx, &[DVec3::zeros()], 1.5 * cell, cell).unwrap();
             assert!(grid.value([0; 3]) < 0.0, "{cell}");
         }
-        let said = |places: &[DVec3], radius: f64, ctx: &Context| {
-            spheres(ctx, places, radius, 0.1).err().unwrap().to_string()
+        let said = |positions: &[DVec3], radius: f64, ctx: &Context| {
+            spheres(ctx, positions, radius, 0.1).err().unwrap().to_string()
         };
         assert!(said(&[DVec3::zeros()], 0.14, &ctx).contains("1.5 to 100"));
         assert!(said(&[DVec3::zeros()], 11.0, &ctx).contains("1.5 to 100"));

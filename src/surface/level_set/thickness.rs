@@ -84,10 +84,10 @@ mod tests {
     use super::*;
 
     /// What a node sees of particles at these displacements from it, each of volume 1: their spread, and the displacement to their mean.
-    fn seen(places: impl Iterator<Item = Vector3<f64>>) -> (Spread, Vector3<f64>) {
+    fn seen(positions: impl Iterator<Item = Vector3<f64>>) -> (Spread, Vector3<f64>) {
         let (mut weight, mut heavy) = (0.0, 0.0);
         let (mut mean, mut middle, mut square) = (Vector3::zeros(), Vector3::zeros(), Matrix3::zeros());
-        for d in places {
+        for d in positions {
             let q = (1.0 - d.norm_squared() / (SUPPORT * SUPPORT)).max(0.0);
             weight += q * q;
             heavy += q * q * q;
@@ -111,14 +111,14 @@ mod tests {
         let layer = move |n: i32| ((f64::from(n) + 0.5) / f64::from(layers) - 0.5) * thick - height;
         let at = move |n: i32, shift: f64| (f64::from(n) + 0.31) * apart + shift;
         let on = || -8..8;
-        let places = (0..layers).flat_map(|y| {
+        let positions = (0..layers).flat_map(|y| {
             on().flat_map(move |x| {
                 on().map(move |z| {
                     Vector3::new(at(x, 0.4 * f64::from(y)), layer(y), at(z, 0.7 * f64::from(y)))
                 })
             })
         });
-        let (spread, mean) = in_half_spacings(seen(places));
+        let (spread, mean) = in_half_spacings(seen(positions));
         let (offset, _) = spread.offset(mean, 2.0);
         // In cells of half a spacing.
         offset / f64::max(thick, LEAST)
@@ -141,10 +141,10 @@ mod tests {
     fn a_body_has_the_surface_that_it_would_have_had() {
         for height in [0.0, 0.2, 0.4, 0.6] {
             let on = |from: i32, to: i32| (from..to).map(|n| f64::from(n) + 0.37);
-            let places = on(-6, 6).flat_map(|x| {
+            let positions = on(-6, 6).flat_map(|x| {
                 on(-6, 0).flat_map(move |y| on(-6, 6).map(move |z| Vector3::new(x, y + 0.13 - height, z)))
             });
-            let (spread, mean) = seen(places);
+            let (spread, mean) = seen(positions);
             assert_eq!(spread.offset(mean, 1.0), (1.0, mean.norm()), "{height}");
         }
     }

@@ -1,45 +1,45 @@
-//! Ways of particles around a place: their weighted sums, and the affine map that fits them best.
+//! Ways of particles around a position: their weighted sums, and the affine map that fits them best.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::{LANES, Lanes};
 
-/// Spread of the places, over that on all axes, below which the map does not follow the ways in that direction.
+/// Spread of the positions, over that on all axes, below which the map does not follow the ways in that direction.
 const FLAT: f64 = 0.004;
 
-/// Particles from a common corner (spacings): their places and ways, in whole lanes.
+/// Particles from a common corner (spacings): their positions and ways, in whole lanes.
 #[derive(Default)]
 pub struct Near {
-    place: [Vec<[f32; LANES]>; 3],
+    position: [Vec<[f32; LANES]>; 3],
     way: [Vec<[f32; LANES]>; 3],
     count: usize,
 }
 
 impl Near {
     pub fn clear(&mut self) {
-        self.place.iter_mut().chain(&mut self.way).for_each(Vec::clear);
+        self.position.iter_mut().chain(&mut self.way).for_each(Vec::clear);
         self.count = 0;
     }
 
     #[inline(always)]
-    pub fn push(&mut self, place: [f32; 3], way: [f32; 3]) {
+    pub fn push(&mut self, position: [f32; 3], way: [f32; 3]) {
         let lane = self.count % LANES;
         if lane == 0 {
             // What fills no lane is too far to count.
-            self.place.iter_mut().for_each(|lanes| lanes.push([1.0e6; LANES]));
+            self.position.iter_mut().for_each(|lanes| lanes.push([1.0e6; LANES]));
             self.way.iter_mut().for_each(|lanes| lanes.push([0.0; LANES]));
         }
         let last = self.count / LANES;
         for axis in 0..3 {
-            self.place[axis][last][lane] = place[axis];
+            self.position[axis][last][lane] = position[axis];
             self.way[axis][last][lane] = way[axis];
         }
         self.count += 1;
     }
 }
 
-/// Weighted sums over the particles around a place, d being the way to a particle and u its own: 1, d, d d, u, and u d.
+/// Weighted sums over the particles around a position, d being the way to a particle and u its own: 1, d, d d, u, and u d.
 pub struct Sums {
     weight: f64,
     d: Vector3<f64>,
@@ -48,7 +48,7 @@ pub struct Sums {
     ud: Matrix3<f64>,
 }
 
-/// Sums over the particles within a radius (spacings) of a place, with the weights (1 - (d / radius)^2)^3 (poly6: Müller, Charypar
+/// Sums over the particles within a radius (spacings) of a position, with the weights (1 - (d / radius)^2)^3 (poly6: Müller, Charypar
 /// and Gross 2003); none where there are none.
 pub fn sums(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums> {
     dispatch!(sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums>)
@@ -60,11 +60,11 @@ fn sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<
     let centre = [Lanes::all(at[0]), Lanes::all(at[1]), Lanes::all(at[2])];
     let most = Lanes::all(radius * radius);
     room.clear();
-    for chunk in 0..near.place[0].len() {
+    for chunk in 0..near.position[0].len() {
         let d = [
-            Lanes(near.place[0][chunk]) - centre[0],
-            Lanes(near.place[1][chunk]) - centre[1],
-            Lanes(near.place[2][chunk]) - centre[2],
+            Lanes(near.position[0][chunk]) - centre[0],
+            Lanes(near.position[1][chunk]) - centre[1],
+            Lanes(near.position[2][chunk]) - centre[2],
         ];
         let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
         let mut bits = square.is_less(most).bits();
@@ -82,8 +82,9 @@ fn sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<
     let mut all = zero;
     let (mut sum_d, mut sum_u) = ([zero; 3], [zero; 3]);
     let (mut sum_dd, mut sum_ud) = ([[zero; 3]; 3], [[zero; 3]; 3]);
-    for chunk in 0..room.place[0].len() {
-        let d = [Lanes(room.place[0][chunk]), Lanes(room.place[1][chunk]), Lanes(room.place[2][chunk])];
+    for chunk in 0..room.position[0].len() {
+        let d =
+            [Lanes(room.position[0][chunk]), Lanes(room.position[1][chunk]), Lanes(room.position[2][chunk])];
         let u = [Lanes(room.way[0][chunk]), Lanes(room.way[1][chunk]), Lanes(room.way[2][chunk])];
         let q = (one - (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * inverse).max(zero);
         let weight = q * q * q;
@@ -116,16 +117,16 @@ fn sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<
 pub struct Map {
     /// Sum of the weights of the particles that it was fitted to.
     pub weight: f64,
-    /// The way at the place itself.
+    /// The way at the position itself.
     way: Vector3<f64>,
-    /// How ways change with the place.
+    /// How ways change with the position.
     change: Matrix3<f64>,
 }
 
 impl Map {
-    /// The way at a place seen from where the map was fitted.
-    pub fn at(&self, place: Vector3<f64>) -> Vector3<f64> {
-        self.way + self.change * place
+    /// The way at a position seen from where the map was fitted.
+    pub fn at(&self, position: Vector3<f64>) -> Vector3<f64> {
+        self.way + self.change * position
     }
 }
 
@@ -140,7 +141,7 @@ impl Sums {
         let (d, u) = (self.d / self.weight, self.u / self.weight);
         let spread = self.dd / self.weight - d * d.transpose();
         let joint = self.ud / self.weight - u * d.transpose();
-        // It is u + joint spread^-1 (x - d). In directions in which places hardly spread it is constant.
+        // It is u + joint spread^-1 (x - d). In directions in which positions hardly spread it is constant.
         let least = FLAT * spread.trace();
         let damped = spread * spread + Matrix3::from_diagonal_element(least * least);
         let change = damped.try_inverse().map_or_else(Matrix3::zeros, |inverse| joint * spread * inverse);

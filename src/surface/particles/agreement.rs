@@ -73,7 +73,7 @@ impl Mismatch {
 /// # Errors
 /// Neither ids in both frames nor velocities in the first.
 pub fn disagreement(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> Result<Option<String>> {
-    if from.places.is_empty() || to.places.is_empty() {
+    if from.positions.is_empty() || to.positions.is_empty() {
         return Ok(None);
     }
     let paths = Paths::between(from, to, dt)?;
@@ -102,7 +102,7 @@ pub(in crate::surface) fn warn_of_tears(
     (from, to, dt): (&Particles, &Particles, f64),
     spacing: f64,
 ) -> Result<()> {
-    let [old, new] = [from, to].map(|frame| frame.places.len());
+    let [old, new] = [from, to].map(|frame| frame.positions.len());
     let warnings = &mut report.mesh_warnings;
     if 2 * lost > all && 2 * report.died <= old && 3 * new >= 2 * old {
         warnings.push(format!("{lost} of the mesh's {all} vertices did not find the particles' surface"));
@@ -125,12 +125,12 @@ fn torn(paths: &Paths, spacing: f64) -> Option<f64> {
     paths.at(0.0, &mut from);
     paths.at(1.0, &mut to);
     let edge = BESIDE * spacing;
-    let bin = |place: &DVec3| cell_of(&(place / edge));
+    let bin = |position: &DVec3| cell_of(&(position / edge));
     let sampled = samples(from.len());
     let mut near: HashMap<Coord, Vec<usize>> =
         sampled.clone().flat_map(|at| around(bin(&from[at]))).map(|cell| (cell, Vec::new())).collect();
-    for (at, place) in from.iter().enumerate() {
-        if let Some(list) = near.get_mut(&bin(place)) {
+    for (at, position) in from.iter().enumerate() {
+        if let Some(list) = near.get_mut(&bin(position)) {
             list.push(at);
         }
     }
@@ -153,14 +153,14 @@ fn torn(paths: &Paths, spacing: f64) -> Option<f64> {
 
 /// A warning that velocities take particles to where no others are.
 fn velocities_miss(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> Option<String> {
-    let bin = |place: &DVec3| cell_of(&(place / spacing));
-    let filled = |frame: &Particles| -> HashSet<Coord> { frame.places.iter().map(bin).collect() };
+    let bin = |position: &DVec3| cell_of(&(position / spacing));
+    let filled = |frame: &Particles| -> HashSet<Coord> { frame.positions.iter().map(bin).collect() };
     let (old, new) = (filled(from), filled(to));
     // Where the liquid goes there must be some, and where it is some must have come from.
     let missed = |frame: &Particles, other: &HashSet<Coord>, time: f64| {
-        let goes = |at: usize| frame.places[at] + DVec3::from(frame.velocities[at].map(f64::from)) * time;
+        let goes = |at: usize| frame.positions[at] + DVec3::from(frame.velocities[at].map(f64::from)) * time;
         let is_missed = |at: &usize| !around(bin(&goes(*at))).iter().any(|cell| other.contains(cell));
-        let sampled = samples(frame.places.len());
+        let sampled = samples(frame.positions.len());
         sampled.clone().filter(is_missed).count() as f64 / sampled.count() as f64
     };
     let share = |factor: f64| {
@@ -217,13 +217,13 @@ mod tests {
         let (s, c) = (libm::sin(turn), libm::cos(turn));
         let turned = |p: DVec3| DVec3::new(c * p.x + s * p.z, p.y, c * p.z - s * p.x);
         let first = shell(DVec3::zeros(), 0.0, 6.3);
-        let places: Vec<DVec3> = first.iter().map(|p| turned(p * 0.1) + fall).collect();
+        let positions: Vec<DVec3> = first.iter().map(|p| turned(p * 0.1) + fall).collect();
         let speed = |p: &DVec3| {
             let arm = p - fall;
             (DVec3::new(2.0 * arm.z, 0.0, -2.0 * arm.x) + DVec3::new(0.3, -1.0 - 9.8 * time, 0.0)) * factor
         };
-        let velocities = places.iter().map(|p| speed(p).cast::<f32>().into()).collect();
-        Particles { ids: (0..places.len() as i64).collect(), places, velocities }
+        let velocities = positions.iter().map(|p| speed(p).cast::<f32>().into()).collect();
+        Particles { ids: (0..positions.len() as i64).collect(), positions, velocities }
     }
 
     fn warning(from: &Particles, to: &Particles) -> Option<String> {
@@ -273,17 +273,20 @@ mod tests {
         // Those in the first rows go, so that all others move up, or rows come in any order.
         let rows = |from: &Particles, to: &Particles| {
             let shifted = |frame: &Particles, by: usize| {
-                let count = frame.places.len() - by;
+                let count = frame.positions.len() - by;
                 Particles {
-                    places: frame.places[by..].to_vec(),
+                    positions: frame.positions[by..].to_vec(),
                     velocities: frame.velocities.get(by..).unwrap_or_default().to_vec(),
                     ids: (0..count as i64).collect(),
                 }
             };
             let mixed = |frame: &Particles| {
-                let count = frame.places.len();
+                let count = frame.positions.len();
                 let row = |n: usize| (n * 7919 + 13) % count;
-                Particles { places: (0..count).map(|n| frame.places[row(n)]).collect(), ..frame.clone() }
+                Particles {
+                    positions: (0..count).map(|n| frame.positions[row(n)]).collect(),
+                    ..frame.clone()
+                }
             };
             [(shifted(from, 0), shifted(to, 29)), (from.clone(), mixed(to))]
         };

@@ -1,13 +1,13 @@
-//! Particles sorted into cells, so that those near a place are found fast.
+//! Particles sorted into cells, so that those near a position are found fast.
 
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::geometry::{Coord, DVec3};
 
-/// The cell that holds a place (cells).
-pub fn cell_of(place: &DVec3) -> Coord {
-    [0, 1, 2].map(|axis| place[axis].floor() as i32)
+/// The cell that holds a position (cells).
+pub fn cell_of(position: &DVec3) -> Coord {
+    [0, 1, 2].map(|axis| position[axis].floor() as i32)
 }
 
 /// With this begins what is said of particles too far apart.
@@ -18,7 +18,7 @@ const BITS: u32 = 21;
 const FARTHEST: i64 = 1 << BITS;
 
 /// Particles in the order of the cells that hold them. What order they come in makes no difference: within a cell they are sorted
-/// by place, then by what else tells them apart.
+/// by position, then by what else tells them apart.
 #[derive(Debug, Default)]
 pub struct Cells {
     /// Edge of a cell (m).
@@ -31,7 +31,7 @@ pub struct Cells {
     start: Vec<u32>,
     /// The index of each particle in the order that they came in.
     pub order: Vec<u32>,
-    /// Place of each in its cell (edges, 0..1).
+    /// Position of each in its cell (edges, 0..1).
     offsets: Vec<[f32; 3]>,
     /// Particles in each octant of a cell.
     octants: Vec<[u16; 8]>,
@@ -47,22 +47,22 @@ struct Item {
 }
 
 impl Cells {
-    /// Sorts particles at places (m) into cells of an edge (m); `rank` tells those at the same place apart.
+    /// Sorts particles at positions (m) into cells of an edge (m); `rank` tells those at the same position apart.
     ///
     /// # Errors
     /// Particles so far apart that there are more than two million cells between them.
-    pub fn new(places: &[DVec3], edge: f64, rank: impl Fn(u32) -> i64 + Sync) -> Result<Self> {
-        let cell_of = |place: &DVec3| [0, 1, 2].map(|axis| (place[axis] / edge).floor());
+    pub fn new(positions: &[DVec3], edge: f64, rank: impl Fn(u32) -> i64 + Sync) -> Result<Self> {
+        let cell_of = |position: &DVec3| [0, 1, 2].map(|axis| (position[axis] / edge).floor());
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
-        for place in places {
-            let cell = cell_of(place);
+        for position in positions {
+            let cell = cell_of(position);
             for axis in 0..3 {
                 low[axis] = low[axis].min(cell[axis]);
                 high[axis] = high[axis].max(cell[axis]);
             }
         }
-        if places.is_empty() {
+        if positions.is_empty() {
             return Ok(Self { edge, ..Self::default() });
         }
         let limit = f64::from(i32::MAX / 16);
@@ -75,15 +75,15 @@ impl Cells {
             }
         }
         let least = low.map(|x| x as i32);
-        let item = |(place, index): (&DVec3, u32)| {
-            let cell = cell_of(place);
-            let part = |axis: usize| ((place[axis] / edge - cell[axis]) as f32).clamp(0.0, 1.0);
+        let item = |(position, index): (&DVec3, u32)| {
+            let cell = cell_of(position);
+            let part = |axis: usize| ((position[axis] / edge - cell[axis]) as f32).clamp(0.0, 1.0);
             let key = pack([0, 1, 2].map(|axis| (cell[axis] - low[axis]) as u64));
             // Adding 0 makes -0 positive.
             Item { key, offset: [0, 1, 2].map(|axis| (part(axis) + 0.0).to_bits()), index }
         };
         let mut items: Vec<Item> =
-            places.par_iter().zip(0..places.len() as u32).with_min_len(4096).map(item).collect();
+            positions.par_iter().zip(0..positions.len() as u32).with_min_len(4096).map(item).collect();
         let tell = |a: &Item, b: &Item| {
             a.key.cmp(&b.key).then(a.offset.cmp(&b.offset)).then_with(|| rank(a.index).cmp(&rank(b.index)))
         };
@@ -191,24 +191,24 @@ mod tests {
 
     #[test]
     fn particles_are_found_in_the_cells_around_in_any_order() {
-        let places: Vec<DVec3> = (0..200)
+        let positions: Vec<DVec3> = (0..200)
             .map(|n| DVec3::new((n * 37 % 50) as f64, (n * 13 % 40) as f64 - 20.0, (n % 30) as f64) * 0.1)
             .collect();
-        let mut turned = places.clone();
+        let mut turned = positions.clone();
         turned.reverse();
-        let near = |places: &[DVec3]| {
-            let cells = Cells::new(places, 0.7, |_| 0).unwrap();
+        let near = |positions: &[DVec3]| {
+            let cells = Cells::new(positions, 0.7, |_| 0).unwrap();
             let mut found = Vec::new();
             cells.near([1, -2, 0], [3, 0, 2], [2, 0, 1], |_, offset| found.push(offset.map(f32::to_bits)));
             found
         };
-        let found = near(&places);
+        let found = near(&positions);
         assert_eq!(found, near(&turned));
         let is_in = |p: &&DVec3| {
             let cell = [0, 1, 2].map(|axis| (p[axis] / 0.7).floor() as i32);
             (1..=3).contains(&cell[0]) && (-2..=0).contains(&cell[1]) && (0..=2).contains(&cell[2])
         };
-        assert_eq!(found.len(), places.iter().filter(is_in).count());
+        assert_eq!(found.len(), positions.iter().filter(is_in).count());
         assert!(Cells::new(&[DVec3::zeros(), DVec3::new(1e7, 0.0, 0.0)], 0.1, |_| 0).is_err());
     }
 }

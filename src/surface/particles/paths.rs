@@ -19,9 +19,9 @@ pub struct Paths {
     to: Vec<DVec3>,
     /// Velocities times the time between the frames (m), at both ends; none: ways are lines.
     speeds: Vec<[DVec3; 2]>,
-    /// What tells particles at the same place apart.
+    /// What tells particles at the same position apart.
     ranks: Vec<i64>,
-    /// What velocities say where that is not what places say: they are then left out.
+    /// What velocities say where that is not what positions say: they are then left out.
     pub mismatch: Option<Mismatch>,
     /// Particles of the first frame that end, and of the second that are new.
     pub died: usize,
@@ -39,7 +39,7 @@ impl Paths {
     /// # Errors
     /// Neither ids in both frames nor velocities in the first.
     pub fn between(from: &Particles, to: &Particles, dt: f64) -> Result<Self> {
-        let (died, born) = (from.places.len(), to.places.len());
+        let (died, born) = (from.positions.len(), to.positions.len());
         if died == 0 || born == 0 && from.velocities.is_empty() {
             return Ok(Self { died, born, ..Self::default() });
         }
@@ -68,14 +68,14 @@ impl Paths {
                 out.died += 1;
                 continue;
             };
-            out.from.push(from.places[at as usize]);
-            out.to.push(to.places[*then as usize]);
+            out.from.push(from.positions[at as usize]);
+            out.to.push(to.positions[*then as usize]);
             out.ranks.push(id);
             if has_speeds {
                 out.speeds.push([speed(from, at), speed(to, *then)]);
             }
         }
-        out.born = to.places.len() - out.from.len();
+        out.born = to.positions.len() - out.from.len();
         out.mismatch = out.mismatched();
         if out.mismatch.is_some() {
             out.speeds.clear();
@@ -90,12 +90,12 @@ impl Paths {
             ));
         }
         let ways = from.velocities.iter().map(|speed| DVec3::from(speed.map(f64::from)) * dt);
-        let to = from.places.iter().zip(ways).map(|(place, way)| place + way).collect();
-        let ranks = vec![0; from.places.len()];
-        Ok(Self { from: from.places.clone(), to, ranks, ..Self::default() })
+        let to = from.positions.iter().zip(ways).map(|(position, way)| position + way).collect();
+        let ranks = vec![0; from.positions.len()];
+        Ok(Self { from: from.positions.clone(), to, ranks, ..Self::default() })
     }
 
-    /// What velocities say where they are not in the unit and at the time that the places say.
+    /// What velocities say where they are not in the unit and at the time that the positions say.
     fn mismatched(&self) -> Option<Mismatch> {
         let speed = |n: usize| (self.speeds[n][0] + self.speeds[n][1]) * 0.5;
         let way = |n: usize| self.to[n] - self.from[n];
@@ -122,7 +122,7 @@ impl Paths {
         self.from.len()
     }
 
-    /// What tells particles at the same place apart.
+    /// What tells particles at the same position apart.
     pub fn rank(&self, path: u32) -> i64 {
         self.ranks[path as usize]
     }
@@ -137,9 +137,9 @@ impl Paths {
         .reduce(|| 0.0, f64::max)
     }
 
-    /// Places (m) at a share 0..=1 of the time.
+    /// Positions (m) at a share 0..=1 of the time.
     pub fn at(&self, share: f64, out: &mut Vec<DVec3>) {
-        let place = |n: usize| {
+        let position = |n: usize| {
             let (from, to) = (self.from[n], self.to[n]);
             match self.speeds.get(n) {
                 // The ends are exact.
@@ -152,7 +152,7 @@ impl Paths {
                 }
             }
         };
-        (0..self.count()).into_par_iter().with_min_len(4096).map(place).collect_into_vec(out);
+        (0..self.count()).into_par_iter().with_min_len(4096).map(position).collect_into_vec(out);
     }
 }
 
@@ -162,20 +162,20 @@ impl Paths {
 /// # Errors
 /// Neither ids in both frames nor velocities in the first.
 pub fn interpolate(from: &Particles, to: &Particles, dt: f64, share: f64) -> Result<Particles> {
-    if from.places.is_empty() {
+    if from.positions.is_empty() {
         return Ok(Particles::default());
     }
-    if to.places.is_empty() && from.velocities.is_empty() {
+    if to.positions.is_empty() && from.velocities.is_empty() {
         return Ok(from.clone());
     }
     if from.ids.is_empty() || to.ids.is_empty() {
-        let mut places = Vec::new();
-        Paths::by_velocity(from, dt)?.at(share, &mut places);
-        return Ok(Particles { places, ..from.clone() });
+        let mut positions = Vec::new();
+        Paths::by_velocity(from, dt)?.at(share, &mut positions);
+        return Ok(Particles { positions, ..from.clone() });
     }
     let paths = Paths::between(from, to, dt)?;
     let mut out = Particles { ids: paths.ranks.clone(), ..Particles::default() };
-    paths.at(share, &mut out.places);
+    paths.at(share, &mut out.positions);
     let row = |frame: &Particles| -> HashMap<i64, usize> { frame.ids.iter().copied().zip(0..).collect() };
     let (old, new) = (row(from), row(to));
     if !from.velocities.is_empty() && !to.velocities.is_empty() {
@@ -187,7 +187,7 @@ pub fn interpolate(from: &Particles, to: &Particles, dt: f64, share: f64) -> Res
     }
     for (row, id) in from.ids.iter().enumerate().filter(|(_, id)| !new.contains_key(id)) {
         let speed = from.velocities.get(row).copied().unwrap_or_default();
-        out.places.push(from.places[row] + DVec3::from(speed.map(f64::from)) * (dt * share));
+        out.positions.push(from.positions[row] + DVec3::from(speed.map(f64::from)) * (dt * share));
         out.ids.push(*id);
         if !out.velocities.is_empty() {
             out.velocities.push(speed);
@@ -202,7 +202,7 @@ mod tests {
 
     fn frame(ids: &[i64], x: &[f64], speed: f32) -> Particles {
         Particles {
-            places: x.iter().map(|x| DVec3::new(*x, 0.0, 0.0)).collect(),
+            positions: x.iter().map(|x| DVec3::new(*x, 0.0, 0.0)).collect(),
             velocities: vec![[speed, 0.0, 0.0]; x.len()],
             ids: ids.to_vec(),
         }
@@ -214,9 +214,9 @@ mod tests {
         let to = frame(&[9, 5, 7], &[3.0, 0.0, 1.0], 10.0);
         let paths = Paths::between(&from, &to, 0.1).unwrap();
         assert_eq!((paths.count(), paths.died, paths.born), (2, 1, 1));
-        let mut places = Vec::new();
-        paths.at(0.5, &mut places);
-        assert!((places[0].x - 0.5).abs() < 1e-12 && (places[1].x - 2.5).abs() < 1e-12);
+        let mut positions = Vec::new();
+        paths.at(0.5, &mut positions);
+        assert!((positions[0].x - 0.5).abs() < 1e-12 && (positions[1].x - 2.5).abs() < 1e-12);
         assert_eq!(paths.farthest(), 1.0);
     }
 
@@ -233,15 +233,15 @@ mod tests {
         assert_eq!(Paths::between(&still, &none, 0.1).unwrap().count(), 0);
         assert_eq!(interpolate(&none, &some, 0.1, 0.5).unwrap(), none);
         assert_eq!(interpolate(&still, &none, 0.1, 0.5).unwrap(), still);
-        assert_eq!(interpolate(&some, &none, 0.1, 0.5).unwrap().places[1].x, 1.5);
+        assert_eq!(interpolate(&some, &none, 0.1, 0.5).unwrap().positions[1].x, 1.5);
     }
 
     #[test]
     fn without_ids_velocities_count_and_without_both_nothing_does() {
         let from = frame(&[], &[0.0, 1.0], 10.0);
-        let mut places = Vec::new();
-        Paths::between(&from, &from, 0.1).unwrap().at(1.0, &mut places);
-        assert_eq!(places[1].x, 2.0);
+        let mut positions = Vec::new();
+        Paths::between(&from, &from, 0.1).unwrap().at(1.0, &mut positions);
+        assert_eq!(positions[1].x, 2.0);
         let none = Particles { velocities: Vec::new(), ..from };
         assert!(Paths::between(&none, &none, 0.1).is_err());
     }
@@ -253,18 +253,18 @@ mod tests {
             Particles { velocities: vec![[20.0, 0.0, 0.0]; 3], ..frame(&[9, 5, 7], &[3.0, 0.0, 1.5], 0.0) };
         let half = interpolate(&from, &to, 0.1, 0.5).unwrap();
         assert_eq!(half.ids, [7, 9, 3]);
-        assert!((half.places[2].x - 1.5).abs() < 1e-12, "one that ends moves on");
+        assert!((half.positions[2].x - 1.5).abs() < 1e-12, "one that ends moves on");
         assert_eq!(half.velocities, [[15.0, 0.0, 0.0], [15.0, 0.0, 0.0], [10.0, 0.0, 0.0]]);
         let without = |frame: &Particles| Particles { ids: Vec::new(), ..frame.clone() };
         let half = interpolate(&without(&from), &without(&to), 0.1, 0.5).unwrap();
-        assert_eq!(half.places[1].x, 1.5);
+        assert_eq!(half.positions[1].x, 1.5);
     }
 
     #[test]
-    fn velocities_that_contradict_the_places_are_left_out() {
+    fn velocities_that_contradict_the_positions_are_left_out() {
         let (from, to) = (frame(&[1], &[0.0], 500.0), frame(&[1], &[1.0], 500.0));
-        let mut places = Vec::new();
-        Paths::between(&from, &to, 0.1).unwrap().at(0.5, &mut places);
-        assert_eq!(places[0].x, 0.5);
+        let mut positions = Vec::new();
+        Paths::between(&from, &to, 0.1).unwrap().at(0.5, &mut positions);
+        assert_eq!(positions[0].x, 0.5);
     }
 }

@@ -1,4 +1,4 @@
-//! Where the liquid at a place was at the first frame: the particles around it know, by their ids.
+//! Where the liquid at a position was at the first frame: the particles around it know, by their ids.
 
 use rayon::prelude::*;
 
@@ -18,12 +18,12 @@ const RADIUS: i32 = 3;
 const DOUBLINGS: u32 = 1;
 /// Cells along a radius.
 const RINGS: i32 = 2;
-/// Particles are of one origin where their first places lie within so many radii, 4 spacings, of that of one of them. Those around a
-/// place on the surface lie little more than a radius from the nearest one, so that liquid that has kept its shape is all of one origin.
-/// What has come together lay at least as far apart as the gap between was wide; where that was less than 4 spacings, places between
+/// Particles are of one origin where their first positions lie within so many radii, 4 spacings, of that of one of them. Those around a
+/// position on the surface lie little more than a radius from the nearest one, so that liquid that has kept its shape is all of one origin.
+/// What has come together lay at least as far apart as the gap between was wide; where that was less than 4 spacings, positions between
 /// the two origins are off by less than the gap. Where the liquid was pressed together by more, only what is nearest counts.
 const TOGETHER: f64 = 4.0 / 3.0;
-/// Places of a task.
+/// Positions of a task.
 const PIECE: usize = 256;
 /// Particles of a task.
 const GRAIN: usize = 4096;
@@ -35,8 +35,8 @@ const LIMIT: f64 = (i32::MAX / 4) as f64;
 pub struct Rest {
     /// Ascending.
     ids: Vec<i64>,
-    /// The particles' places (m), in the order of the ids.
-    places: Vec<DVec3>,
+    /// The particles' positions (m), in the order of the ids.
+    positions: Vec<DVec3>,
 }
 
 impl Rest {
@@ -46,21 +46,21 @@ impl Rest {
             return None;
         }
         let mut all: Vec<(i64, DVec3)> =
-            first.ids.iter().copied().zip(first.places.iter().copied()).collect();
+            first.ids.iter().copied().zip(first.positions.iter().copied()).collect();
         all.sort_unstable_by_key(|(id, _)| *id);
-        let (ids, places) = all.into_iter().unzip();
-        Some(Self { ids, places })
+        let (ids, positions) = all.into_iter().unzip();
+        Some(Self { ids, positions })
     }
 
-    /// Where the liquid at places (m) was at the first frame (m): from the particles around, which are `now` and whose spacing is
+    /// Where the liquid at positions (m) was at the first frame (m): from the particles around, which are `now` and whose spacing is
     /// `spacing` (m). Their ways back are fitted by an affine map, as those of advection are; of particles that came from different
-    /// places only those of one origin count, which weigh most together. None where no particle that was there at the first frame is
-    /// within three spacings (six, where no other one is either), or particles have no ids. A place's answer does not depend on the
+    /// positions only those of one origin count, which weigh most together. None where no particle that was there at the first frame is
+    /// within three spacings (six, where no other one is either), or particles have no ids. A position's answer does not depend on the
     /// others.
     ///
     /// # Errors
     /// A spacing that is not over 0; particles too far apart; cancel.
-    pub fn places(
+    pub fn positions(
         &self,
         ctx: &Context,
         now: &Particles,
@@ -70,7 +70,7 @@ impl Rest {
         if !(spacing > 0.0 && spacing.is_finite()) {
             return Err(Error::argument(format!("spacing = {spacing} is not over 0 m")));
         }
-        if now.ids.len() != now.places.len() {
+        if now.ids.len() != now.positions.len() {
             return Ok(vec![None; at.len()]);
         }
         ctx.phase("rest", || {
@@ -81,7 +81,7 @@ impl Rest {
                 .map(|piece| {
                     ctx.check()?;
                     let mut scratch = Scratch::default();
-                    Ok(piece.iter().map(|place| field.first(*place, &mut scratch)).collect())
+                    Ok(piece.iter().map(|position| field.first(*position, &mut scratch)).collect())
                 })
                 .collect::<Result<_>>()?;
             Ok(parts.concat())
@@ -92,7 +92,7 @@ impl Rest {
     /// [`Traced`](crate::mesh_repair::Traced) needs it: for those of new triangles. None for all others.
     ///
     /// # Errors
-    /// As [`Rest::places`].
+    /// As [`Rest::positions`].
     pub fn of_change(
         &self,
         ctx: &Context,
@@ -106,32 +106,32 @@ impl Rest {
         names.dedup();
         let at: Vec<DVec3> = names.iter().map(|name| change.vertices[*name as usize]).collect();
         let mut out = vec![None; change.vertices.len()];
-        for (name, place) in names.into_iter().zip(self.places(ctx, now, spacing, &at)?) {
-            out[name as usize] = place;
+        for (name, position) in names.into_iter().zip(self.positions(ctx, now, spacing, &at)?) {
+            out[name as usize] = position;
         }
         Ok(out)
     }
 
     fn find(&self, id: i64) -> Option<DVec3> {
-        self.ids.binary_search(&id).ok().map(|at| self.places[at])
+        self.ids.binary_search(&id).ok().map(|at| self.positions[at])
     }
 }
 
 impl Tracker {
     /// Where the liquid at each vertex was at the first frame (m), from the particles at the end of the last step: see
-    /// [`Rest::places`].
+    /// [`Rest::positions`].
     ///
     /// # Errors
-    /// As [`Rest::places`].
+    /// As [`Rest::positions`].
     pub fn rest(&self, ctx: &Context, rest: &Rest, now: &Particles) -> Result<Vec<Option<DVec3>>> {
-        rest.places(ctx, now, self.params.spacing, &self.vertices)
+        rest.positions(ctx, now, self.params.spacing, &self.vertices)
     }
 }
 
-/// A particle near a place.
+/// A particle near a position.
 #[derive(Clone, Copy)]
 struct Seen {
-    /// From the corner of the place's cell (cells).
+    /// From the corner of the position's cell (cells).
     offset: [f32; 3],
     /// Where it is, and was at the first frame (m).
     now: DVec3,
@@ -162,32 +162,32 @@ impl Field {
     fn of(rest: &Rest, now: &Particles, spacing: f64, at: &[DVec3]) -> Result<Self> {
         let reach = DVec3::repeat(f64::from(RADIUS << DOUBLINGS) * spacing);
         let first = at.first().copied().unwrap_or_default();
-        let low = at.iter().fold(first, |low, place| low.inf(place)) - reach;
-        let high = at.iter().fold(first, |high, place| high.sup(place)) + reach;
+        let low = at.iter().fold(first, |low, position| low.inf(position)) - reach;
+        let high = at.iter().fold(first, |high, position| high.sup(position)) + reach;
         let is_near = |particle: &u32| {
-            let place = now.places[*particle as usize];
-            (0..3).all(|axis| low[axis] <= place[axis] && place[axis] <= high[axis])
+            let position = now.positions[*particle as usize];
+            (0..3).all(|axis| low[axis] <= position[axis] && position[axis] <= high[axis])
         };
-        let near: Vec<u32> = (0..now.places.len() as u32).filter(is_near).collect();
-        let places: Vec<DVec3> = near.iter().map(|particle| now.places[*particle as usize]).collect();
+        let near: Vec<u32> = (0..now.positions.len() as u32).filter(is_near).collect();
+        let positions: Vec<DVec3> = near.iter().map(|particle| now.positions[*particle as usize]).collect();
         let id = |n: u32| now.ids[near[n as usize] as usize];
-        let cells = Cells::new(&places, f64::from(RADIUS) * spacing / f64::from(RINGS), id)?;
-        let particle = |n: &u32| (places[*n as usize], rest.find(id(*n)));
+        let cells = Cells::new(&positions, f64::from(RADIUS) * spacing / f64::from(RINGS), id)?;
+        let particle = |n: &u32| (positions[*n as usize], rest.find(id(*n)));
         let particles = cells.order.par_iter().with_min_len(GRAIN).map(particle).collect();
         Ok(Self { cells, particles, spacing })
     }
 
-    /// Where the liquid at a place (m) was at the first frame (m).
-    fn first(&self, place: DVec3, scratch: &mut Scratch) -> Option<DVec3> {
+    /// Where the liquid at a position (m) was at the first frame (m).
+    fn first(&self, position: DVec3, scratch: &mut Scratch) -> Option<DVec3> {
         let edge = self.cells.edge();
-        let cell = [0, 1, 2].map(|axis| (place[axis] / edge).floor().clamp(-LIMIT, LIMIT) as i32);
-        let from = place / edge - DVec3::from(cell.map(f64::from));
+        let cell = [0, 1, 2].map(|axis| (position[axis] / edge).floor().clamp(-LIMIT, LIMIT) as i32);
+        let from = position / edge - DVec3::from(cell.map(f64::from));
         let is_there = |doubling: &u32| self.gather(cell, from, RINGS << *doubling, &mut scratch.seen);
         let doubling = (0..=DOUBLINGS).find(is_there)?;
-        self.fitted(place, from, RADIUS << doubling, scratch)
+        self.fitted(position, from, RADIUS << doubling, scratch)
     }
 
-    /// The particles within so many cells of a place, seen from the corner of its cell (cells), that were there at the first frame.
+    /// The particles within so many cells of a position, seen from the corner of its cell (cells), that were there at the first frame.
     /// Returns whether any particle is near, also one that was not.
     fn gather(&self, cell: Coord, from: DVec3, rings: i32, seen: &mut Vec<Seen>) -> bool {
         seen.clear();
@@ -206,9 +206,9 @@ impl Field {
         is_any
     }
 
-    /// What the particles that were gathered within a radius (spacings) of a place (m) say of it, which is seen from the corner of its
+    /// What the particles that were gathered within a radius (spacings) of a position (m) say of it, which is seen from the corner of its
     /// cell (cells).
-    fn fitted(&self, place: DVec3, from: DVec3, radius: i32, scratch: &mut Scratch) -> Option<DVec3> {
+    fn fitted(&self, position: DVec3, from: DVec3, radius: i32, scratch: &mut Scratch) -> Option<DVec3> {
         let Scratch { seen, near, room } = scratch;
         let most = TOGETHER * f64::from(radius) * self.spacing;
         let head = heaviest_origin(seen, most)?;
@@ -222,7 +222,7 @@ impl Field {
             near.push(one.offset.map(|x| edge * x), [turn.x as f32, turn.y as f32, turn.z as f32]);
         }
         let at = [from.x, from.y, from.z].map(|x| edge * x as f32);
-        let to = |turn: DVec3| place + way + turn * self.spacing;
+        let to = |turn: DVec3| position + way + turn * self.spacing;
         let Some(sums) = sums(near, room, at, radius as f32) else { return Some(to(DVec3::zeros())) };
         let fit = to(sums.map().at(DVec3::zeros()));
         // What so few particles say that it leads far away is worth no more than their mean.
@@ -259,16 +259,16 @@ mod tests {
     use crate::context::Pool;
     use crate::surface::test_particles::numbered;
 
-    /// A block of n^3 places, one apart, from a corner on.
+    /// A block of n^3 positions, one apart, from a corner on.
     fn block(corner: DVec3, n: i32) -> impl Iterator<Item = DVec3> {
         let on = move |axis: u32| (0..n * n * n).map(move |at| f64::from(at / n.pow(axis) % n));
         on(0).zip(on(1)).zip(on(2)).map(move |((x, y), z)| corner + DVec3::new(x, y, z))
     }
 
     /// Turned by 1 rad about an axis, drawn out, and taken far away.
-    fn moved(place: DVec3) -> DVec3 {
+    fn moved(position: DVec3) -> DVec3 {
         let axis = DVec3::new(1.0, 2.0, 0.5).normalize();
-        let p = place.component_mul(&DVec3::new(1.2, 0.95, 0.9));
+        let p = position.component_mul(&DVec3::new(1.2, 0.95, 0.9));
         let turned = p * libm::cos(1.0)
             + axis.cross(&p) * libm::sin(1.0)
             + axis * (axis.dot(&p) * (1.0 - libm::cos(1.0)));
@@ -279,19 +279,21 @@ mod tests {
     fn liquid_that_turned_and_stretched_is_found_where_it_was() {
         let ctx = Context::new(Pool::new(2).unwrap());
         let spacing = 0.01;
-        let first = numbered(block(DVec3::zeros(), 9).map(|place| place * spacing).collect());
+        let first = numbered(block(DVec3::zeros(), 9).map(|position| position * spacing).collect());
         let rest = Rest::of(&first).unwrap();
         // Backwards, and with particles that were born later, far away.
-        let mut now = numbered(block(DVec3::zeros(), 9).map(|place| moved(place) * spacing).collect());
-        now.places.extend(block(DVec3::new(90.0, 0.0, 0.0), 3).map(|place| place * spacing));
+        let mut now = numbered(block(DVec3::zeros(), 9).map(|position| moved(position) * spacing).collect());
+        now.positions.extend(block(DVec3::new(90.0, 0.0, 0.0), 3).map(|position| position * spacing));
         now.ids.extend(10_000..10_027);
-        now.places.reverse();
+        now.positions.reverse();
         now.ids.reverse();
         let wanted = [[4.0, 4.0, 4.0], [4.3, 3.6, 4.1], [-0.5, 4.0, 4.0], [8.4, 8.4, 8.4], [-0.5, -0.5, 4.0]]
             .map(DVec3::from);
-        let mut at: Vec<DVec3> = wanted.iter().map(|place| moved(*place) * spacing).collect();
-        at.extend([DVec3::new(91.0, 1.0, 1.0), DVec3::new(-50.0, 0.0, 0.0)].map(|place| place * spacing));
-        let found = rest.places(&ctx, &now, spacing, &at).unwrap();
+        let mut at: Vec<DVec3> = wanted.iter().map(|position| moved(*position) * spacing).collect();
+        at.extend(
+            [DVec3::new(91.0, 1.0, 1.0), DVec3::new(-50.0, 0.0, 0.0)].map(|position| position * spacing),
+        );
+        let found = rest.positions(&ctx, &now, spacing, &at).unwrap();
         for (found, wanted) in found.iter().zip(&wanted) {
             let off = (found.unwrap() / spacing - wanted).norm();
             assert!(off < 5e-3, "{wanted}: {off} spacings off");
@@ -299,27 +301,27 @@ mod tests {
         assert_eq!(found[wanted.len()..], [None, None]);
         // One by one, and on one thread, they are the same bit for bit.
         let alone = Context::new(Pool::new(0).unwrap());
-        for (place, found) in at.iter().zip(&found) {
-            assert_eq!(rest.places(&alone, &now, spacing, &[*place]).unwrap(), [*found]);
+        for (position, found) in at.iter().zip(&found) {
+            assert_eq!(rest.positions(&alone, &now, spacing, &[*position]).unwrap(), [*found]);
         }
         let nameless = Particles { ids: Vec::new(), ..now.clone() };
         assert!(Rest::of(&nameless).is_none());
-        assert_eq!(rest.places(&ctx, &nameless, spacing, &at[..2]).unwrap(), [None, None]);
-        let error = rest.places(&ctx, &now, 0.0, &at).unwrap_err();
+        assert_eq!(rest.positions(&ctx, &nameless, spacing, &at[..2]).unwrap(), [None, None]);
+        let error = rest.positions(&ctx, &now, 0.0, &at).unwrap_err();
         assert_eq!(error.to_string(), "spacing = 0 is not over 0 m");
         ctx.cancel();
-        assert!(matches!(rest.places(&ctx, &now, spacing, &at), Err(Error::Cancelled)));
+        assert!(matches!(rest.positions(&ctx, &now, spacing, &at), Err(Error::Cancelled)));
     }
 
     #[test]
-    fn a_place_between_liquids_that_came_together_was_in_one_of_the_two() {
+    fn a_position_between_liquids_that_came_together_was_in_one_of_the_two() {
         let ctx = Context::new(Pool::new(2).unwrap());
         // Two blocks with a gap of 5 between them, which closes to one spacing, and to a half.
         for deep in [0.0, 0.5] {
             let ways = [DVec3::new(2.0 + 0.5 * deep, 0.0, 0.0), DVec3::new(-2.0 - 0.5 * deep, 0.0, 0.0)];
             let corners = [DVec3::zeros(), DVec3::new(10.0, 0.3, 0.4)];
             let all = |share: f64| {
-                let one = |n: usize| block(corners[n], 6).map(move |place| place + ways[n] * share);
+                let one = |n: usize| block(corners[n], 6).map(move |position| position + ways[n] * share);
                 numbered(one(0).chain(one(1)).collect())
             };
             let rest = Rest::of(&all(0.0)).unwrap();
@@ -327,12 +329,12 @@ mod tests {
                 .map(|n| [n % 20, n / 20 % 5, n / 100].map(f64::from))
                 .map(|[x, y, z]| DVec3::new(5.5 + 0.2 * x, 1.2 * y - 0.3, 1.5 * z))
                 .collect();
-            let found = rest.places(&ctx, &all(1.0), 1.0, &at).unwrap();
+            let found = rest.positions(&ctx, &all(1.0), 1.0, &at).unwrap();
             let mut counts = [0; 2];
-            for (place, found) in at.iter().zip(&found) {
-                let off = ways.map(|way| (found.unwrap() + way - place).norm());
+            for (position, found) in at.iter().zip(&found) {
+                let off = ways.map(|way| (found.unwrap() + way - position).norm());
                 let nearer = usize::from(off[1] < off[0]);
-                assert!(off[nearer] < 1e-3, "{deep}, {place}: {off:?}");
+                assert!(off[nearer] < 1e-3, "{deep}, {position}: {off:?}");
                 counts[nearer] += 1;
             }
             assert!(counts.iter().all(|count| *count > 150), "{counts:?}");

@@ -10,21 +10,21 @@ const LOOKED_AT: [usize; 2] = [256, 32];
 /// as far (1.02 spacings in frames of two solvers' caches).
 const NEIGHBOURS: usize = 6;
 
-/// The spacing (m) of particles at places (m): the mean distance to the six nearest ones, in the median. None for fewer than seven
-/// particles, or where so many lie at one place.
-pub fn estimate(places: &[DVec3]) -> Option<f64> {
-    median(places, LOOKED_AT[0])
+/// The spacing (m) of particles at positions (m): the mean distance to the six nearest ones, in the median. None for fewer than seven
+/// particles, or where so many lie at one position.
+pub fn estimate(positions: &[DVec3]) -> Option<f64> {
+    median(positions, LOOKED_AT[0])
 }
 
 /// The same within a tenth or so, in an eighth of the time: to see whether a spacing that is known can be right.
-pub fn rough(places: &[DVec3]) -> Option<f64> {
-    median(places, LOOKED_AT[1])
+pub fn rough(positions: &[DVec3]) -> Option<f64> {
+    median(positions, LOOKED_AT[1])
 }
 
-fn median(places: &[DVec3], looked_at: usize) -> Option<f64> {
+fn median(positions: &[DVec3], looked_at: usize) -> Option<f64> {
     // The same particles are looked at in whatever order they come.
-    let mut order: Vec<usize> = (0..places.len()).collect();
-    let key = |at: &usize| places[*at];
+    let mut order: Vec<usize> = (0..positions.len()).collect();
+    let key = |at: &usize| positions[*at];
     order.par_sort_unstable_by(|a, b| {
         let (a, b) = (key(a), key(b));
         a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z))
@@ -32,8 +32,8 @@ fn median(places: &[DVec3], looked_at: usize) -> Option<f64> {
     let step = order.len().div_ceil(looked_at).max(1);
     let mean = |at: &usize| {
         let mut nearest = [f64::INFINITY; NEIGHBOURS + 1];
-        for place in places {
-            let square = (place - places[*at]).norm_squared();
+        for position in positions {
+            let square = (position - positions[*at]).norm_squared();
             if square < nearest[NEIGHBOURS] {
                 let slot = nearest.partition_point(|other| *other <= square);
                 nearest[slot..].rotate_right(1);
@@ -56,15 +56,15 @@ mod tests {
 
     #[test]
     fn the_spacing_of_a_grid_is_found_in_any_order() {
-        let mut places: Vec<DVec3> = (0..1000)
+        let mut positions: Vec<DVec3> = (0..1000)
             .map(|n| DVec3::new(f64::from(n % 10), f64::from(n / 10 % 10), f64::from(n / 100)) * 0.3)
             .collect();
-        let found = estimate(&places).unwrap();
+        let found = estimate(&positions).unwrap();
         assert!((found - 0.3).abs() < 0.1, "{found}");
-        assert!((rough(&places).unwrap() / found - 1.0).abs() < 0.2);
-        places.reverse();
-        assert_eq!(estimate(&places), Some(found));
-        assert_eq!(estimate(&places[..6]), None);
+        assert!((rough(&positions).unwrap() / found - 1.0).abs() < 0.2);
+        positions.reverse();
+        assert_eq!(estimate(&positions), Some(found));
+        assert_eq!(estimate(&positions[..6]), None);
         assert_eq!(estimate(&[DVec3::zeros(); 20]), None);
     }
 }

@@ -4,13 +4,13 @@ use super::grid::Cells;
 use crate::error::Result;
 use crate::geometry::DVec3;
 
-/// Which particles at places (m), whose spacing is `spacing` (m), belong to groups of fewer than `least`. Two are of one group where
+/// Which particles at positions (m), whose spacing is `spacing` (m), belong to groups of fewer than `least`. Two are of one group where
 /// the cells of one spacing that hold them touch.
 ///
 /// # Errors
 /// Particles too far apart.
-pub fn specks(places: &[DVec3], spacing: f64, least: usize) -> Result<Vec<bool>> {
-    let cells = Cells::new(places, spacing, i64::from)?;
+pub fn specks(positions: &[DVec3], spacing: f64, least: usize) -> Result<Vec<bool>> {
+    let cells = Cells::new(positions, spacing, i64::from)?;
     let runs: Vec<&[u32]> = cells.runs().collect();
     let mut parent: Vec<u32> = (0..runs.len() as u32).collect();
     for (cell, coord) in cells.coords().enumerate() {
@@ -28,7 +28,7 @@ pub fn specks(places: &[DVec3], spacing: f64, least: usize) -> Result<Vec<bool>>
     let roots: Vec<u32> = (0..runs.len() as u32).map(|cell| root(&mut parent, cell)).collect();
     let mut counts = vec![0; runs.len()];
     roots.iter().zip(&runs).for_each(|(root, run)| counts[*root as usize] += run.len());
-    let mut out = vec![false; places.len()];
+    let mut out = vec![false; positions.len()];
     for (root, run) in roots.iter().zip(&runs) {
         if counts[*root as usize] < least {
             run.iter().for_each(|particle| out[*particle as usize] = true);
@@ -53,11 +53,11 @@ mod tests {
     #[test]
     fn small_groups_are_found_whatever_their_order() {
         let line = |x: f64, count: i32| (0..count).map(move |n| DVec3::new(x, 0.1 * f64::from(n), 0.0));
-        let places: Vec<DVec3> = line(0.05, 12).chain(line(5.05, 3)).chain(line(-9.0, 4)).collect();
-        let found = specks(&places, 0.1, 4).unwrap();
+        let positions: Vec<DVec3> = line(0.05, 12).chain(line(5.05, 3)).chain(line(-9.0, 4)).collect();
+        let found = specks(&positions, 0.1, 4).unwrap();
         assert_eq!(found.iter().filter(|is| **is).count(), 3);
         assert!(found[12..15].iter().all(|is| *is));
-        assert_eq!(specks(&places, 0.1, 1).unwrap(), [false; 19]);
-        assert!(specks(&places, 0.1, 13).unwrap().iter().all(|is| *is));
+        assert_eq!(specks(&positions, 0.1, 1).unwrap(), [false; 19]);
+        assert!(specks(&positions, 0.1, 13).unwrap().iter().all(|is| *is));
     }
 }

@@ -14,7 +14,7 @@ const DOUBLINGS: u32 = 4;
 /// Vertices of a task.
 const PIECE: usize = 256;
 
-/// Means of numbers of the particles at places (m), whose spacing is `spacing` (m), at vertices (m): each particle counts by
+/// Means of numbers of the particles at positions (m), whose spacing is `spacing` (m), at vertices (m): each particle counts by
 /// (1 - (d / R)^2)^3 at a distance d. Each column has one number for each particle; those that come out have one for each vertex, 0
 /// where no particle is near.
 ///
@@ -22,13 +22,13 @@ const PIECE: usize = 256;
 /// Particles too far apart; cancel.
 pub fn transfer(
     ctx: &Context,
-    places: &[DVec3],
+    positions: &[DVec3],
     spacing: f64,
     vertices: &[DVec3],
     columns: &[Vec<f32>],
 ) -> Result<Vec<Vec<f32>>> {
     let edge = RADIUS * spacing;
-    let cells = Cells::new(places, edge, i64::from)?;
+    let cells = Cells::new(positions, edge, i64::from)?;
     let means = |vertex: &DVec3, sums: &mut [f64]| {
         let cell = [0, 1, 2].map(|axis| (vertex[axis] / edge).floor() as i32);
         let at = vertex / edge - DVec3::from(cell.map(f64::from));
@@ -80,14 +80,14 @@ mod tests {
     #[test]
     fn a_linear_field_is_met_in_the_middle_and_far_vertices_have_the_nearest() {
         let ctx = Context::new(Pool::new(2).unwrap());
-        let places: Vec<DVec3> = (0..1000)
+        let positions: Vec<DVec3> = (0..1000)
             .map(|n| DVec3::new(f64::from(n % 10), f64::from(n / 10 % 10), f64::from(n / 100)) * 0.1)
             .collect();
-        let columns = [places.iter().map(|p| 2.0 * p.x as f32 + 1.0).collect(), vec![7.0; 1000]];
+        let columns = [positions.iter().map(|p| 2.0 * p.x as f32 + 1.0).collect(), vec![7.0; 1000]];
         let vertices = [DVec3::repeat(0.45), DVec3::new(-0.3, 0.45, 0.45), DVec3::repeat(90.0)];
-        let means = transfer(&ctx, &places, 0.1, &vertices, &columns).unwrap();
+        let means = transfer(&ctx, &positions, 0.1, &vertices, &columns).unwrap();
         assert!((means[0][0] - 1.9).abs() < 1e-5 && means[0][1] < 1.3, "{means:?}");
         assert_eq!(means[1], [7.0, 7.0, 0.0]);
-        assert!(transfer(&ctx, &places, 0.1, &vertices, &[]).unwrap().is_empty());
+        assert!(transfer(&ctx, &positions, 0.1, &vertices, &[]).unwrap().is_empty());
     }
 }

@@ -14,8 +14,8 @@ const FAR: f64 = 0.25;
 
 impl Fans<'_, '_> {
     /// Where an edge is split: its middle, but its midpoint where a triangle would turn over.
-    pub fn split_place(&self, edge: &Edge) -> DVec3 {
-        let [a, b, c, d] = edge.corners.map(|corner| self.place(corner));
+    pub fn split_position(&self, edge: &Edge) -> DVec3 {
+        let [a, b, c, d] = edge.corners.map(|corner| self.position(corner));
         let middle = self.middle([edge.corners[0], edge.corners[1]]);
         let halves = [
             ([a, b, c], [a, middle, c]),
@@ -26,13 +26,13 @@ impl Fans<'_, '_> {
         if halves.iter().all(|(old, new)| is_upright(old, new)) { middle } else { 0.5 * (a + b) }
     }
 
-    /// The place on a smooth surface that belongs to the middle of an edge; its midpoint where neighbours are missing or not where they
+    /// The position on a smooth surface that belongs to the middle of an edge; its midpoint where neighbours are missing or not where they
     /// belong (flagged), or where that is far from it.
     pub fn middle(&self, ends: [u32; 2]) -> DVec3 {
-        let [p, q] = ends.map(|end| self.place(end));
+        let [p, q] = ends.map(|end| self.position(end));
         let midpoint = 0.5 * (p + q);
-        let place = self.butterfly(ends).unwrap_or(midpoint);
-        if (place - midpoint).norm() <= FAR * (q - p).norm() { place } else { midpoint }
+        let position = self.butterfly(ends).unwrap_or(midpoint);
+        if (position - midpoint).norm() <= FAR * (q - p).norm() { position } else { midpoint }
     }
 
     fn butterfly(&self, [a, b]: [u32; 2]) -> Option<DVec3> {
@@ -41,17 +41,17 @@ impl Fans<'_, '_> {
             return None;
         }
         if rings.iter().all(|ring| ring.len() == 6) {
-            let at = |side: usize, n: usize| self.place(rings[side][n]);
+            let at = |side: usize, n: usize| self.position(rings[side][n]);
             let opposite = at(0, 1) + at(0, 5);
             let wings = at(0, 2) + at(0, 4) + at(1, 2) + at(1, 4);
-            return Some(0.5 * (self.place(a) + self.place(b)) + 0.125 * opposite - 0.0625 * wings);
+            return Some(0.5 * (self.position(a) + self.position(b)) + 0.125 * opposite - 0.0625 * wings);
         }
         // The ends with other than 6 neighbours decide; both do so alike.
         let (mut sum, mut count) = (DVec3::zeros(), 0.0);
         for (end, ring) in [a, b].into_iter().zip(&rings).filter(|(_, ring)| ring.len() != 6) {
-            sum += 0.75 * self.place(end);
+            sum += 0.75 * self.position(end);
             for (n, &vertex) in ring.iter().enumerate() {
-                sum += weight(n, ring.len()) * self.place(vertex);
+                sum += weight(n, ring.len()) * self.position(vertex);
             }
             count += 1.0;
         }
@@ -79,16 +79,16 @@ mod tests {
     use super::super::tests::{Body, sphere};
     use super::*;
 
-    /// A regular grid of places in a plane, `count` by `count`.
+    /// A regular grid of positions in a plane, `count` by `count`.
     fn grid(count: u32) -> Body {
-        let place =
+        let position =
             |n: u32| DVec3::new(f64::from(n / count), f64::from(n % count), f64::from(n / count + n % count));
         let quad = |n: u32| {
             let [a, b, c, d] = [n, n + count, n + count + 1, n + 1];
             [[a, b, c], [a, c, d]]
         };
         let quads = (0..count * (count - 1)).filter(|n| n % count != count - 1);
-        Body::of((0..count * count).map(place).collect(), quads.flat_map(quad).collect())
+        Body::of((0..count * count).map(position).collect(), quads.flat_map(quad).collect())
     }
 
     #[test]
@@ -107,14 +107,14 @@ mod tests {
         let fans = Fans::of(&mut mesh);
         let middle = 3 * 7 + 3;
         for other in [middle + 1, middle + 7, middle + 8, middle - 1] {
-            let expected = 0.5 * (fans.place(middle) + fans.place(other));
+            let expected = 0.5 * (fans.position(middle) + fans.position(other));
             assert!(fans.butterfly([middle, other]).is_some());
             assert_eq!(fans.middle([middle, other]), expected);
-            assert_eq!(fans.split_place(&fans.edge([middle, other]).unwrap()), expected);
+            assert_eq!(fans.split_position(&fans.edge([middle, other]).unwrap()), expected);
         }
         // Vertices at the border have not all neighbours.
         assert!(fans.butterfly([0, 1]).is_none());
-        assert_eq!(fans.middle([0, 1]), 0.5 * (fans.place(0) + fans.place(1)));
+        assert_eq!(fans.middle([0, 1]), 0.5 * (fans.position(0) + fans.position(1)));
     }
 
     #[test]
@@ -127,8 +127,8 @@ mod tests {
             for triangle in 0..8 * 4u32.pow(level) {
                 let [a, b, c] = fans.corners(triangle);
                 for ends in [[a, b], [b, c], [c, a]] {
-                    let [p, q] = ends.map(|end| fans.place(end));
-                    let far = |place: DVec3| (place.norm() - 1.0).abs();
+                    let [p, q] = ends.map(|end| fans.position(end));
+                    let far = |position: DVec3| (position.norm() - 1.0).abs();
                     let ratio = far(fans.middle(ends)) / far(0.5 * (p + q));
                     assert!(ratio < 0.7, "{ends:?}: {ratio}");
                     sum += ratio;
@@ -142,15 +142,15 @@ mod tests {
     #[test]
     fn what_is_flagged_or_far_says_nothing() {
         let ends = [0u32, 1].map(|n| n + 3 * 7 + 3);
-        let half = |body: &Body| 0.5 * (body.places[ends[0] as usize] + body.places[ends[1] as usize]);
+        let half = |body: &Body| 0.5 * (body.positions[ends[0] as usize] + body.positions[ends[1] as usize]);
         let middle = |body: &mut Body| Fans::of(&mut body.improvable()).middle(ends);
         let mut body = grid(7);
-        body.places[2 * 7 + 3].z += 0.5;
+        body.positions[2 * 7 + 3].z += 0.5;
         assert!(middle(&mut body) != half(&body));
         body.flags[2 * 7 + 3] = true;
         assert_eq!(middle(&mut body), half(&body));
         body.flags[2 * 7 + 3] = false;
-        body.places[2 * 7 + 3].z += 50.0;
+        body.positions[2 * 7 + 3].z += 50.0;
         assert_eq!(middle(&mut body), half(&body));
     }
 }

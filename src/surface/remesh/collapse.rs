@@ -24,7 +24,7 @@ impl Fans<'_, '_> {
     pub fn rank(&self, vertex: u32) -> u8 {
         let mut rows = [DVec3::zeros(); 3];
         for &triangle in self.around(vertex) {
-            let normal = normal(&self.places(triangle));
+            let normal = normal(&self.positions(triangle));
             let length = normal.norm();
             if length > 0.0 {
                 for axis in 0..3 {
@@ -48,7 +48,8 @@ impl Fans<'_, '_> {
     /// there before this frame, then the lesser number. Where two new ones are on a smooth surface they meet in the middle.
     pub fn collapses(&self, [a, b]: [u32; 2]) -> Vec<Collapse> {
         let (a, b) = (a.min(b), a.max(b));
-        let into = |to: u32, from: u32| Collapse { from, to, place: self.place(to), size: self.size(to) };
+        let into =
+            |to: u32, from: u32| Collapse { from, to, position: self.position(to), size: self.size(to) };
         let [worth_a, worth_b] = [a, b].map(|end| (self.rank(end), self.has_origin(end)));
         if worth_a > worth_b {
             return vec![into(a, b)];
@@ -58,8 +59,8 @@ impl Fans<'_, '_> {
         }
         let mut ways = vec![into(a, b), into(b, a)];
         if worth_a == (1, false) {
-            let (place, size) = (self.middle([a, b]), mean(self.size(a), self.size(b)));
-            ways.insert(0, Collapse { from: b, to: a, place, size });
+            let (position, size) = (self.middle([a, b]), mean(self.size(a), self.size(b)));
+            ways.insert(0, Collapse { from: b, to: a, position, size });
         }
         ways
     }
@@ -73,7 +74,7 @@ impl Fans<'_, '_> {
 
     /// Whether a triangle is sound after a collapse, or gone.
     fn bears(&self, triangle: u32, collapse: &Collapse, folded: &[u32]) -> bool {
-        let &Collapse { from, to, place, size } = collapse;
+        let &Collapse { from, to, position, size } = collapse;
         let corners = self.corners(triangle);
         if corners.iter().any(|&corner| self.is_flagged(corner)) {
             return false;
@@ -85,10 +86,10 @@ impl Fans<'_, '_> {
         let longest = if folded.is_empty() { LONGEST } else { LONGEST_OF_FOLD };
         let is_short = |corner: u32| {
             let [_, target] = between(size, self.size(corner));
-            moves(corner) || (self.place(corner) - place).norm() <= longest * target
+            moves(corner) || (self.position(corner) - position).norm() <= longest * target
         };
-        let old = self.places(triangle);
-        let new = corners.map(|corner| if moves(corner) { place } else { self.place(corner) });
+        let old = self.positions(triangle);
+        let new = corners.map(|corner| if moves(corner) { position } else { self.position(corner) });
         let before = quality(&old);
         let keeps_side = folded.contains(&triangle) || before < SLIVER || is_upright(&old, &new);
         keeps_side && quality(&new) >= before.min(LEAST) && corners.into_iter().all(is_short)
@@ -103,7 +104,7 @@ impl Fans<'_, '_> {
         let [a, b, c] = self.corners(triangle);
         [[a, b], [b, c], [c, a]].into_iter().find_map(|ends| {
             let edge = self.edge(ends)?;
-            let [one, two] = edge.triangles.map(|triangle| normal(&self.places(triangle)));
+            let [one, two] = edge.triangles.map(|triangle| normal(&self.positions(triangle)));
             let is_flagged = edge.corners.iter().any(|&corner| self.is_flagged(corner));
             if is_flagged || one.dot(&two) >= FOLDED * one.norm() * two.norm() {
                 return None;
@@ -129,9 +130,9 @@ mod tests {
     use crate::geometry::TriMesh;
 
     #[test]
-    fn ridges_and_corners_are_told_from_smooth_places() {
+    fn ridges_and_corners_are_told_from_smooth_positions() {
         let TriMesh { positions, triangles } = TriMesh::cuboid([0.0; 3], [1.0; 3]);
-        let mut body = Body::of(positions.iter().map(|place| place.cast()).collect(), triangles);
+        let mut body = Body::of(positions.iter().map(|position| position.cast()).collect(), triangles);
         let mut mesh = body.improvable();
         let mut fans = Fans::of(&mut mesh);
         assert!((0..8).all(|vertex| fans.rank(vertex) == 3));
@@ -140,10 +141,10 @@ mod tests {
             let [a, b, c] = fans.corners(triangle);
             for ends in [[a, b], [b, c], [c, a]] {
                 let Some(edge) = fans.edge(ends) else { continue };
-                let [one, two] = edge.triangles.map(|triangle| normal(&fans.places(triangle)));
+                let [one, two] = edge.triangles.map(|triangle| normal(&fans.positions(triangle)));
                 let is_flat = one.cross(&two).norm() < 1e-9;
                 let made = 8 + on_faces + on_ridges;
-                fans.split(&edge, 0.5 * (fans.place(ends[0]) + fans.place(ends[1])));
+                fans.split(&edge, 0.5 * (fans.position(ends[0]) + fans.position(ends[1])));
                 assert_eq!(fans.rank(made), if is_flat { 1 } else { 2 });
                 *(if is_flat { &mut on_faces } else { &mut on_ridges }) += 1;
             }
@@ -164,18 +165,18 @@ mod tests {
             let mut mesh = body.improvable();
             let fans = Fans::of(&mut mesh);
             let ways = fans.collapses([a, b]);
-            (ways.iter().map(|way| (way.from, way.to)).collect::<Vec<_>>(), ways[0].place)
+            (ways.iter().map(|way| (way.from, way.to)).collect::<Vec<_>>(), ways[0].position)
         };
-        let place = |body: &Body, vertex: u32| body.places[vertex as usize];
-        assert_eq!(offers(&mut body), (vec![(high, low), (low, high)], place(&body, low)));
+        let position = |body: &Body, vertex: u32| body.positions[vertex as usize];
+        assert_eq!(offers(&mut body), (vec![(high, low), (low, high)], position(&body, low)));
         body.origins[low as usize] = None;
-        assert_eq!(offers(&mut body), (vec![(low, high)], place(&body, high)));
+        assert_eq!(offers(&mut body), (vec![(low, high)], position(&body, high)));
         body.origins[high as usize] = None;
         let (ways, middle) = offers(&mut body);
         assert_eq!(ways, [(high, low), (high, low), (low, high)]);
-        assert!((middle - 0.5 * (place(&body, low) + place(&body, high))).norm() < 0.03);
+        assert!((middle - 0.5 * (position(&body, low) + position(&body, high))).norm() < 0.03);
         // A spike is a corner.
-        body.places[low as usize] *= 1.2;
+        body.positions[low as usize] *= 1.2;
         assert_eq!(offers(&mut body).0, [(high, low)]);
     }
 
@@ -200,8 +201,8 @@ mod tests {
         let mut mesh = body.improvable();
         let fans = Fans::of(&mut mesh);
         let way = fans.collapses([a, b])[0];
-        let beyond = 3.5 * fans.place(way.from) - 2.5 * fans.place(way.to);
-        assert!(fans.may(&way, &[]) && !fans.may(&Collapse { place: beyond, ..way }, &[]));
+        let beyond = 3.5 * fans.position(way.from) - 2.5 * fans.position(way.to);
+        assert!(fans.may(&way, &[]) && !fans.may(&Collapse { position: beyond, ..way }, &[]));
     }
 
     #[test]
@@ -211,8 +212,8 @@ mod tests {
             let vertex = 100u32;
             let beside = body.triangles.iter().find(|corners| corners.contains(&vertex)).unwrap();
             let other = beside.iter().copied().find(|&corner| corner != vertex).unwrap();
-            let [p, q] = [vertex, other].map(|at| body.places[at as usize]);
-            body.places[vertex as usize] = q + 0.6 * (q - p);
+            let [p, q] = [vertex, other].map(|at| body.positions[at as usize]);
+            body.positions[vertex as usize] = q + 0.6 * (q - p);
             if made {
                 body.origins[vertex as usize] = None;
             }

@@ -57,7 +57,7 @@ mod tests {
     #[test]
     fn a_mesh_that_was_drawn_out_keeps_every_triangle_when_its_particles_only_tremble() {
         let ctx = Context::new(Pool::new(2).unwrap());
-        let places = shell(DVec3::zeros(), 0.0, 4.2);
+        let positions = shell(DVec3::zeros(), 0.0, 4.2);
         let mut seed = 1u64;
         let mut chance = || {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -66,14 +66,14 @@ mod tests {
         let mut at = |frame: i32| -> Particles {
             let long = libm::exp(0.05 * f64::from(frame.min(MOVING)));
             let thin = 1.0 / long.sqrt();
-            let moved = |place: &DVec3| {
+            let moved = |position: &DVec3| {
                 let by = DVec3::new(chance(), chance(), chance()) * 0.0115;
-                place.component_mul(&DVec3::new(long, thin, thin)) + by
+                position.component_mul(&DVec3::new(long, thin, thin)) + by
             };
-            numbered(places.iter().map(moved).collect())
+            numbered(positions.iter().map(moved).collect())
         };
         let mut from = at(0);
-        let mesh = own_surface(&ctx, &from.places);
+        let mesh = own_surface(&ctx, &from.positions);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
         let mut made = Vec::new();

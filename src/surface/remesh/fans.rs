@@ -23,8 +23,8 @@ pub(super) struct Collapse {
     pub from: u32,
     pub to: u32,
     /// Where the neighbour lies then, and its size.
-    pub place: DVec3,
-    /// See `place`.
+    pub position: DVec3,
+    /// See `position`.
     pub size: Size,
 }
 
@@ -56,7 +56,7 @@ pub(super) struct Fans<'m, 'a> {
 impl<'m, 'a> Fans<'m, 'a> {
     /// Takes two passes over all triangles.
     pub fn of(mesh: &'m mut Improvable<'a>) -> Self {
-        let (vertices, triangles) = (mesh.places.len(), mesh.triangles.len());
+        let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
         let mut starts = vec![0u32; vertices + 1];
         mesh.triangles.as_flattened().iter().for_each(|&corner| starts[corner as usize + 1] += 1);
         for vertex in 1..starts.len() {
@@ -99,24 +99,24 @@ impl<'m, 'a> Fans<'m, 'a> {
         self.mesh.triangles[triangle as usize]
     }
 
-    /// Places of a triangle's vertices.
-    pub fn places(&self, triangle: u32) -> [DVec3; 3] {
-        self.corners(triangle).map(|corner| self.place(corner))
+    /// Positions of a triangle's vertices.
+    pub fn positions(&self, triangle: u32) -> [DVec3; 3] {
+        self.corners(triangle).map(|corner| self.position(corner))
     }
 
-    /// The place of a vertex.
-    pub fn place(&self, vertex: u32) -> DVec3 {
-        self.mesh.places[vertex as usize]
+    /// The position of a vertex.
+    pub fn position(&self, vertex: u32) -> DVec3 {
+        self.mesh.positions[vertex as usize]
     }
 
     /// Moves a vertex.
-    pub fn put(&mut self, vertex: u32, place: DVec3) {
-        self.mesh.places[vertex as usize] = place;
+    pub fn put(&mut self, vertex: u32, position: DVec3) {
+        self.mesh.positions[vertex as usize] = position;
     }
 
     /// Length of an edge.
     pub fn length(&self, [a, b]: [u32; 2]) -> f64 {
-        (self.place(a) - self.place(b)).norm()
+        (self.position(a) - self.position(b)).norm()
     }
 
     /// Length of the edges that a vertex was born with.
@@ -208,9 +208,9 @@ impl<'m, 'a> Fans<'m, 'a> {
 
     /// Triangles with a corner that a collapse moves or renames; those that it takes away are among them.
     pub fn moving(&self, collapse: &Collapse) -> Vec<u32> {
-        let &Collapse { from, to, place, .. } = collapse;
+        let &Collapse { from, to, position, .. } = collapse;
         let mut moving = self.around(from).to_vec();
-        if place != self.place(to) {
+        if position != self.position(to) {
             let others = self.around(to).iter().copied();
             moving.extend(others.filter(|&triangle| !self.corners(triangle).contains(&from)));
         }
@@ -225,13 +225,13 @@ impl<'m, 'a> Fans<'m, 'a> {
         touched
     }
 
-    /// Divides an edge by a vertex at a place.
-    pub fn split(&mut self, edge: &Edge, place: DVec3) {
+    /// Divides an edge by a vertex at a position.
+    pub fn split(&mut self, edge: &Edge, position: DVec3) {
         let Edge { triangles: [one, two], corners: [a, b, c, d] } = *edge;
-        let made = self.mesh.places.len() as u32;
+        let made = self.mesh.positions.len() as u32;
         let [three, four] = [0, 1].map(|n| self.mesh.triangles.len() as u32 + n);
         let size = mean(self.size(a), self.size(b));
-        self.mesh.places.push(place);
+        self.mesh.positions.push(position);
         self.mesh.sizes.push(size);
         let drift = self.mean_drift(a, b);
         self.mesh.drifts.push(drift);
@@ -259,12 +259,12 @@ impl<'m, 'a> Fans<'m, 'a> {
 
     /// Makes a collapse of two vertices that may join.
     pub fn collapse(&mut self, collapse: &Collapse) {
-        let &Collapse { from, to, place, size } = collapse;
+        let &Collapse { from, to, position, size } = collapse;
         self.moving(collapse).into_iter().for_each(|triangle| self.becomes_part(triangle));
-        if place != self.place(to) {
+        if position != self.position(to) {
             self.mesh.drifts[to as usize] = self.mean_drift(from, to);
         }
-        self.mesh.places[to as usize] = place;
+        self.mesh.positions[to as usize] = position;
         self.mesh.sizes[to as usize] = size;
         self.is_gone[from as usize] = true;
         for triangle in std::mem::take(self.own_mut(from)) {
@@ -281,7 +281,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         self.around(to).to_vec().into_iter().for_each(|triangle| self.touch(triangle));
     }
 
-    /// Puts the other diagonal of an edge's two triangles in its place. They stay parts where they are of one triangle.
+    /// Puts the other diagonal of an edge's two triangles in its position. They stay parts where they are of one triangle.
     pub fn flip(&mut self, edge: &Edge) {
         let Edge { triangles: [one, two], corners: [a, b, c, d] } = *edge;
         let sources = [one, two].map(|triangle| self.mesh.sources[triangle as usize]);
@@ -343,7 +343,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         }
         drop_marked(mesh.triangles, &is_dead);
         drop_marked(mesh.sources, &is_dead);
-        drop_marked(mesh.places, &is_gone);
+        drop_marked(mesh.positions, &is_gone);
         drop_marked(mesh.sizes, &is_gone);
         drop_marked(mesh.drifts, &is_gone);
         drop_marked(mesh.origins, &is_gone);
@@ -375,7 +375,7 @@ mod tests {
     /// A cube of 8 vertices and 12 triangles.
     fn cube() -> Body {
         let TriMesh { positions, triangles } = TriMesh::cuboid([0.0; 3], [1.0; 3]);
-        Body::of(positions.iter().map(|place| place.cast()).collect(), triangles)
+        Body::of(positions.iter().map(|position| position.cast()).collect(), triangles)
     }
 
     #[test]
@@ -389,7 +389,7 @@ mod tests {
         };
         // What is around a vertex is what names it.
         let check = |fans: &Fans<'_, '_>| {
-            for vertex in 0..fans.mesh.places.len() as u32 {
+            for vertex in 0..fans.mesh.positions.len() as u32 {
                 let names =
                     |&triangle: &u32| fans.is_there(triangle) && fans.corners(triangle).contains(&vertex);
                 let expected: Vec<u32> = (0..fans.mesh.triangles.len() as u32).filter(names).collect();
@@ -403,10 +403,10 @@ mod tests {
             let edge = fans.edge(ends(&fans, triangle)).unwrap();
             assert_eq!(edge.triangles[0], triangle);
             let [a, b, ..] = edge.corners;
-            fans.split(&edge, 0.5 * (fans.place(a) + fans.place(b)));
+            fans.split(&edge, 0.5 * (fans.position(a) + fans.position(b)));
             check(&fans);
         }
-        assert_eq!((fans.mesh.places.len(), fans.mesh.triangles.len()), (13, 22));
+        assert_eq!((fans.mesh.positions.len(), fans.mesh.triangles.len()), (13, 22));
         let touched = fans.take_touched();
         assert!(touched.is_sorted() && touched.contains(&13) && fans.take_touched().is_empty());
         let mut flips = 0;
@@ -423,8 +423,8 @@ mod tests {
         for triangle in 0..22 {
             let [to, from] = ends(&fans, triangle);
             if fans.is_there(triangle) && fans.may_join(from, to) {
-                let (place, size) = (fans.place(to), fans.size(to));
-                fans.collapse(&Collapse { from, to, place, size });
+                let (position, size) = (fans.position(to), fans.size(to));
+                fans.collapse(&Collapse { from, to, position, size });
                 joined += 1;
                 assert!(fans.edge([from, to]).is_none());
             }
@@ -433,7 +433,7 @@ mod tests {
         fans.finish();
         assert!(flips > 3 && joined > 3, "{flips} {joined}");
         body.check();
-        assert_eq!((body.places.len(), body.triangles.len()), (13 - joined, 22 - 2 * joined));
+        assert_eq!((body.positions.len(), body.triangles.len()), (13 - joined, 22 - 2 * joined));
     }
 
     #[test]
@@ -454,7 +454,7 @@ mod tests {
         let edge = fans.edge([a, b]).unwrap();
         let other = edge.triangles[1];
         fans.mesh.sources[other as usize] = Source::New;
-        fans.split(&edge, 0.5 * (fans.place(a) + fans.place(b)));
+        fans.split(&edge, 0.5 * (fans.position(a) + fans.position(b)));
         assert_eq!(fans.mesh.sources[12..], [Source::Part(0), Source::New]);
         assert_eq!(fans.mesh.sources[0], Source::Part(0));
         assert_eq!((fans.mesh.origins[8], fans.mesh.flags[8]), (None, false));

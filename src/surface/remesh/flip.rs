@@ -16,7 +16,7 @@ impl Fans<'_, '_> {
     /// triangles and those at flagged vertices do not flip.
     pub fn better(&self, triangle: u32) -> Option<Edge> {
         let may = self.is_there(triangle) && !self.is_whole(triangle);
-        if !may || least_angle(&self.places(triangle)) >= LEAST {
+        if !may || least_angle(&self.positions(triangle)) >= LEAST {
             return None;
         }
         let [a, b, c] = self.corners(triangle);
@@ -40,12 +40,12 @@ impl Fans<'_, '_> {
         if is_fixed || self.stretch([c, d]) > TOO_LONG * TOO_LONG || self.are_neighbours(c, d) {
             return None;
         }
-        let old = edge.triangles.map(|triangle| self.places(triangle));
+        let old = edge.triangles.map(|triangle| self.positions(triangle));
         let [one, two] = old.each_ref().map(normal);
         if one.dot(&two) < FLAT * one.norm() * two.norm() {
             return None;
         }
-        let new = flipped(edge.corners).map(|corners| corners.map(|corner| self.place(corner)));
+        let new = flipped(edge.corners).map(|corners| corners.map(|corner| self.position(corner)));
         // The larger of the two has the better normal.
         let side = if one.norm_squared() >= two.norm_squared() { &old[0] } else { &old[1] };
         if !new.iter().all(|corners| is_upright(side, corners)) {
@@ -67,8 +67,8 @@ mod tests {
     fn kite(height: f64, turn: f64) -> Body {
         let turn = turn.to_radians();
         let low = DVec3::new(0.0, -height * libm::cos(turn), height * libm::sin(turn));
-        let places = vec![DVec3::x() * -2.0, DVec3::x() * 2.0, DVec3::y() * height, low];
-        let mut body = Body::of(places, vec![[0, 1, 2], [1, 0, 3]]);
+        let positions = vec![DVec3::x() * -2.0, DVec3::x() * 2.0, DVec3::y() * height, low];
+        let mut body = Body::of(positions, vec![[0, 1, 2], [1, 0, 3]]);
         body.sizes = vec![[2.0; 2]; 4];
         body.sources = vec![Source::Part(7); 2];
         body
@@ -111,8 +111,8 @@ mod tests {
         assert_eq!(better(&mut body), None);
         // Triangles that do not make a convex quadrangle would turn over.
         let mut body = kite(0.5, 0.0);
-        body.places[2].x = 4.0;
-        body.places[3].x = 4.0;
+        body.positions[2].x = 4.0;
+        body.positions[3].x = 4.0;
         assert_eq!(better(&mut body), None);
     }
 

@@ -47,8 +47,8 @@ const LOOK: usize = 256;
 
 /// A mesh that is improved, lengths in any unit: closed and 2-manifold by index. Arrays have one value for each vertex, or triangle.
 pub struct Improvable<'a> {
-    /// Places of vertices.
-    pub places: &'a mut Vec<DVec3>,
+    /// Positions of vertices.
+    pub positions: &'a mut Vec<DVec3>,
     /// Triangles, counter-clockwise seen from outside.
     pub triangles: &'a mut Vec<[u32; 3]>,
     /// Of each vertex the lengths of the shortest and of the longest edge around it at its birth: as born no edge is out of range. Edges
@@ -99,11 +99,11 @@ pub fn improve(ctx: &Context, mesh: &mut Improvable<'_>) -> Result<Improvements>
 }
 
 /// The size of each vertex as it is; 0 where it has no edges.
-pub fn sizes(places: &[DVec3], triangles: &[[u32; 3]]) -> Vec<Size> {
-    let mut sizes = vec![[f32::INFINITY, 0.0f32]; places.len()];
+pub fn sizes(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<Size> {
+    let mut sizes = vec![[f32::INFINITY, 0.0f32]; positions.len()];
     for &[a, b, c] in triangles {
         for ends in [[a, b], [b, c], [c, a]] {
-            let [p, q] = ends.map(|end| places[end as usize]);
+            let [p, q] = ends.map(|end| positions[end as usize]);
             let length = (p - q).norm() as f32;
             for end in ends {
                 let [shortest, longest] = &mut sizes[end as usize];
@@ -122,7 +122,7 @@ impl Improvable<'_> {
 
     /// Square of an edge's length over its target; 1 where it is between the two, or has none.
     fn stretch(&self, ends: [u32; 2]) -> f64 {
-        let [p, q] = ends.map(|end| self.places[end as usize]);
+        let [p, q] = ends.map(|end| self.positions[end as usize]);
         let [shortest, longest] = self.target(ends);
         let square = (p - q).norm_squared();
         let stretch = if square > longest * longest {
@@ -251,8 +251,8 @@ impl Work<'_, '_, '_> {
             if let Some(edge) = edge
                 && !edge.corners.iter().any(|&corner| self.fans.is_flagged(corner))
             {
-                let place = self.fans.split_place(&edge);
-                self.fans.split(&edge, place);
+                let position = self.fans.split_position(&edge);
+                self.fans.split(&edge, position);
                 self.done.splits += 1;
             }
         }
@@ -309,8 +309,8 @@ impl Work<'_, '_, '_> {
         for _ in 0..RELAXED {
             for (n, vertex) in vertices.iter().enumerate() {
                 self.look(n)?;
-                if let Some(place) = self.fans.relaxed(*vertex) {
-                    self.fans.put(*vertex, place);
+                if let Some(position) = self.fans.relaxed(*vertex) {
+                    self.fans.put(*vertex, position);
                 }
             }
         }

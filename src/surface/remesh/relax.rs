@@ -14,7 +14,7 @@ impl Fans<'_, '_> {
         if self.has_origin(vertex) || fan.is_empty() {
             return None;
         }
-        let place = self.place(vertex);
+        let position = self.position(vertex);
         let (mut sum, mut across) = (DVec3::zeros(), DVec3::zeros());
         for &triangle in fan {
             let corners = self.corners(triangle);
@@ -22,17 +22,18 @@ impl Fans<'_, '_> {
                 return None;
             }
             // Each neighbour is in two triangles.
-            sum += corners.iter().map(|&corner| self.place(corner)).sum::<DVec3>() - place;
-            across += normal(&self.places(triangle));
+            sum += corners.iter().map(|&corner| self.position(corner)).sum::<DVec3>() - position;
+            across += normal(&self.positions(triangle));
         }
         let across = across.try_normalize(0.0)?;
-        let way = sum / (2.0 * fan.len() as f64) - place;
-        let to = place + (way - across * across.dot(&way)) * SHARE;
+        let way = sum / (2.0 * fan.len() as f64) - position;
+        let to = position + (way - across * across.dot(&way)) * SHARE;
         let (mut before, mut after) = (f64::INFINITY, f64::INFINITY);
         for &triangle in fan {
-            let old = self.places(triangle);
-            let new =
-                self.corners(triangle).map(|corner| if corner == vertex { to } else { self.place(corner) });
+            let old = self.positions(triangle);
+            let new = self
+                .corners(triangle)
+                .map(|corner| if corner == vertex { to } else { self.position(corner) });
             if !is_upright(&old, &new) {
                 return None;
             }

@@ -10,7 +10,7 @@ pub(super) fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
     (b - a).cross(&(c - a))
 }
 
-/// Altitude of a triangle on its longest edge, over that edge: 0.87 at best, 0 where all corners are at one place.
+/// Altitude of a triangle on its longest edge, over that edge: 0.87 at best, 0 where all corners are at one position.
 pub(super) fn quality(corners: &[DVec3; 3]) -> f64 {
     let [a, b, c] = corners;
     let square = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());

@@ -27,7 +27,7 @@ impl Improvable<'_> {
         if self.origins[a].is_none() || self.origins[b].is_none() {
             return true;
         }
-        let now = self.places[a] - self.places[b];
+        let now = self.positions[a] - self.positions[b];
         let drift = |at: usize| DVec3::from(self.drifts[at].map(f64::from));
         let (now, before) = (now.norm(), (now - (drift(a) - drift(b))).norm());
         let [shortest, longest] = self.target(ends);
@@ -68,10 +68,10 @@ mod tests {
 
     #[test]
     fn an_edge_rests_until_it_changes_or_creeps_far_out() {
-        // Two vertices 1.6 targets apart, of which the second came from a place this much nearer.
+        // Two vertices 1.6 targets apart, of which the second came from a position this much nearer.
         let is_strained = |length: f64, nearer: f32, tremble: f64| {
-            let places = vec![DVec3::zeros(), DVec3::x() * length, DVec3::y()];
-            let mut body = Body::of(places, vec![[0, 1, 2]]);
+            let positions = vec![DVec3::zeros(), DVec3::x() * length, DVec3::y()];
+            let mut body = Body::of(positions, vec![[0, 1, 2]]);
             body.sizes = vec![[1.0; 2]; 3];
             body.drifts = vec![[100.0, 7.0, 0.0], [100.0 + nearer, 7.0, 0.0], [0.0; 3]];
             body.tremble = tremble;
@@ -88,8 +88,8 @@ mod tests {
     #[test]
     fn ends_that_are_where_they_were_do_not_strain_an_edge_before_it_creeps_far_out() {
         let is_strained = |length: f64, by: f32| {
-            let places = vec![DVec3::zeros(), DVec3::x() * length, DVec3::y()];
-            let mut body = Body::of(places, vec![[0, 1, 2]]);
+            let positions = vec![DVec3::zeros(), DVec3::x() * length, DVec3::y()];
+            let mut body = Body::of(positions, vec![[0, 1, 2]]);
             body.sizes = vec![[1.0; 2]; 3];
             body.drifts = vec![[0.0; 3], [by, 0.0, 0.0], [0.0; 3]];
             body.tremble = 0.01;

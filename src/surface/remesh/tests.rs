@@ -16,7 +16,7 @@ const UNKNOWN: [f32; 3] = [f32::INFINITY; 3];
 /// A mesh with all that is improved along with it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Body {
-    pub places: Vec<DVec3>,
+    pub positions: Vec<DVec3>,
     pub triangles: Vec<[u32; 3]>,
     pub sizes: Vec<Size>,
     pub drifts: Vec<[f32; 3]>,
@@ -28,22 +28,22 @@ pub(super) struct Body {
 
 impl Body {
     /// As it is born; how its vertices moved before is not known.
-    pub fn of(places: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
+    pub fn of(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
         Self {
-            sizes: sizes(&places, &triangles),
-            drifts: vec![UNKNOWN; places.len()],
-            origins: (0..places.len() as u32).map(Some).collect(),
+            sizes: sizes(&positions, &triangles),
+            drifts: vec![UNKNOWN; positions.len()],
+            origins: (0..positions.len() as u32).map(Some).collect(),
             sources: (0..triangles.len() as u32).map(Source::Whole).collect(),
-            flags: vec![false; places.len()],
+            flags: vec![false; positions.len()],
             tremble: 0.0,
-            places,
+            positions,
             triangles,
         }
     }
 
     pub fn improvable(&mut self) -> Improvable<'_> {
         Improvable {
-            places: &mut self.places,
+            positions: &mut self.positions,
             triangles: &mut self.triangles,
             sizes: &mut self.sizes,
             drifts: &mut self.drifts,
@@ -56,7 +56,7 @@ impl Body {
 
     /// Checks that arrays are in step and that the mesh is closed.
     pub fn check(&self) {
-        let vertices = self.places.len();
+        let vertices = self.positions.len();
         let counts = [self.sizes.len(), self.drifts.len(), self.origins.len(), self.flags.len()];
         assert_eq!(counts, [vertices; 4]);
         assert_eq!(self.sources.len(), self.triangles.len());
@@ -68,7 +68,7 @@ impl Body {
     }
 
     fn stretched(mut self, by: [f64; 3]) -> Self {
-        self.places.iter_mut().for_each(|place| place.component_mul_assign(&DVec3::from(by)));
+        self.positions.iter_mut().for_each(|position| position.component_mul_assign(&DVec3::from(by)));
         self
     }
 
@@ -78,9 +78,9 @@ impl Body {
         let ctx = Context::new(Pool::new(threads).unwrap());
         let done = ctx.phase("improve", || improve(&ctx, &mut self.improvable())).unwrap();
         self.check();
-        for vertex in 0..self.places.len() {
+        for vertex in 0..self.positions.len() {
             if let Some(origin) = self.origins[vertex] {
-                assert_eq!(self.places[vertex], before.places[origin as usize], "vertex {vertex}");
+                assert_eq!(self.positions[vertex], before.positions[origin as usize], "vertex {vertex}");
                 assert_eq!(self.sizes[vertex], before.sizes[origin as usize], "vertex {vertex}");
             }
         }
@@ -105,7 +105,7 @@ impl Body {
     }
 
     fn corners(&self, triangle: usize) -> [DVec3; 3] {
-        self.triangles[triangle].map(|corner| self.places[corner as usize])
+        self.triangles[triangle].map(|corner| self.positions[corner as usize])
     }
 
     fn volume(&self) -> f64 {
@@ -128,7 +128,7 @@ impl Body {
 
     /// As it comes into the next frame.
     fn in_next_frame(mut self) -> Self {
-        self.origins = (0..self.places.len() as u32).map(Some).collect();
+        self.origins = (0..self.positions.len() as u32).map(Some).collect();
         self.sources = (0..self.triangles.len() as u32).map(Source::Whole).collect();
         self
     }
@@ -136,15 +136,15 @@ impl Body {
 
 /// A unit sphere of 8 x 4^levels triangles.
 pub(super) fn sphere(levels: u32) -> Body {
-    let (places, triangles) = test_meshes::sphere(levels);
-    Body::of(places, triangles)
+    let (positions, triangles) = test_meshes::sphere(levels);
+    Body::of(positions, triangles)
 }
 
 /// A torus whose edges are not all of a length.
 fn torus() -> Body {
     const AROUND: u32 = 80;
     const ACROSS: u32 = 24;
-    let place = |n: u32| {
+    let position = |n: u32| {
         let turn = |n: u32, of: u32| TAU * f64::from(n) / f64::from(of);
         let (u, v) = (turn(n / ACROSS, AROUND), turn(n % ACROSS, ACROSS));
         let far = 6.0 + 2.0 * libm::cos(v);
@@ -155,13 +155,13 @@ fn torus() -> Body {
         let [a, b, c, d] = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)];
         [[a, c, b], [c, a, d]]
     };
-    Body::of((0..AROUND * ACROSS).map(place).collect(), (0..AROUND * ACROSS).flat_map(quad).collect())
+    Body::of((0..AROUND * ACROSS).map(position).collect(), (0..AROUND * ACROSS).flat_map(quad).collect())
 }
 
 #[test]
 fn sizes_are_the_shortest_and_the_longest_length() {
-    let places = [DVec3::zeros(), DVec3::x() * 3.0, DVec3::y() * 4.0, DVec3::z()];
-    assert_eq!(sizes(&places, &[[0, 1, 2], [1, 0, 2]]), [[3.0, 4.0], [3.0, 5.0], [4.0, 5.0], [0.0; 2]]);
+    let positions = [DVec3::zeros(), DVec3::x() * 3.0, DVec3::y() * 4.0, DVec3::z()];
+    assert_eq!(sizes(&positions, &[[0, 1, 2], [1, 0, 2]]), [[3.0, 4.0], [3.0, 5.0], [4.0, 5.0], [0.0; 2]]);
 }
 
 #[test]
@@ -205,7 +205,7 @@ fn what_is_as_it_was_born_stays_bit_for_bit() {
 fn what_rests_stays_bit_for_bit_however_it_is_stretched() {
     let at_reference = |by: f64| {
         let mut body = torus().stretched([by, 1.0, 0.6]);
-        body.drifts = vec![[0.0; 3]; body.places.len()];
+        body.drifts = vec![[0.0; 3]; body.positions.len()];
         body
     };
     for by in [0.4, 1.7, 4.0] {
@@ -214,7 +214,9 @@ fn what_rests_stays_bit_for_bit_however_it_is_stretched() {
         assert!(after == at_reference(by));
         // As it is drawn out since the reference, it is improved as if nothing were known.
         let mut body = at_reference(by);
-        for (drift, (now, before)) in body.drifts.iter_mut().zip(body.places.iter().zip(&torus().places)) {
+        for (drift, (now, before)) in
+            body.drifts.iter_mut().zip(body.positions.iter().zip(&torus().positions))
+        {
             *drift = (now - before).cast::<f32>().into();
         }
         let (_, done) = body.improved(2);
@@ -226,8 +228,8 @@ fn what_rests_stays_bit_for_bit_however_it_is_stretched() {
 #[test]
 fn triangles_at_flagged_vertices_are_left_alone() {
     let mut body = sphere(4).stretched([2.0, 1.0, 1.0]);
-    for vertex in 0..body.places.len() {
-        body.flags[vertex] = body.places[vertex].y > 0.5;
+    for vertex in 0..body.positions.len() {
+        body.flags[vertex] = body.positions[vertex].y > 0.5;
     }
     let flagged = |body: &Body| {
         let is_it = |names: &[u32; 3]| names.iter().any(|&name| body.flags[name as usize]);
@@ -243,8 +245,8 @@ fn triangles_at_flagged_vertices_are_left_alone() {
 #[test]
 fn a_part_that_needs_nothing_is_whole() {
     let mut body = sphere(4);
-    body.places.iter_mut().filter(|place| place.x > 0.0).for_each(|place| place.x *= 2.0);
-    let far = |body: &Body, triangle: usize| body.corners(triangle).iter().all(|place| place.x < -0.2);
+    body.positions.iter_mut().filter(|position| position.x > 0.0).for_each(|position| position.x *= 2.0);
+    let far = |body: &Body, triangle: usize| body.corners(triangle).iter().all(|position| position.x < -0.2);
     let expected: Vec<Source> = (0..body.triangles.len())
         .filter(|&triangle| far(&body, triangle))
         .map(|triangle| Source::Whole(triangle as u32))
@@ -280,7 +282,7 @@ fn threads_change_nothing() {
 fn a_vertex_that_went_astray_takes_bounded_work() {
     for far in [10.0, 1000.0] {
         let mut body = sphere(3);
-        body.places[20] *= far;
+        body.positions[20] *= far;
         for _ in 0..2 {
             let (after, done) = body.improved(2);
             assert!(done.splits < 20_000, "{far}: {done:?}");
@@ -301,8 +303,8 @@ fn folds_go() {
     let around: Vec<usize> =
         (0..512).filter(|&triangle| body.triangles[triangle].contains(&vertex)).collect();
     let other = body.triangles[around[0]].into_iter().find(|&corner| corner != vertex).unwrap();
-    let [p, q] = [vertex, other].map(|at| body.places[at as usize]);
-    body.places[vertex as usize] = q + 0.6 * (q - p);
+    let [p, q] = [vertex, other].map(|at| body.positions[at as usize]);
+    body.positions[vertex as usize] = q + 0.6 * (q - p);
     body.origins[vertex as usize] = None;
     around.iter().for_each(|&triangle| body.sources[triangle] = Source::New);
     assert!(body.folds() > 2);

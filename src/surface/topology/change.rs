@@ -21,12 +21,12 @@ use crate::surface::track::project::foot;
 
 /// A mesh, and where it no longer fits.
 pub struct Unfit<'a> {
-    /// Places of vertices (m).
+    /// Positions of vertices (m).
     pub vertices: &'a [DVec3],
     pub triangles: &'a [[u32; 3]],
     /// Vertices whose triangles are rebuilt.
     pub flags: &'a [bool],
-    /// Places of the particles' surface that the mesh should have, and does not (cells).
+    /// Positions of the particles' surface that the mesh should have, and does not (cells).
     pub bare: &'a [DVec3],
     /// What it takes to find where it does not fit besides; none: that is not looked for.
     pub everywhere: Option<Everywhere<'a>>,
@@ -35,7 +35,7 @@ pub struct Unfit<'a> {
 /// What a mesh became.
 #[derive(Debug, Clone)]
 pub struct Change {
-    /// Places of vertices (m): those that stayed, in their order, then those that were made.
+    /// Positions of vertices (m): those that stayed, in their order, then those that were made.
     pub vertices: Vec<DVec3>,
     /// Triangles, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
@@ -43,7 +43,7 @@ pub struct Change {
     pub origins: Vec<Option<u32>>,
     /// For each triangle where it comes from.
     pub sources: Vec<Source>,
-    /// Places (m) to which the step took the vertices that there were; after several steps, the first that changed the mesh.
+    /// Positions (m) to which the step took the vertices that there were; after several steps, the first that changed the mesh.
     pub before: Vec<DVec3>,
     /// For each vertex that was made its signed distance from the particles' surface (m); of several steps, in the last.
     pub delta: Vec<f32>,
@@ -152,11 +152,11 @@ pub fn change(
     let Some(first) = unfit.vertices.first().copied().or_else(|| Some(unfit.bare.first()? * cell)) else {
         return Ok(None);
     };
-    let low = unfit.vertices.iter().fold(first, |low, place| low.inf(place));
-    let high = unfit.vertices.iter().fold(first, |high, place| high.sup(place));
+    let low = unfit.vertices.iter().fold(first, |low, position| low.inf(position));
+    let high = unfit.vertices.iter().fold(first, |high, position| high.sup(position));
     let lattice = Lattice::near(cell, 0.5 * (low + high))?;
-    let in_cells: Vec<DVec3> = unfit.vertices.iter().map(|place| lattice.to_cells(*place)).collect();
-    let fixed = in_cells.iter().map(|place| lattice.fix(*place)).collect::<Result<Vec<_>>>()?;
+    let in_cells: Vec<DVec3> = unfit.vertices.iter().map(|position| lattice.to_cells(*position)).collect();
+    let fixed = in_cells.iter().map(|position| lattice.fix(*position)).collect::<Result<Vec<_>>>()?;
     let (shape, flagged) = ctx.phase("flag", || {
         // Some 100 bytes for each edge of the grid, of which there are up to 1.7 for a cell's face.
         let edges = |[a, b, c]: [DVec3; 3]| (b - a).cross(&(c - a)).norm() / 2.0;
@@ -186,14 +186,14 @@ pub fn change(
     let rebuilt = ctx.phase("rebuild", || ladder(ctx, &shape, (&in_cells, &lattice), &set, &gamma))?;
     let Rebuilt { draft, cells, rung, .. } = rebuilt;
     let own = unfit.vertices.len();
-    let names = used(draft.places.len(), &draft.triangles)
-        .unwrap_or_else(|| (0..draft.places.len() as u32).collect());
+    let names = used(draft.positions.len(), &draft.triangles)
+        .unwrap_or_else(|| (0..draft.positions.len() as u32).collect());
     let origin = DVec3::from(lattice.origin.map(f64::from));
-    let place = |name: &u32| match unfit.vertices.get(*name as usize) {
-        Some(place) => *place,
-        None => (draft.places[*name as usize] + origin) * cell,
+    let position = |name: &u32| match unfit.vertices.get(*name as usize) {
+        Some(position) => *position,
+        None => (draft.positions[*name as usize] + origin) * cell,
     };
-    let vertices = names.iter().map(place).collect();
+    let vertices = names.iter().map(position).collect();
     Ok(Some(Change {
         vertices,
         triangles: crate::geometry::mesh::renumbered(&draft.triangles, &names),
@@ -240,7 +240,7 @@ pub fn improved(
     let mut flags: Vec<bool> =
         change.origins.iter().map(|at| at.is_some_and(|at| unfit.flags[at as usize])).collect();
     let mut mesh = Improvable {
-        places: &mut change.vertices,
+        positions: &mut change.vertices,
         triangles: &mut change.triangles,
         sizes: &mut change.sizes,
         drifts: &mut change.drifts,
@@ -255,16 +255,16 @@ pub fn improved(
     }
     let mut sampler = Sampler::new(distances);
     let made = change.vertices.iter().zip(&change.origins).filter(|(_, origin)| origin.is_none());
-    let mut distance = |place: DVec3| match foot(&mut sampler, place) {
+    let mut distance = |position: DVec3| match foot(&mut sampler, position) {
         Some(foot) => foot.distance,
-        None => sampler.at(place).map_or(0.0, |(distance, _)| f64::from(distance)),
+        None => sampler.at(position).map_or(0.0, |(distance, _)| f64::from(distance)),
     };
     change.delta =
-        made.map(|(place, _)| (distance(*place / cell) * cell).clamp(-most, most) as f32).collect();
+        made.map(|(position, _)| (distance(*position / cell) * cell).clamp(-most, most) as f32).collect();
     Ok(Some(change))
 }
 
-/// The cells in which the mesh does not fit: those of triangles around flagged vertices, those of the places that it should have, and
+/// The cells in which the mesh does not fit: those of triangles around flagged vertices, those of the positions that it should have, and
 /// those in which it has passed through itself.
 fn flagged(unfit: &Unfit<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
     let mut set = CellSet::default();
@@ -273,8 +273,8 @@ fn flagged(unfit: &Unfit<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
             shape.cells_of(triangle).into_iter().for_each(|cell| _ = set.add(cell));
         }
     }
-    for place in unfit.bare {
-        let cell: Coord = cell_of(place);
+    for position in unfit.bare {
+        let cell: Coord = cell_of(position);
         set.add([0, 1, 2].map(|axis| cell[axis] - lattice.origin[axis]));
     }
     overlaps(shape, DEEP, &mut set);
@@ -296,7 +296,7 @@ mod tests {
         let away = |frame: i32| 9.0 - 0.25 * f64::from(if frame < 24 { frame } else { 48 - frame });
         let at = |frame: i32| two_balls(5.5, DVec3::new(away(frame), 0.1, 0.2));
         let mut from = at(0);
-        let mesh = own_surface(&ctx, &from.places);
+        let mesh = own_surface(&ctx, &from.positions);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
         let mut parts = Vec::new();

@@ -1,4 +1,4 @@
-//! Places of the particles' surface that the mesh does not cover, though it covers others of the same part: a bridge that has just
+//! Positions of the particles' surface that the mesh does not cover, though it covers others of the same part: a bridge that has just
 //! grown between two bodies, the rim of a hole. They reveal a change before a vertex jumps there. The thesis (2.3.3) has no such
 //! early test: a thread that forms between vertices moves none of them.
 //!
@@ -18,16 +18,16 @@ use crate::surface::level_set::implicit::{Implicit, SIDE};
 use crate::surface::level_set::isosurface::Isosurface;
 use crate::surface::particles::grid::cell_of;
 
-/// A place of the surface is covered if a triangle of feet is so near (spacings; a cell at least).
+/// A position of the surface is covered if a triangle of feet is so near (spacings; a cell at least).
 const SLACK: f64 = 0.5;
-/// Vertices whose feet are so near to an uncovered place are beside it (spacings; two cells at least).
+/// Vertices whose feet are so near to an uncovered position are beside it (spacings; two cells at least).
 const BESIDE: f64 = 1.0;
 /// Factor by which `BESIDE` is larger at the first frame. Gaps of that frame are no change, but look a little larger or smaller as the
 /// surface moves through the grid.
 const FIRST: f64 = 2.0;
 /// A triangle of feet over more bins than this on an axis does not lie on the surface.
 const LONG: f64 = 1024.0;
-/// Vertices, places or triangles between looks for a cancel.
+/// Vertices, positions or triangles between looks for a cancel.
 const GRAIN: usize = 2048;
 
 /// The mesh without its detail, on the particles' surface.
@@ -42,7 +42,7 @@ pub struct Cover<'a> {
 }
 
 impl Cover<'_> {
-    /// Whether each vertex is beside a place of the surface that is not covered, and these places (cells).
+    /// Whether each vertex is beside a position of the surface that is not covered, and these positions (cells).
     ///
     /// # Errors
     /// Cancel.
@@ -58,11 +58,11 @@ impl Cover<'_> {
         ctx.check()?;
         let bare = self.bare(ctx, &doubtful(phi, surface, parts, &trodden))?;
         let reach = self.reach();
-        let items = bare.iter().zip(0..).map(|(place, index)| (bin_of(place, reach), index)).collect();
+        let items = bare.iter().zip(0..).map(|(position, index)| (bin_of(position, reach), index)).collect();
         let bins = Bins::new(reach, items);
         let is_beside = |foot: &Option<DVec3>| {
             let foot = foot.as_ref()?;
-            let mut near = bins.near(foot).map(|place| (bare[place as usize] - foot).norm());
+            let mut near = bins.near(foot).map(|position| (bare[position as usize] - foot).norm());
             near.any(|distance| distance <= reach).then_some(())
         };
         let flags: Vec<Vec<bool>> = self
@@ -76,19 +76,19 @@ impl Cover<'_> {
         Ok((flags.concat(), bare))
     }
 
-    /// How near to an uncovered place a vertex' foot is beside it (cells).
+    /// How near to an uncovered position a vertex' foot is beside it (cells).
     pub fn reach(&self) -> f64 {
         (BESIDE * self.spacing).max(2.0) * if self.is_first { FIRST } else { 1.0 }
     }
 
     /// Those of some places (cells) that no triangle of feet is near.
-    fn bare(&self, ctx: &Context, places: &[DVec3]) -> Result<Vec<DVec3>> {
-        if places.is_empty() {
+    fn bare(&self, ctx: &Context, positions: &[DVec3]) -> Result<Vec<DVec3>> {
+        if positions.is_empty() {
             return Ok(Vec::new());
         }
         let slack = (SLACK * self.spacing).max(1.0);
         let mut wanted = Marks::default();
-        places.iter().for_each(|place| around(bin_of(place, slack)).for_each(|bin| wanted.set(bin)));
+        positions.iter().for_each(|position| around(bin_of(position, slack)).for_each(|bin| wanted.set(bin)));
         let in_bins = |(chunk, triangles): (usize, &[[u32; 3]])| {
             ctx.check()?;
             let (mut out, mut bins) = (Vec::new(), Vec::new());
@@ -109,13 +109,14 @@ impl Cover<'_> {
             .map(|(n, part)| in_bins((n, part)))
             .collect::<Result<_>>()?;
         let bins = Bins::new(slack, lists.concat());
-        let is_bare =
-            |place: &DVec3| !bins.near(place).any(|triangle| self.distance(triangle, place) <= slack);
-        let parts: Vec<Vec<DVec3>> = places
+        let is_bare = |position: &DVec3| {
+            !bins.near(position).any(|triangle| self.distance(triangle, position) <= slack)
+        };
+        let parts: Vec<Vec<DVec3>> = positions
             .par_chunks(GRAIN)
-            .map(|places| {
+            .map(|positions| {
                 ctx.check()?;
-                Ok(places.iter().filter(|place| is_bare(place)).copied().collect())
+                Ok(positions.iter().filter(|position| is_bare(position)).copied().collect())
             })
             .collect::<Result<_>>()?;
         Ok(parts.concat())
@@ -126,21 +127,21 @@ impl Cover<'_> {
         Some([a?, b?, c?])
     }
 
-    /// Distance (cells) of a place from a triangle of feet.
-    fn distance(&self, triangle: u32, place: &DVec3) -> f64 {
+    /// Distance (cells) of a position from a triangle of feet.
+    fn distance(&self, triangle: u32, position: &DVec3) -> f64 {
         let corners = self.corners(&self.triangles[triangle as usize]).expect("it was listed with its feet");
-        let seen = corners.map(|corner| (corner - place).cast::<f32>().into());
+        let seen = corners.map(|corner| (corner - position).cast::<f32>().into());
         DVec3::from(Triangle::of_cells(seen).closest([0.0; 3]).map(f64::from)).norm()
     }
 }
 
 /// Corners of the surface's triangles (cells), on parts that have feet, in cells without any.
 fn doubtful(phi: &Implicit, surface: &Isosurface, parts: &Parts, trodden: &Marks) -> Vec<DVec3> {
-    let place = |vertex: u32| {
-        let place = surface.in_cells(phi, vertex);
-        (parts.is_covered(vertex) && !trodden.has(cell_of(&place))).then_some(place)
+    let position = |vertex: u32| {
+        let position = surface.in_cells(phi, vertex);
+        (parts.is_covered(vertex) && !trodden.has(cell_of(&position))).then_some(position)
     };
-    (0..surface.vertices() as u32).into_par_iter().with_min_len(4096).filter_map(place).collect()
+    (0..surface.vertices() as u32).into_par_iter().with_min_len(4096).filter_map(position).collect()
 }
 
 /// What lies in cubes of an edge (cells).
@@ -157,9 +158,9 @@ impl Bins {
         Self { edge, items }
     }
 
-    /// What lies in the bin of a place (cells) and in those around it.
-    fn near(&self, place: &DVec3) -> impl Iterator<Item = u32> {
-        let [x, y, z] = bin_of(place, self.edge);
+    /// What lies in the bin of a position (cells) and in those around it.
+    fn near(&self, position: &DVec3) -> impl Iterator<Item = u32> {
+        let [x, y, z] = bin_of(position, self.edge);
         // The three along z are neighbours in the order.
         (x - 1..=x + 1).flat_map(move |x| (y - 1..=y + 1).map(move |y| (x, y))).flat_map(move |(x, y)| {
             let from = self.items.partition_point(|(bin, _)| *bin < [x, y, z - 1]);
@@ -217,8 +218,8 @@ fn bit(cell: Coord) -> u64 {
     1 << (x << 4 | y << 2 | z)
 }
 
-fn bin_of(place: &DVec3, edge: f64) -> Coord {
-    cell_of(&(place / edge))
+fn bin_of(position: &DVec3, edge: f64) -> Coord {
+    cell_of(&(position / edge))
 }
 
 /// Bins from one to another, ascending.
@@ -247,8 +248,8 @@ mod tests {
         for n in 0..=1000 {
             let share = f64::from(n) / 1000.0;
             for end in [corners[1], corners[2]] {
-                let place = corners[0] + (end - corners[0]) * share;
-                assert!(bins.binary_search(&cell_of(&place)).is_ok(), "{place}");
+                let position = corners[0] + (end - corners[0]) * share;
+                assert!(bins.binary_search(&cell_of(&position)).is_ok(), "{position}");
             }
         }
         each_bin([DVec3::zeros(), DVec3::new(3e3, 0.0, 0.0), DVec3::new(0.0, 1.0, 0.0)], 1.0, |_| {

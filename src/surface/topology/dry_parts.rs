@@ -71,7 +71,7 @@ impl Change {
         (six > 0.0).then_some([low, high])
     }
 
-    /// Places (m) of the corners of some triangles.
+    /// Positions (m) of the corners of some triangles.
     fn corners<'a>(&'a self, part: &'a [u32]) -> impl Iterator<Item = [DVec3; 3]> + 'a {
         part.iter()
             .map(move |triangle| self.triangles[*triangle as usize].map(|at| self.vertices[at as usize]))
@@ -89,7 +89,7 @@ mod tests {
     /// From this frame on both drops are far from the ball.
     const AWAY: i32 = 23;
 
-    /// A box of places 1 m apart.
+    /// A box of positions 1 m apart.
     fn lattice(low: DVec3, counts: [u32; 3]) -> impl Iterator<Item = DVec3> {
         let on = move |axis: usize| (0..counts[axis]).map(f64::from);
         on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| low + DVec3::new(x, y, z))))
@@ -102,16 +102,16 @@ mod tests {
         let ball = shell(DVec3::zeros(), 0.0, 4.5);
         let four = lattice(small, [2, 2, 1]);
         let twenty = lattice(large, [5, 2, 2]);
-        let places = ball.into_iter().chain(four).chain(twenty).collect();
+        let positions = ball.into_iter().chain(four).chain(twenty).collect();
         let middles = [small + DVec3::new(0.5, 0.5, 0.0), large + DVec3::new(2.0, 0.5, 0.5)];
-        (numbered(places), middles)
+        (numbered(positions), middles)
     }
 
     /// Follows it to the end: how many specks were taken away, and in each of the last frames the counts of vertices at both drops.
     fn followed(min_drop: usize) -> (usize, Vec<[usize; 2]>) {
         let ctx = Context::new(Pool::new(2).unwrap());
         let mut from = splash(0).0;
-        let mesh = own_surface(&ctx, &from.places);
+        let mesh = own_surface(&ctx, &from.positions);
         let params = Params { rebuild: true, min_drop, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
         let (mut specks, mut counts) = (0, Vec::new());
@@ -122,7 +122,7 @@ mod tests {
             specks += report.change.map_or(0, |change| change.specks);
             if frame >= AWAY {
                 let near = |middle: DVec3| {
-                    tracker.vertices().iter().filter(|place| (**place - middle).norm() < 2.2).count()
+                    tracker.vertices().iter().filter(|position| (**position - middle).norm() < 2.2).count()
                 };
                 counts.push(middles.map(near));
             }
@@ -147,7 +147,7 @@ mod tests {
         let hollow = shell(DVec3::new(-20.0, 0.3, 0.2), 4.0, 6.5);
         assert!(hollow.len() < LEAST && ball.len() >= LEAST, "{} and {}", hollow.len(), ball.len());
         let particles = numbered([ball, hollow].concat());
-        let mesh = own_surface(&ctx, &particles.places);
+        let mesh = own_surface(&ctx, &particles.positions);
         assert_eq!(bodies(&mesh.triangles).len(), 3);
         for every in [false, true] {
             let params = Params { rebuild: true, every, min_drop: LEAST, ..Params::for_spacing(1.0) };
@@ -156,7 +156,7 @@ mod tests {
             for step in 0..3 {
                 let report = tracker.step(&ctx, &particles, &particles, 1.0 / 24.0).unwrap();
                 specks += report.change.map_or(0, |change| change.specks);
-                let left = tracker.vertices().iter().filter(|place| place.x < -10.0).count();
+                let left = tracker.vertices().iter().filter(|position| position.x < -10.0).count();
                 assert!(left == 0, "{left} vertices after step {step}, every = {every}");
             }
             assert!(specks == 1 && bodies(tracker.triangles()).len() == 1, "{specks}, every = {every}");

@@ -7,7 +7,7 @@
 //! | what | found by |
 //! |---|---|
 //! | liquid without a mesh, a mesh without liquid | nodes inside of the one and outside of the other, farther from phi = 0 than vertices around keep |
-//! | needles, and films across a gap | places on triangles, farther from phi = 0 than the corners keep |
+//! | needles, and films across a gap | positions on triangles, farther from phi = 0 than the corners keep |
 //! | hollows of the mesh in which there is liquid | closed parts with a volume below 0 that lie inside of phi |
 //!
 //! Bubbles and drops that the mesh does not cover are known anyway (`topology/uncovered_parts.rs`).
@@ -39,8 +39,8 @@ const GRAIN: usize = 2048;
 const LARGE: i64 = 512;
 /// Vertices are rounded by less than this (cells).
 const ROUNDED: f64 = 0.01;
-/// Most places on a triangle along an axis.
-const PLACES: f64 = 4096.0;
+/// Most positions on a triangle along an axis.
+const POSITIONS: f64 = 4096.0;
 
 /// What it takes to find where a mesh does not fit, all over it.
 pub struct Everywhere<'a> {
@@ -53,7 +53,7 @@ pub struct Everywhere<'a> {
 }
 
 impl Everywhere<'_> {
-    /// Adds the cells in which a mesh does not fit and no vertex says so. Vertices have these places (cells from the lattice's origin);
+    /// Adds the cells in which a mesh does not fit and no vertex says so. Vertices have these positions (cells from the lattice's origin);
     /// `phi` and its distances are on the same grid.
     ///
     /// # Errors
@@ -73,8 +73,8 @@ impl Everywhere<'_> {
         let origin = lattice.origin;
         let mesh = Compared { shape, in_cells, kept: self.kept, keeps, slack, origin, phi, distances };
         for node in mesh.differing(ctx)? {
-            let place = DVec3::from(plus(node, origin).map(f64::from));
-            if !self.specks.iter().any(|speck| is_within(speck, &place)) {
+            let position = DVec3::from(plus(node, origin).map(f64::from));
+            if !self.specks.iter().any(|speck| is_within(speck, &position)) {
                 cells_at(node).for_each(|cell| _ = set.add(cell));
             }
         }
@@ -86,7 +86,7 @@ impl Everywhere<'_> {
 /// A mesh and the particles' surface.
 struct Compared<'a> {
     shape: &'a Shape,
-    /// Places of vertices (cells from the lattice's origin).
+    /// Positions of vertices (cells from the lattice's origin).
     in_cells: &'a [DVec3],
     /// See [`Everywhere::kept`].
     kept: &'a [f32],
@@ -172,8 +172,9 @@ impl Compared<'_> {
             let mut out = Passed::default();
             for names in triangles {
                 let [a, b, c] = self.corners(names);
-                let side =
-                    |place: DVec3, by: f64| [0, 1, 2].map(|axis| ((place[axis] + by).floor() as i32) >> 3);
+                let side = |position: DVec3, by: f64| {
+                    [0, 1, 2].map(|axis| ((position[axis] + by).floor() as i32) >> 3)
+                };
                 let low = side(a.inf(&b).inf(&c), -ROUNDED);
                 let high = side(a.sup(&b).sup(&c), ROUNDED);
                 let keeps = self.most_kept(names);
@@ -196,7 +197,7 @@ impl Compared<'_> {
         Ok(all)
     }
 
-    /// Cells with places of triangles that are farther from phi = 0 than their corners keep.
+    /// Cells with positions of triangles that are farther from phi = 0 than their corners keep.
     fn stray(&self, ctx: &Context) -> Result<Vec<Coord>> {
         let in_cells = |sampler: &mut Sampler<'_>, triangles: &[[u32; 3]]| {
             ctx.check()?;
@@ -209,9 +210,9 @@ impl Compared<'_> {
                     continue;
                 }
                 let allowed = self.slack + self.most_kept(names);
-                each_place([a, b, c], |place| {
-                    if self.phi_at(sampler, place).abs() > allowed {
-                        out.push(cell_of(&place));
+                each_position([a, b, c], |position| {
+                    if self.phi_at(sampler, position).abs() > allowed {
+                        out.push(cell_of(&position));
                     }
                 });
             }
@@ -239,7 +240,9 @@ impl Compared<'_> {
             let Some([first, ..]) = corners().next() else { continue };
             let six = corners().map(|[a, b, c]| (a - first).dot(&(b - first).cross(&(c - first))));
             let is_hollow = six.sum::<f64>() < 0.0;
-            if is_hollow && corners().flatten().all(|place| self.phi_at(&mut sampler, place) < -self.slack) {
+            if is_hollow
+                && corners().flatten().all(|position| self.phi_at(&mut sampler, position) < -self.slack)
+            {
                 let cells = part.iter().flat_map(|triangle| self.shape.cells_of(*triangle)).collect();
                 self.fill(cells, set);
             }
@@ -291,11 +294,11 @@ impl Compared<'_> {
         }
     }
 
-    /// phi at a place (cells).
-    fn phi_at(&self, sampler: &mut Sampler<'_>, place: DVec3) -> f32 {
-        match sampler.at(place + DVec3::from(self.origin.map(f64::from))) {
+    /// phi at a position (cells).
+    fn phi_at(&self, sampler: &mut Sampler<'_>, position: DVec3) -> f32 {
+        match sampler.at(position + DVec3::from(self.origin.map(f64::from))) {
             Some((phi, _)) => phi,
-            None => self.phi_of(cell_of(&place)),
+            None => self.phi_of(cell_of(&position)),
         }
     }
 
@@ -338,11 +341,11 @@ fn longest_first([a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
     }
 }
 
-/// Calls `see` with places on a triangle whose first edge is its longest, a cell apart or less.
-fn each_place([a, b, c]: [DVec3; 3], mut see: impl FnMut(DVec3)) {
+/// Calls `see` with positions on a triangle whose first edge is its longest, a cell apart or less.
+fn each_position([a, b, c]: [DVec3; 3], mut see: impl FnMut(DVec3)) {
     let length = (b - a).norm();
     let height = if length > 0.0 { (b - a).cross(&(c - a)).norm() / length } else { 0.0 };
-    let parts = |length: f64| length.ceil().clamp(1.0, PLACES);
+    let parts = |length: f64| length.ceil().clamp(1.0, POSITIONS);
     let rows = parts(height);
     for row in 0..=rows as u32 {
         let share = f64::from(row) / rows;
@@ -368,8 +371,8 @@ mod tests {
     }
 
     /// What becomes of a mesh on particles that stay where they are.
-    fn followed(ctx: &Context, mesh: &TriMesh, places: &[DVec3], every: bool) -> Tracker {
-        let particles = numbered(places.to_vec());
+    fn followed(ctx: &Context, mesh: &TriMesh, positions: &[DVec3], every: bool) -> Tracker {
+        let particles = numbered(positions.to_vec());
         let params = Params { rebuild: true, every, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(ctx, params, mesh, &particles).unwrap();
         for step in 0..3 {
@@ -389,13 +392,13 @@ mod tests {
     #[test]
     fn a_hollow_with_liquid_in_it_is_filled() {
         let ctx = context();
-        let places = shell(DVec3::zeros(), 0.0, 6.5);
-        let mut mesh = own_surface(&ctx, &places);
+        let positions = shell(DVec3::zeros(), 0.0, 6.5);
+        let mut mesh = own_surface(&ctx, &positions);
         let hollow = own_surface(&ctx, &shell(DVec3::new(2.5, 0.3, 0.2), 0.0, 2.0));
         let whole = mesh.volume();
         mesh.append(&hollow.clone().reversed());
-        assert!(followed(&ctx, &mesh, &places, false).triangles() == mesh.triangles);
-        let filled = followed(&ctx, &mesh, &places, true).mesh();
+        assert!(followed(&ctx, &mesh, &positions, false).triangles() == mesh.triangles);
+        let filled = followed(&ctx, &mesh, &positions, true).mesh();
         let off = (filled.volume() - whole).abs();
         assert!(parts(&filled) == 1 && off < 0.1 * hollow.volume(), "{off} m3 of {}", hollow.volume());
     }
@@ -422,28 +425,28 @@ mod tests {
     #[test]
     fn a_needle_across_a_gap_is_cut() {
         let ctx = context();
-        let places = two_balls(3.5, DVec3::new(-7.0, 0.0, 0.0)).places;
-        let mut mesh = own_surface(&ctx, &places);
+        let positions = two_balls(3.5, DVec3::new(-7.0, 0.0, 0.0)).positions;
+        let mut mesh = own_surface(&ctx, &positions);
         // The tip of a triangle that looks at the other ball is pulled up to it.
         let x = |name: u32| mesh.positions[name as usize].x;
         let middle = |triangle: &usize| mesh.triangles[*triangle].map(x).iter().sum::<f32>();
         let left = (0..mesh.triangles.len()).filter(|triangle| middle(triangle) < 0.0);
         let nearest = left.max_by(|a, b| middle(a).total_cmp(&middle(b))).unwrap();
-        let right = mesh.positions.iter().filter(|place| place.x > 0.0);
+        let right = mesh.positions.iter().filter(|position| position.x > 0.0);
         let tip = right.min_by(|a, b| a.x.total_cmp(&b.x)).unwrap() - Vec3::new(0.4, 0.0, 0.0);
         let [a, b, c] = mesh.triangles.swap_remove(nearest);
         let at = mesh.positions.len() as u32;
         mesh.positions.push(tip);
         mesh.triangles.extend([[a, b, at], [b, c, at], [c, a, at]]);
         let longest = |tracker: &Tracker| {
-            let places = tracker.vertices();
-            let corners = tracker.triangles().iter().map(|names| names.map(|name| places[name as usize]));
+            let positions = tracker.vertices();
+            let corners = tracker.triangles().iter().map(|names| names.map(|name| positions[name as usize]));
             corners
                 .map(|[a, b, c]| (a - b).norm().max((b - c).norm()).max((c - a).norm()))
                 .fold(0.0, f64::max)
         };
-        let without = longest(&followed(&ctx, &mesh, &places, false));
-        let tracker = followed(&ctx, &mesh, &places, true);
+        let without = longest(&followed(&ctx, &mesh, &positions, false));
+        let tracker = followed(&ctx, &mesh, &positions, true);
         assert_eq!(parts(&tracker.mesh()), 2);
         let with = longest(&tracker);
         assert!(without > 4.0 && with < 2.5, "{without} m, {with} m");
@@ -452,16 +455,16 @@ mod tests {
     #[test]
     fn detail_stays_as_it_is() {
         let ctx = context();
-        let places = shell(DVec3::zeros(), 0.0, 6.5);
-        let mut mesh = own_surface(&ctx, &places);
+        let positions = shell(DVec3::zeros(), 0.0, 6.5);
+        let mut mesh = own_surface(&ctx, &positions);
         // A bump of 2 m on one side, a dent of 1.5 m on the other.
-        for place in &mut mesh.positions {
-            let off = (place.x * place.x + place.z * place.z) / 9.0;
+        for position in &mut mesh.positions {
+            let off = (position.x * position.x + position.z * position.z) / 9.0;
             let share = (1.0 - off).max(0.0) * (1.0 - off).max(0.0);
-            let up = place.normalize() * (share * if place.y > 0.0 { 2.0 } else { -1.5 });
-            *place += up;
+            let up = position.normalize() * (share * if position.y > 0.0 { 2.0 } else { -1.5 });
+            *position += up;
         }
-        let tracker = followed(&ctx, &mesh, &places, true);
+        let tracker = followed(&ctx, &mesh, &positions, true);
         assert!(tracker.triangles() == mesh.triangles);
         let now = tracker.mesh().positions;
         let far = now.iter().zip(&mesh.positions).map(|(a, b)| (a - b).norm());

@@ -56,8 +56,8 @@ mod tests {
         vertices[3] = DVec3::repeat(1e6);
         let is_lost = [false, false, true, true, true, true];
         gather(&before, &triangles, &is_lost, &mut vertices);
-        for (place, first) in vertices.iter().zip(&before) {
-            assert!((place - first - DVec3::y()).norm() < 1e-12, "{place:?}");
+        for (position, first) in vertices.iter().zip(&before) {
+            assert!((position - first - DVec3::y()).norm() < 1e-12, "{position:?}");
         }
         // Without any that is known nothing moves.
         let mut alone = vertices.clone();

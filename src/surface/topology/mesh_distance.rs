@@ -47,7 +47,7 @@ pub struct Gamma<'a> {
 }
 
 impl<'a> Gamma<'a> {
-    /// Matches it around flagged cells. Vertices have these places (cells from the lattice's origin); `phi` and its distances are
+    /// Matches it around flagged cells. Vertices have these positions (cells from the lattice's origin); `phi` and its distances are
     /// on the same grid.
     ///
     /// # Errors
@@ -87,7 +87,7 @@ impl<'a> Gamma<'a> {
         };
         let own: Vec<Box<Values>> = near.par_iter().map_init(Search::default, one).collect::<Result<_>>()?;
         let mut nodes = Vec::new();
-        let mut places = Vec::new();
+        let mut positions = Vec::new();
         for (slot, block) in blocks.iter().enumerate() {
             let there = [0, 1, 2].map(|axis| block[axis] + origin[axis]);
             let known = distances.find(there).map(|slot| distances.values(slot));
@@ -95,19 +95,19 @@ impl<'a> Gamma<'a> {
                 continue;
             }
             for at in 0..VOXELS {
-                let place = node(*block, at);
+                let position = node(*block, at);
                 let phi = known.map_or_else(|| far(phi, distances.reach(), there, at), |values| values[at]);
                 let size = own[slot][at].clamp(LEAST, KNOWN);
-                let gamma = if shape.pierces.winding(place) > 0 { -size } else { size };
-                nodes.push(Node { place, gamma, phi, is_flagged: is_flagged(flagged, place) });
-                places.push((slot, at));
+                let gamma = if shape.pierces.winding(position) > 0 { -size } else { size };
+                nodes.push(Node { position, gamma, phi, is_flagged: is_flagged(flagged, position) });
+                positions.push((slot, at));
             }
         }
         let matching = Matching { reach: REACH, ..Matching::default() };
         let matched = match_topology(ctx, &nodes, &matching)?;
         let mut values: Vec<Values> = own.into_iter().map(|values| *values).collect();
         let mut changed = vec![[0; DIM]; blocks.len()];
-        for ((node, gamma), (slot, at)) in nodes.iter().zip(&matched.gamma).zip(places) {
+        for ((node, gamma), (slot, at)) in nodes.iter().zip(&matched.gamma).zip(positions) {
             values[slot][at] = *gamma;
             changed[slot][at >> 6] |= u64::from(gamma.to_bits() != node.gamma.to_bits()) << (at & 63);
         }
@@ -194,8 +194,9 @@ fn near(
     let mut lists: Vec<Vec<u32>> = vec![Vec::new(); blocks.len()];
     for (triangle, names) in (0..).zip(&shape.triangles) {
         let v = names.map(|name| in_cells[name as usize]);
-        let side =
-            |place: DVec3, by: f32| [0, 1, 2].map(|axis| ((place[axis] + f64::from(by)).floor() as i32) >> 3);
+        let side = |position: DVec3, by: f32| {
+            [0, 1, 2].map(|axis| ((position[axis] + f64::from(by)).floor() as i32) >> 3)
+        };
         let low = side(v[0].inf(&v[1]).inf(&v[2]), -KNOWN);
         let high = side(v[0].sup(&v[1]).sup(&v[2]), KNOWN + 1.0);
         let size = (0..3).map(|axis| i64::from(high[axis] - low[axis]) + 1).product::<i64>();

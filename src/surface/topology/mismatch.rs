@@ -30,15 +30,15 @@ impl Tracker {
         let mut flags: Vec<bool> =
             next.flags.iter().zip(&next.delta).map(|(flag, delta)| *flag && !delta.is_nan()).collect();
         self.wait_alone(&mut flags, &covered.bare);
-        let bin = |place: &DVec3| cell_of(&(place / covered.reach));
+        let bin = |position: &DVec3| cell_of(&(position / covered.reach));
         let beside =
             feet.iter().zip(&covered.bare).filter(|(_, is)| **is).filter_map(|(foot, _)| foot.as_ref());
         let mut beside: Vec<Coord> = beside.map(bin).collect();
         beside.par_sort_unstable();
         beside.dedup();
         let mut bare: Vec<DVec3> =
-            covered.places.iter().filter(|place| is_near(&beside, bin(place))).copied().collect();
-        bare.extend_from_slice(&covered.lacking.places);
+            covered.positions.iter().filter(|position| is_near(&beside, bin(position))).copied().collect();
+        bare.extend_from_slice(&covered.lacking.positions);
         let Params { spacing, cell, change: farthest, every, .. } = self.params;
         let specks = &covered.lacking.specks;
         let everywhere = every.then(|| Everywhere { kept: &next.delta, spacing: 1.0 / cell, specks });
@@ -101,7 +101,7 @@ mod tests {
     fn a_vertex_that_jumps_alone_has_a_step_to_come_back() {
         let particles = numbered(shell(DVec3::zeros(), 0.0, 3.2));
         let ctx = Context::new(Pool::new(1).unwrap());
-        let mesh = own_surface(&ctx, &particles.places);
+        let mesh = own_surface(&ctx, &particles.positions);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &particles).unwrap();
         let none = vec![false; mesh.positions.len()];

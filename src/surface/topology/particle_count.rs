@@ -1,6 +1,6 @@
 //! How many particles closed parts of a surface hold: drops, crumbs.
 //!
-//! The particles' surface passes close to those of small drops, and outside of some: of 20 at random places 10 to 14 lie inside, nearly
+//! The particles' surface passes close to those of small drops, and outside of some: of 20 at random positions 10 to 14 lie inside, nearly
 //! all others less than half a spacing from it. So those beside a part count too, if any lies inside.
 
 use super::mesh_distance::between;
@@ -17,14 +17,14 @@ const BESIDE: f64 = 0.5;
 /// The longest part of those in bins of one size over the shortest.
 const SPREAD: f64 = 4.0;
 
-/// Least and greatest place of a part.
+/// Least and greatest position of a part.
 pub type Bounds = [DVec3; 2];
 
 /// Particles, of which a part of the mesh must hold a minimum count.
 #[derive(Debug, Clone, Copy)]
 pub struct Crowd<'a> {
-    /// Their places (m).
-    pub places: &'a [DVec3],
+    /// Their positions (m).
+    pub positions: &'a [DVec3],
     /// Initial distance between them (m).
     pub spacing: f64,
     /// How many a part must hold, at least 1.
@@ -33,14 +33,14 @@ pub struct Crowd<'a> {
 
 impl Crowd<'_> {
     /// How many particles each of some closed parts holds, of which these are the bounds (m), counted up to [`Crowd::least`]: 0 if none
-    /// lies inside, else those inside and beside it. `mesh` gives a part's triangles, outward, their places seen from its least one; it
+    /// lies inside, else those inside and beside it. `mesh` gives a part's triangles, outward, their positions seen from its least one; it
     /// is asked where particles come near.
     pub fn held(&self, parts: &[Bounds], mesh: impl Fn(usize) -> TriMesh) -> Vec<usize> {
         let mut trees: Vec<Option<Bvh>> = Vec::new();
         trees.resize_with(parts.len(), || None);
-        let mut counts = count(parts, self.places, &vec![self.least; parts.len()], |part, place| {
+        let mut counts = count(parts, self.positions, &vec![self.least; parts.len()], |part, position| {
             let tree = trees[part].get_or_insert_with(|| Bvh::new(&mesh(part)));
-            tree.surrounding(place - parts[part][0], ASLANT) > 0
+            tree.surrounding(position - parts[part][0], ASLANT) > 0
         });
         let lacking = |count: &usize| if *count == 0 { 0 } else { self.least - count };
         let lacking: Vec<usize> = counts.iter().map(lacking).collect();
@@ -51,8 +51,8 @@ impl Crowd<'_> {
             .collect();
         let mut surfaces: Vec<Option<NearestTree>> = Vec::new();
         surfaces.resize_with(parts.len(), || None);
-        let beside = count(&wider, self.places, &lacking, |part, place| {
-            let seen = place - parts[part][0];
+        let beside = count(&wider, self.positions, &lacking, |part, position| {
+            let seen = position - parts[part][0];
             let surface = surfaces[part].get_or_insert_with(|| NearestTree::new(&mesh(part)));
             let is_near = surface.nearest(seen).is_some_and(|nearest| nearest.distance <= margin);
             is_near && trees[part].as_ref().is_some_and(|tree| tree.surrounding(seen, ASLANT) <= 0)
@@ -62,23 +62,24 @@ impl Crowd<'_> {
     }
 }
 
-/// Counts the places within each of some bounds that are of the part, up to as many as it lacks.
+/// Counts the positions within each of some bounds that are of the part, up to as many as it lacks.
 fn count(
     parts: &[Bounds],
-    places: &[DVec3],
+    positions: &[DVec3],
     lacking: &[usize],
     mut is_of: impl FnMut(usize, DVec3) -> bool,
 ) -> Vec<usize> {
     let mut counts = vec![0; parts.len()];
     let mut all = Bins::of(parts, (0..parts.len()).filter(|part| lacking[*part] > 0).collect());
-    for place in places {
+    for position in positions {
         if all.is_empty() {
             break;
         }
         for bins in &mut all {
             let mut full = 0;
-            for part in bins.near(place) {
-                if counts[part] < lacking[part] && is_within(&parts[part], place) && is_of(part, *place) {
+            for part in bins.near(position) {
+                if counts[part] < lacking[part] && is_within(&parts[part], position) && is_of(part, *position)
+                {
                     counts[part] += 1;
                     full += usize::from(counts[part] == lacking[part]);
                 }
@@ -119,7 +120,7 @@ impl Bins {
             let count = rest.partition_point(|part| length(*part) <= most).max(1);
             let (own, longer) = rest.split_at(count);
             let edge = length(own[count - 1]);
-            let bin = |place: DVec3| cell_of(&(place / edge));
+            let bin = |position: DVec3| cell_of(&(position / edge));
             let mut listed: Vec<(Coord, usize)> = own
                 .iter()
                 .flat_map(|part| {
@@ -134,38 +135,38 @@ impl Bins {
         all
     }
 
-    /// The parts in the bin of a place: all whose bounds hold it, and others.
-    fn near(&self, place: &DVec3) -> impl Iterator<Item = usize> {
-        // The quotient of a place between two others is never outside of theirs.
-        let bin = cell_of(&(place / self.edge));
+    /// The parts in the bin of a position: all whose bounds hold it, and others.
+    fn near(&self, position: &DVec3) -> impl Iterator<Item = usize> {
+        // The quotient of a position between two others is never outside of theirs.
+        let bin = cell_of(&(position / self.edge));
         let first = self.listed.partition_point(|(other, _)| *other < bin);
         self.listed[first..].iter().take_while(move |(other, _)| *other == bin).map(|(_, part)| *part)
     }
 }
 
 /// Which of some places (m) lie inside of any of some closed parts, of which these are the bounds (m); `mesh` as for [`Crowd::held`].
-pub fn are_inside(places: &[DVec3], parts: &[Bounds], mesh: impl Fn(usize) -> TriMesh) -> Vec<bool> {
-    let mut are = vec![false; places.len()];
+pub fn are_inside(positions: &[DVec3], parts: &[Bounds], mesh: impl Fn(usize) -> TriMesh) -> Vec<bool> {
+    let mut are = vec![false; positions.len()];
     for (part, bounds) in parts.iter().enumerate() {
         let mut tree: Option<Bvh> = None;
-        for (place, is_inside) in places.iter().zip(&mut are) {
-            if !*is_inside && is_within(bounds, place) {
+        for (position, is_inside) in positions.iter().zip(&mut are) {
+            if !*is_inside && is_within(bounds, position) {
                 let tree = tree.get_or_insert_with(|| Bvh::new(&mesh(part)));
-                *is_inside = tree.surrounding(place - bounds[0], ASLANT) > 0;
+                *is_inside = tree.surrounding(position - bounds[0], ASLANT) > 0;
             }
         }
     }
     are
 }
 
-/// Whether a place lies within bounds.
-pub fn is_within([low, high]: &Bounds, place: &DVec3) -> bool {
-    (0..3).all(|axis| (low[axis]..=high[axis]).contains(&place[axis]))
+/// Whether a position lies within bounds.
+pub fn is_within([low, high]: &Bounds, position: &DVec3) -> bool {
+    (0..3).all(|axis| (low[axis]..=high[axis]).contains(&position[axis]))
 }
 
-/// Triangles as a mesh, their places seen from another; each has corners of its own.
-pub fn seen_from(place: DVec3, triangles: &[[DVec3; 3]]) -> TriMesh {
-    let positions = triangles.as_flattened().iter().map(|corner| (corner - place).cast()).collect();
+/// Triangles as a mesh, their positions seen from another; each has corners of its own.
+pub fn seen_from(position: DVec3, triangles: &[[DVec3; 3]]) -> TriMesh {
+    let positions = triangles.as_flattened().iter().map(|corner| (corner - position).cast()).collect();
     let triangles = (0..triangles.len() as u32).map(|at| [3 * at, 3 * at + 1, 3 * at + 2]).collect();
     TriMesh { positions, triangles }
 }
@@ -175,7 +176,7 @@ mod tests {
     use super::*;
 
     /// How many particles are held by a hundred cubes of an edge of 1 along a line, and by a box that holds them all.
-    fn held(places: &[DVec3], spacing: f64, least: usize) -> Vec<usize> {
+    fn held(positions: &[DVec3], spacing: f64, least: usize) -> Vec<usize> {
         let mut parts: Vec<Bounds> = (0..100)
             .map(|n| DVec3::new(3.0 * f64::from(n), 0.0, 0.0))
             .map(|low| [low, low + DVec3::repeat(1.0)])
@@ -185,7 +186,7 @@ mod tests {
             100 => TriMesh::cuboid([0.0; 3], [401.0, 3.0, 3.0]),
             _ => TriMesh::cuboid([0.0; 3], [1.0; 3]),
         };
-        Crowd { places, spacing, least }.held(&parts, mesh)
+        Crowd { positions, spacing, least }.held(&parts, mesh)
     }
 
     fn middle(n: u32) -> DVec3 {
@@ -195,11 +196,11 @@ mod tests {
     #[test]
     fn particles_are_counted_in_parts_of_all_lengths() {
         // One in every second cube, another in each tenth; one between cubes, one outside of all.
-        let mut places: Vec<DVec3> = (0..100).filter(|n| n % 2 == 0).map(middle).collect();
-        places.extend((0..100).filter(|n| n % 10 == 0).map(|n| middle(n) + DVec3::repeat(0.1)));
-        places.extend([DVec3::new(1.6, 0.5, 0.5), DVec3::new(0.5, 9.0, 0.5)]);
+        let mut positions: Vec<DVec3> = (0..100).filter(|n| n % 2 == 0).map(middle).collect();
+        positions.extend((0..100).filter(|n| n % 10 == 0).map(|n| middle(n) + DVec3::repeat(0.1)));
+        positions.extend([DVec3::new(1.6, 0.5, 0.5), DVec3::new(0.5, 9.0, 0.5)]);
         for least in [1, 2, 100] {
-            for (n, count) in held(&places, 1.0, least).into_iter().enumerate() {
+            for (n, count) in held(&positions, 1.0, least).into_iter().enumerate() {
                 let all = if n == 100 { 61 } else { usize::from(n % 2 == 0) + usize::from(n % 10 == 0) };
                 assert_eq!(count, all.min(least), "part {n} up to {least}");
             }
@@ -220,24 +221,24 @@ mod tests {
             .map(|(low, size)| [low, low + size])
             .collect();
         // Some on the very bounds.
-        let mut places: Vec<DVec3> = (0..3000).map(|_| any(44.0) - DVec3::repeat(22.0)).collect();
-        places.extend(parts.as_flattened());
+        let mut positions: Vec<DVec3> = (0..3000).map(|_| any(44.0) - DVec3::repeat(22.0)).collect();
+        positions.extend(parts.as_flattened());
         let lacking: Vec<usize> = (0..parts.len()).map(|n| n % 3 * 5).collect();
-        let counts = count(&parts, &places, &lacking, |part, _| part != 7);
+        let counts = count(&parts, &positions, &lacking, |part, _| part != 7);
         for (n, bounds) in parts.iter().enumerate() {
-            let all = places.iter().filter(|place| n != 7 && is_within(bounds, place)).count();
+            let all = positions.iter().filter(|position| n != 7 && is_within(bounds, position)).count();
             assert_eq!(counts[n], all.min(lacking[n]), "part {n}: {bounds:?}");
         }
     }
 
     #[test]
-    fn places_in_any_part_are_told() {
+    fn positions_in_any_part_are_told() {
         let parts = [DVec3::zeros(), DVec3::new(5.0, 0.0, 0.0)].map(|low| [low, low + DVec3::repeat(1.0)]);
         // The mesh of the second fills a part of its bounds alone.
         let mesh = |part: usize| TriMesh::cuboid([0.0; 3], [1.0, [1.0, 0.5][part], 1.0]);
-        let places = [0.3, 5.3, 3.0].map(|x| DVec3::new(x, 0.7, 0.6));
-        assert_eq!(are_inside(&places, &parts, mesh), [true, false, false]);
-        let lower = places.map(|place| place - DVec3::new(0.0, 0.4, 0.0));
+        let positions = [0.3, 5.3, 3.0].map(|x| DVec3::new(x, 0.7, 0.6));
+        assert_eq!(are_inside(&positions, &parts, mesh), [true, false, false]);
+        let lower = positions.map(|position| position - DVec3::new(0.0, 0.4, 0.0));
         assert_eq!(are_inside(&lower, &parts, mesh), [true, true, false]);
     }
 
@@ -245,10 +246,10 @@ mod tests {
     fn those_beside_count_where_one_is_inside() {
         // Above the first cube and above the second; inside of the first alone.
         let above = |n: u32, by: f64| middle(n) + DVec3::new(0.0, 0.55 + by, 0.0);
-        let places = [above(0, 0.4), middle(0), above(0, 0.6), above(1, 0.4), above(0, 0.1)];
-        let counts = held(&places, 1.0, 8);
+        let positions = [above(0, 0.4), middle(0), above(0, 0.6), above(1, 0.4), above(0, 0.1)];
+        let counts = held(&positions, 1.0, 8);
         assert_eq!([counts[0], counts[1], counts[2]], [3, 0, 0]);
-        assert_eq!(held(&places, 0.5, 8)[0], 2);
-        assert_eq!(held(&places, 1.0, 2)[0], 2);
+        assert_eq!(held(&positions, 0.5, 8)[0], 2);
+        assert_eq!(held(&positions, 1.0, 2)[0], 2);
     }
 }

@@ -13,7 +13,7 @@ use crate::surface::particles::grid::cell_of;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Apart {
     /// Its middle: the mean of its corners (m).
-    pub place: DVec3,
+    pub position: DVec3,
     /// What it encloses (m3); negative: a bubble.
     pub volume: f64,
     /// Its triangles.
@@ -32,8 +32,8 @@ pub struct Wanted<'a> {
 /// What a mesh should have, and does not.
 #[derive(Debug, Default)]
 pub struct Lacking {
-    /// Places (cells) on the particles' surface.
-    pub places: Vec<DVec3>,
+    /// Positions (cells) on the particles' surface.
+    pub positions: Vec<DVec3>,
     /// Bounds (cells) of drops that it should not have: they are too small.
     pub specks: Vec<Bounds>,
 }
@@ -93,18 +93,18 @@ impl Parts {
         if wanted.crowd.least > 1 {
             let (drops, bubbles): (Vec<usize>, Vec<usize>) =
                 (0..six.len()).filter(|part| is_wanted[*part]).partition(|part| six[*part] > 0.0);
-            let first = |part: usize| firsts[part].map(|place| (part, place * phi.cell()));
+            let first = |part: usize| firsts[part].map(|position| (part, position * phi.cell()));
             let bubbles: Vec<(usize, DVec3)> = bubbles.into_iter().filter_map(first).collect();
             let (unwanted, bounds) = self.specks(phi, surface, (&drops, &bubbles), &wanted.crowd);
             unwanted.into_iter().for_each(|part| is_wanted[part] = false);
             specks = bounds;
         }
         let vertices = (0..).zip(&self.of_vertex).filter(|(_, part)| is_wanted[**part as usize]);
-        let places = vertices.map(|(vertex, _)| surface.in_cells(phi, vertex)).collect();
-        Lacking { places, specks }
+        let positions = vertices.map(|(vertex, _)| surface.in_cells(phi, vertex)).collect();
+        Lacking { positions, specks }
     }
 
-    /// Those of some drops, ascending, that hold too few particles, those of some bubbles, with a place (m) on each, that lie in such a
+    /// Those of some drops, ascending, that hold too few particles, those of some bubbles, with a position (m) on each, that lie in such a
     /// drop, and the bounds (cells) of the drops. The meshes that they would get are counted in the same way.
     fn specks(
         &self,
@@ -125,18 +125,20 @@ impl Parts {
             .map(|triangles| {
                 let corners = triangles.as_flattened();
                 let first = corners.first().copied().unwrap_or_default();
-                corners.iter().fold([first; 2], |[low, high], place| [low.inf(place), high.sup(place)])
+                corners
+                    .iter()
+                    .fold([first; 2], |[low, high], position| [low.inf(position), high.sup(position)])
             })
             .collect();
         let mesh = |slot: usize| seen_from(bounds[slot][0], &triangles[slot]);
         let counts = crowd.held(&bounds, mesh);
         let few: Vec<usize> = (0..drops.len()).filter(|slot| counts[*slot] < crowd.least).collect();
         let few_bounds: Vec<Bounds> = few.iter().map(|slot| bounds[*slot]).collect();
-        let places: Vec<DVec3> = bubbles.iter().map(|(_, place)| *place).collect();
-        let are_in = are_inside(&places, &few_bounds, |at| mesh(few[at]));
+        let positions: Vec<DVec3> = bubbles.iter().map(|(_, position)| *position).collect();
+        let are_in = are_inside(&positions, &few_bounds, |at| mesh(few[at]));
         let bubbles = bubbles.iter().zip(are_in).filter(|(_, is_in)| *is_in).map(|((part, _), _)| *part);
         let parts = few.iter().map(|slot| drops[*slot]).chain(bubbles).collect();
-        let in_cells = |bounds: Bounds| bounds.map(|place| place / phi.cell());
+        let in_cells = |bounds: Bounds| bounds.map(|position| position / phi.cell());
         (parts, few_bounds.into_iter().map(in_cells).collect())
     }
 
@@ -163,7 +165,7 @@ impl Parts {
         }
         let cell = phi.cell();
         let told = sums.into_iter().filter(|sum| sum.3 > 0).map(|(corners, count, six, triangles)| Apart {
-            place: corners / count as f64 * cell,
+            position: corners / count as f64 * cell,
             volume: six / 6.0 * cell.powi(3),
             triangles,
         });

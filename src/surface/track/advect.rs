@@ -44,8 +44,8 @@ const DOUBLINGS: u32 = 8;
 /// Farthest cell.
 const LIMIT: f64 = (i32::MAX / 4) as f64;
 
-/// Where particles carry places (m) from one frame to the next, `dt` (s, over 0) later: what
-/// [`Tracker::step`](crate::surface::Tracker::step) does to its vertices before it projects them, for any places, with the parameters' spacing
+/// Where particles carry positions (m) from one frame to the next, `dt` (s, over 0) later: what
+/// [`Tracker::step`](crate::surface::Tracker::step) does to its vertices before it projects them, for any positions, with the parameters' spacing
 /// and weighting.
 ///
 /// # Errors
@@ -53,7 +53,7 @@ const LIMIT: f64 = (i32::MAX / 4) as f64;
 /// velocities; cancel.
 pub fn carried(
     ctx: &Context,
-    places: &[DVec3],
+    positions: &[DVec3],
     from: &Particles,
     to: &Particles,
     dt: f64,
@@ -63,7 +63,7 @@ pub fn carried(
     validate_step(from, to, dt)?;
     ctx.phase("advect", || {
         let paths = Paths::between(from, to, dt)?;
-        let mut out = places.to_vec();
+        let mut out = positions.to_vec();
         advect(ctx, &mut out, &paths, params.spacing, params.weighting)?;
         Ok(out)
     })
@@ -73,10 +73,10 @@ pub fn carried(
 #[derive(Default)]
 struct Scratch {
     of_cell: Near,
-    of_place: Near,
+    of_position: Near,
 }
 
-/// Carries places (m) along the ways of particles whose spacing is `spacing` (m). Returns the count of parts.
+/// Carries positions (m) along the ways of particles whose spacing is `spacing` (m). Returns the count of parts.
 ///
 /// # Errors
 /// Particles too far apart; cancel.
@@ -123,8 +123,8 @@ struct Field<'a> {
 /// Sorts vertices (m) by cells of an edge (m). `order` are their cells and numbers, as they were sorted before.
 fn sort(vertices: &[DVec3], edge: f64, order: &mut [(Coord, u32)]) {
     order.par_iter_mut().with_min_len(4096).for_each(|(cell, vertex)| {
-        let place = vertices[*vertex as usize];
-        *cell = [0, 1, 2].map(|axis| (place[axis] / edge).floor().clamp(-LIMIT, LIMIT) as i32);
+        let position = vertices[*vertex as usize];
+        *cell = [0, 1, 2].map(|axis| (position[axis] / edge).floor().clamp(-LIMIT, LIMIT) as i32);
     });
     order.par_sort_unstable();
 }
@@ -170,12 +170,12 @@ impl Field<'_> {
 
     /// The maps at nodes in a particles' cell; none where no particle is near.
     fn maps_at(&self, nodes: &[Coord], scratch: &mut Scratch) -> Vec<Option<Map>> {
-        let Scratch { of_cell, of_place } = scratch;
+        let Scratch { of_cell, of_position } = scratch;
         let cell = nodes[0].map(|x| x >> 1);
         self.gather(cell, 2, of_cell);
         let map = |node: &Coord| {
             let at = [0, 1, 2].map(|axis| (node[axis] - 2 * cell[axis]) as f32);
-            sums(of_cell, of_place, at, MAP_RADIUS).map(|sums| sums.map())
+            sums(of_cell, of_position, at, MAP_RADIUS).map(|sums| sums.map())
         };
         nodes.iter().map(map).collect()
     }
@@ -191,12 +191,12 @@ impl Field<'_> {
         let groups: Vec<&[(Coord, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
         let follow = |group: &[(Coord, u32)]| {
             let cell = group[0].0;
-            let (mut of_cell, mut of_place) = (Near::default(), Near::default());
+            let (mut of_cell, mut of_position) = (Near::default(), Near::default());
             self.gather(cell, 1, &mut of_cell);
             let way = |(_, vertex): &(Coord, u32)| {
-                let place = vertices[*vertex as usize];
-                let sums = sums(&of_cell, &mut of_place, self.seen_from(cell, place), MEAN_RADIUS);
-                sums.map_or_else(|| self.mean_far(place), |sums| sums.mean()) * self.spacing
+                let position = vertices[*vertex as usize];
+                let sums = sums(&of_cell, &mut of_position, self.seen_from(cell, position), MEAN_RADIUS);
+                sums.map_or_else(|| self.mean_far(position), |sums| sums.mean()) * self.spacing
             };
             group.iter().map(way).collect()
         };
@@ -205,9 +205,9 @@ impl Field<'_> {
         Ok(())
     }
 
-    /// A place (m) from the corner of a particles' cell (spacings).
-    fn seen_from(&self, cell: Coord, place: DVec3) -> [f32; 3] {
-        let at = (place - DVec3::from(cell.map(f64::from)) * self.cells.edge()) / self.spacing;
+    /// A position (m) from the corner of a particles' cell (spacings).
+    fn seen_from(&self, cell: Coord, position: DVec3) -> [f32; 3] {
+        let at = (position - DVec3::from(cell.map(f64::from)) * self.cells.edge()) / self.spacing;
         [at.x as f32, at.y as f32, at.z as f32]
     }
 
@@ -220,15 +220,15 @@ impl Field<'_> {
         });
     }
 
-    /// The mean way (spacings) of the particles around a place (m) that has none near: the thesis' radius is doubled until there are
+    /// The mean way (spacings) of the particles around a position (m) that has none near: the thesis' radius is doubled until there are
     /// some.
-    fn mean_far(&self, place: DVec3) -> DVec3 {
+    fn mean_far(&self, position: DVec3) -> DVec3 {
         let cell =
-            [0, 1, 2].map(|axis| (place[axis] / self.cells.edge()).floor().clamp(-LIMIT, LIMIT) as i32);
+            [0, 1, 2].map(|axis| (position[axis] / self.cells.edge()).floor().clamp(-LIMIT, LIMIT) as i32);
         let (mut near, mut room) = (Near::default(), Near::default());
         let found: Option<Sums> = (1..=DOUBLINGS).find_map(|doubling| {
             self.gather(cell, 1 << doubling, &mut near);
-            sums(&near, &mut room, self.seen_from(cell, place), MEAN_RADIUS * (1 << doubling) as f32)
+            sums(&near, &mut room, self.seen_from(cell, position), MEAN_RADIUS * (1 << doubling) as f32)
         });
         found.map_or_else(DVec3::zeros, |sums| sums.mean())
     }
@@ -258,7 +258,7 @@ fn corners(cell: Coord) -> [Coord; 8] {
     std::array::from_fn(|n| [0, 1, 2].map(|axis| cell[axis] + (n >> (2 - axis) & 1) as i32))
 }
 
-/// What the maps at the corners of a cell say at a place in it (0..1 on each axis): the nearer, and the more particles they are
+/// What the maps at the corners of a cell say at a position in it (0..1 on each axis): the nearer, and the more particles they are
 /// made of, the more they count. None without maps.
 fn blended(maps: &[Option<Map>; 8], at: DVec3) -> Option<DVec3> {
     let (mut sum, mut all) = (Vector3::zeros(), 0.0);
@@ -278,18 +278,23 @@ mod tests {
     use crate::context::Pool;
 
     #[test]
-    fn places_outside_of_the_particles_turn_with_them_and_lag_behind_by_the_mean() {
+    fn positions_outside_of_the_particles_turn_with_them_and_lag_behind_by_the_mean() {
         let ctx = Context::new(Pool::new(2).unwrap());
         let grid = (0..729).map(|n| [n / 81, n / 9 % 9, n % 9].map(|x| f64::from(x) - 4.0));
-        let places: Vec<DVec3> = grid.map(DVec3::from).collect();
-        let turn = |place: &DVec3| place + DVec3::new(-place.z, 0.0, place.x) * 0.05;
-        let at = |places: Vec<DVec3>| Particles { places, velocities: Vec::new(), ids: (0..729).collect() };
-        let (from, to) = (at(places.clone()), at(places.iter().map(turn).collect()));
+        let positions: Vec<DVec3> = grid.map(DVec3::from).collect();
+        let turn = |position: &DVec3| position + DVec3::new(-position.z, 0.0, position.x) * 0.05;
+        let at =
+            |positions: Vec<DVec3>| Particles { positions, velocities: Vec::new(), ids: (0..729).collect() };
+        let (from, to) = (at(positions.clone()), at(positions.iter().map(turn).collect()));
         let outside = [DVec3::new(4.5, 0.0, 0.0), DVec3::new(0.2, 4.7, 4.6)];
         let off = |weighting| {
             let params = Params { weighting, ..Params::for_spacing(1.0) };
             let there = carried(&ctx, &outside, &from, &to, 0.1, &params).unwrap();
-            there.iter().zip(&outside).map(|(there, place)| (there - turn(place)).norm()).fold(0.0, f64::max)
+            there
+                .iter()
+                .zip(&outside)
+                .map(|(there, position)| (there - turn(position)).norm())
+                .fold(0.0, f64::max)
         };
         assert!(off(Weighting::Affine) < 1e-3, "{}", off(Weighting::Affine));
         assert!(off(Weighting::Mean) > 0.02, "{}", off(Weighting::Mean));

@@ -100,7 +100,7 @@ mod tests {
             let report = tracker.step(&ctx, &at(frame), &at(frame + 1), 0.04).unwrap();
             assert_eq!(report.flagged(), 0, "frame {frame}");
         }
-        let by = at(4).places[0] - positions[0];
+        let by = at(4).positions[0] - positions[0];
         let off = tracker
             .vertices()
             .iter()

@@ -1,5 +1,5 @@
 //! Changes that are seen before they happen (thesis 2.8 wishes for it): vertices that a change will take away lead to what will take
-//! their place, and go a part of that way in each of the frames before it, so that a bridge does not pop up. Only what is shown is
+//! their position, and go a part of that way in each of the frames before it, so that a bridge does not pop up. Only what is shown is
 //! moved so; the mesh that goes on is not.
 
 use rayon::prelude::*;
@@ -13,11 +13,11 @@ use crate::geometry::{DVec3, TriMesh, Vec3};
 use crate::mesh_repair::{Source, weights};
 use crate::surface::topology::change::Change;
 
-/// Places of a task.
+/// Positions of a task.
 const GRAIN: usize = 256;
-/// How often the places that are made pull the old surface towards them.
+/// How often the positions that are made pull the old surface towards them.
 const PULLS: usize = 16;
-/// Longest way to what takes a vertex' place (spacings): what is farther away is another surface that appears.
+/// Longest way to what takes a vertex' position (spacings): what is farther away is another surface that appears.
 const LONGEST: f64 = 4.0;
 /// A part of the old surface is not eased if nothing that is made there is farther from it than this (spacings): there is no jump to hide.
 const NEAR: f64 = 0.25;
@@ -29,7 +29,7 @@ const LEAST: f64 = 1e-3;
 /// What a step does to the vertices before it.
 #[derive(Debug, Clone, Default)]
 pub struct Leads {
-    /// Vertices that go, ascending, with their ways (m) to what takes their place.
+    /// Vertices that go, ascending, with their ways (m) to what takes their position.
     ways: Vec<(u32, DVec3)>,
     /// The vertex before the step that each vertex was, where any was made or went.
     origins: Origins,
@@ -124,39 +124,40 @@ fn ways(ctx: &Context, change: &Change, triangles: &[[u32; 3]], spacing: f64) ->
     if new.triangles.is_empty() {
         return Ok(Vec::new());
     }
-    // Places count from one of them: far from the origin 32 bits are too few.
+    // Positions count from one of them: far from the origin 32 bits are too few.
     let origin = change.before[old.names[0] as usize];
     let begin: Vec<DVec3> = old.names.iter().map(|name| change.before[*name as usize] - origin).collect();
     let ends: Vec<DVec3> = new.names.iter().map(|name| change.vertices[*name as usize] - origin).collect();
-    let made = ends.iter().zip(&new.is_loose).filter(|(_, made)| **made).map(|(place, _)| *place);
+    let made = ends.iter().zip(&new.is_loose).filter(|(_, made)| **made).map(|(position, _)| *position);
     let made = old.jumps(&begin, made.collect(), [NEAR, LONGEST].map(|length| length * spacing));
     if made.is_empty() {
         return Ok(Vec::new());
     }
-    let mut places = begin.clone();
-    let mut is_pulled = vec![false; places.len()];
+    let mut positions = begin.clone();
+    let mut is_pulled = vec![false; positions.len()];
     for _ in 0..PULLS {
         ctx.check()?;
-        let tree = old.tree(&places);
-        let near: Vec<_> = made.par_iter().with_min_len(GRAIN).map(|place| tree.nearest(*place)).collect();
-        let mut pulls = vec![(DVec3::zeros(), 0.0); places.len()];
-        for (place, near) in made.iter().zip(near) {
+        let tree = old.tree(&positions);
+        let near: Vec<_> =
+            made.par_iter().with_min_len(GRAIN).map(|position| tree.nearest(*position)).collect();
+        let mut pulls = vec![(DVec3::zeros(), 0.0); positions.len()];
+        for (position, near) in made.iter().zip(near) {
             let Some(near) = near else { continue };
             let corners = old.triangles[near.triangle];
-            let shares = weights(&corners.map(|at| places[at as usize]), near.place);
+            let shares = weights(&corners.map(|at| positions[at as usize]), near.position);
             for (corner, share) in corners.into_iter().zip(shares) {
                 let pull = &mut pulls[corner as usize];
-                *pull = (pull.0 + (place - near.place) * share, pull.1 + share);
+                *pull = (pull.0 + (position - near.position) * share, pull.1 + share);
             }
         }
         for (at, (pull, share)) in pulls.into_iter().enumerate() {
             if old.is_loose[at] && share > LEAST {
-                places[at] += pull / share;
+                positions[at] += pull / share;
                 is_pulled[at] = true;
             }
         }
     }
-    let mut ways: Vec<DVec3> = places.iter().zip(&begin).map(|(to, from)| to - from).collect();
+    let mut ways: Vec<DVec3> = positions.iter().zip(&begin).map(|(to, from)| to - from).collect();
     old.spread(&mut ways, &is_pulled);
     let limit = LONGEST * spacing;
     let moved = (0..ways.len()).filter(|at| ways[*at] != DVec3::zeros() && ways[*at].norm() <= limit);
@@ -216,14 +217,15 @@ impl Patch {
         let tree = self.tree(begin);
         let mut is_jump = vec![false; parts.len()];
         let mut found = Vec::with_capacity(made.len());
-        let feet: Vec<_> = made.par_iter().with_min_len(GRAIN).map(|place| tree.nearest(*place)).collect();
-        for (place, at) in made.into_iter().zip(feet) {
+        let feet: Vec<_> =
+            made.par_iter().with_min_len(GRAIN).map(|position| tree.nearest(*position)).collect();
+        for (position, at) in made.into_iter().zip(feet) {
             let Some(at) = at.filter(|at| at.distance <= longest) else { continue };
             let part = part_of[at.triangle];
             is_jump[part] |= at.distance > near;
-            found.push((place, part));
+            found.push((position, part));
         }
-        found.into_iter().filter(|(_, part)| is_jump[*part]).map(|(place, _)| place).collect()
+        found.into_iter().filter(|(_, part)| is_jump[*part]).map(|(position, _)| position).collect()
     }
 
     /// Gives each loose vertex without a way the mean of those around it, a few times; those that stay have none.
@@ -256,7 +258,7 @@ mod tests {
         let ctx = Context::new(Pool::new(2).unwrap());
         let balls = |away: f64| two_balls(4.2, DVec3::new(away, 0.1, 0.0));
         let mut from = balls(6.5);
-        let mesh = own_surface(&ctx, &from.places);
+        let mesh = own_surface(&ctx, &from.positions);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
         let farthest = |places: &[DVec3], triangles: &[[u32; 3]], change: &Change| {

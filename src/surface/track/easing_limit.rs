@@ -98,12 +98,12 @@ impl<'a> Around<'a> {
 
     /// Pairs of triangles that meet where vertices are displaced by shares of what is asked.
     fn meeting(&self, shares: &[f64]) -> Vec<[u32; 2]> {
-        let place = |(name, slot): (&u32, &u32)| {
+        let position = |(name, slot): (&u32, &u32)| {
             let own = self.vertices[*name as usize];
             let by = self.displaced.get(*slot as usize).map(|(_, by)| by * shares[*slot as usize]);
             by.map_or(own, |by| own + by).cast()
         };
-        let positions = self.names.iter().zip(&self.slots).map(place).collect();
+        let positions = self.names.iter().zip(&self.slots).map(position).collect();
         meeting_pairs(&TriMesh { positions, triangles: self.triangles.clone() })
     }
 
@@ -173,7 +173,7 @@ impl Bins {
     /// The bins of a box; none where they are too many.
     fn between(&self, [low, high]: &[DVec3; 2]) -> Option<[Coord; 2]> {
         let from = self.bounds[0];
-        let ends = [low, high].map(|place| cell_of(&((place - from) / self.edge)));
+        let ends = [low, high].map(|position| cell_of(&((position - from) / self.edge)));
         let count = |axis: usize| i64::from(ends[1][axis]) - i64::from(ends[0][axis]) + 1;
         let all = count(0).checked_mul(count(1))?.checked_mul(count(2))?;
         (self.edge > 0.0 && all <= BINS).then_some(ends)
@@ -197,13 +197,15 @@ mod tests {
     fn cubes() -> (Vec<DVec3>, Vec<[u32; 3]>) {
         let mut mesh = TriMesh::cuboid([0.0; 3], [1.0; 3]);
         mesh.append(&TriMesh::cuboid([2.0, 0.0, 0.0], [3.0, 1.0, 1.0]));
-        (mesh.positions.iter().map(|place| place.cast()).collect(), mesh.triangles)
+        (mesh.positions.iter().map(|position| position.cast()).collect(), mesh.triangles)
     }
 
     /// The faces at the gap move by so much towards each other.
     fn towards(vertices: &[DVec3], by: f64) -> Vec<Displaced> {
-        let at_gap = (0..).zip(vertices).filter(|(_, place)| place.x == 1.0 || place.x == 2.0);
-        at_gap.map(|(vertex, place)| (vertex, DVec3::x() * if place.x < 1.5 { by } else { -by })).collect()
+        let at_gap = (0..).zip(vertices).filter(|(_, position)| position.x == 1.0 || position.x == 2.0);
+        at_gap
+            .map(|(vertex, position)| (vertex, DVec3::x() * if position.x < 1.5 { by } else { -by }))
+            .collect()
     }
 
     #[test]
@@ -233,7 +235,7 @@ mod tests {
         const AHEAD: usize = 4;
         let ctx = Context::new(Pool::new(2).unwrap());
         let balls = |frame: usize| two_balls(4.2, DVec3::new(6.5 - 0.2 * frame as f64, 0.1, 0.0));
-        let mesh = own_surface(&ctx, &balls(0).places);
+        let mesh = own_surface(&ctx, &balls(0).positions);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &balls(0)).unwrap();
         let (mut outlook, mut moved) = (Outlook::default(), 0);

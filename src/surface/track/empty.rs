@@ -81,7 +81,7 @@ mod tests {
 
     const DT: f64 = 0.04;
 
-    /// A ball of particles, 1 m apart, around a place.
+    /// A ball of particles, 1 m apart, around a position.
     fn ball(x: f64) -> Particles {
         numbered(shell(DVec3::new(x, 0.1, 0.2), 0.0, 4.2))
     }
@@ -94,24 +94,24 @@ mod tests {
     fn liquid_that_is_gone_and_comes_back_has_no_mesh_and_then_one_again() {
         let ctx = Context::new(Pool::new(2).unwrap());
         let (first, none, second) = (ball(0.0), Particles::default(), ball(20.0));
-        let mesh = own_surface(&ctx, &first.places);
+        let mesh = own_surface(&ctx, &first.positions);
         let mut tracker = Tracker::new(&ctx, params(true), &mesh, &first).unwrap();
         let report = tracker.step(&ctx, &first, &none, DT).unwrap();
         let change = report.change.unwrap();
         assert!(change.origins.is_empty() && change.before.len() == mesh.positions.len());
-        assert_eq!((report.died, report.lost), (first.places.len(), mesh.positions.len()));
+        assert_eq!((report.died, report.lost), (first.positions.len(), mesh.positions.len()));
         assert!(tracker.vertices().is_empty() && tracker.triangles().is_empty());
         let report = tracker.step(&ctx, &none, &none, DT).unwrap();
         assert!(report.change.is_none() && report.died == 0);
         // What was saved goes on with the same bytes.
         let mut back = Tracker::resume(params(true), &mesh, &tracker.save()).unwrap();
         let report = tracker.step(&ctx, &none, &second, DT).unwrap();
-        assert_eq!(report.born, second.places.len());
+        assert_eq!(report.born, second.positions.len());
         back.step(&ctx, &none, &second, DT).unwrap();
         assert!(back.save() == tracker.save());
         let faults = Faults::of(&tracker.mesh());
         assert!(faults.by_index.is_watertight() && faults.parts == 1, "{faults:?}");
-        let wanted = own_surface(&ctx, &second.places).volume();
+        let wanted = own_surface(&ctx, &second.positions).volume();
         assert!((tracker.mesh().volume() / wanted - 1.0).abs() < 0.02, "{}", tracker.mesh().volume());
         // One that begins without any is the same.
         let mut born = Tracker::without_mesh(params(true)).unwrap();
@@ -123,7 +123,7 @@ mod tests {
     fn a_mesh_that_is_not_rebuilt_waits_where_it_was() {
         let ctx = Context::new(Pool::new(2).unwrap());
         let (first, none) = (ball(0.0), Particles::default());
-        let mesh = own_surface(&ctx, &first.places);
+        let mesh = own_surface(&ctx, &first.positions);
         let mut tracker = Tracker::new(&ctx, params(false), &mesh, &first).unwrap();
         let before = tracker.vertices().to_vec();
         let report = tracker.step(&ctx, &first, &none, DT).unwrap();

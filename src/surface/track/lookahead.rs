@@ -82,18 +82,18 @@ impl Outlook {
         Some((after, report))
     }
 
-    /// Places (m) of the tracker's vertices as they are shown: those that a step to come takes away go towards what it makes, for
+    /// Positions (m) of the tracker's vertices as they are shown: those that a step to come takes away go towards what it makes, for
     /// `ahead` steps before it, as far as the mesh does not pass through itself.
     ///
     /// # Errors
     /// Cancel.
     pub fn eased(&self, ctx: &Context, tracker: &Tracker, ahead: usize) -> Result<Vec<DVec3>> {
-        let mut places = tracker.vertices().to_vec();
+        let mut positions = tracker.vertices().to_vec();
         let moved = displaced(&eased(self.steps.iter().map(|step| &step.leads), ahead));
         for (vertex, by) in uncrossed(ctx, tracker.vertices(), tracker.triangles(), moved)? {
-            places[vertex as usize] += by;
+            positions[vertex as usize] += by;
         }
-        Ok(places)
+        Ok(positions)
     }
 }
 
@@ -121,7 +121,7 @@ mod tests {
     fn steps_that_were_made_ahead_are_those_that_come_and_only_what_goes_is_moved() {
         let ctx = Context::new(Pool::new(2).unwrap());
         let first = balls(0);
-        let mesh = own_surface(&ctx, &first.places);
+        let mesh = own_surface(&ctx, &first.positions);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &first).unwrap();
         let mut plain = tracker.clone();
@@ -130,8 +130,8 @@ mod tests {
             let (from, to) = (balls(frame), balls(frame + 1));
             let coming: Vec<Particles> = (1..=3).map(|ahead| balls(frame + ahead)).collect();
             outlook.look(&ctx, &tracker, from.clone(), coming, DT).unwrap();
-            let places = outlook.eased(&ctx, &tracker, 3).unwrap();
-            moved += places.iter().zip(tracker.vertices()).filter(|(shown, own)| shown != own).count();
+            let positions = outlook.eased(&ctx, &tracker, 3).unwrap();
+            moved += positions.iter().zip(tracker.vertices()).filter(|(shown, own)| shown != own).count();
             let (next, report) = outlook.take(&from, &to, DT).unwrap();
             tracker = next;
             let wanted = plain.step(&ctx, &from, &to, DT).unwrap();

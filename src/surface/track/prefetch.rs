@@ -23,9 +23,12 @@ pub(in crate::surface) struct Ahead {
 }
 
 impl Ahead {
-    /// The surface of particles at these places, if it is there.
-    pub fn ready(&self, places: &[DVec3]) -> Option<Surface> {
-        self.ready.as_ref().filter(|(own, _)| *own.places == *places).map(|(_, surface)| surface.clone())
+    /// The surface of particles at these positions, if it is there.
+    pub fn ready(&self, positions: &[DVec3]) -> Option<Surface> {
+        self.ready
+            .as_ref()
+            .filter(|(own, _)| *own.positions == *positions)
+            .map(|(_, surface)| surface.clone())
     }
 }
 

@@ -18,17 +18,17 @@ const TINY: f64 = 0.1;
 /// Where a vertex meets the surface.
 #[derive(Debug, Clone, Copy)]
 pub struct Foot {
-    /// The place on phi = 0 (cells).
-    pub place: DVec3,
+    /// The position on phi = 0 (cells).
+    pub position: DVec3,
     /// Unit vector outward from it through the vertex.
     pub outward: DVec3,
     /// Distance of the vertex (cells), negative inside.
     pub distance: f64,
 }
 
-/// The foot of a vertex at a place (cells); none where the steps do not arrive.
-pub fn foot(sampler: &mut Sampler<'_>, place: DVec3) -> Option<Foot> {
-    let mut at = place;
+/// The foot of a vertex at a position (cells); none where the steps do not arrive.
+pub fn foot(sampler: &mut Sampler<'_>, position: DVec3) -> Option<Foot> {
+    let mut at = position;
     let (first, mut slope) = sampler.at(at)?;
     let mut phi = first;
     let shares = STEPS.into_iter().flat_map(|(share, count)| std::iter::repeat_n(share, count));
@@ -36,16 +36,16 @@ pub fn foot(sampler: &mut Sampler<'_>, place: DVec3) -> Option<Foot> {
         let gradient = DVec3::from(slope.map(f64::from));
         let unit = gradient.try_normalize(1e-3)?;
         if phi.abs() < ARRIVED {
-            let way = place - at;
+            let way = position - at;
             let length = way.norm();
             // Signed as phi: the way leads outward from outside, and inward from inside.
             let sign = if first < 0.0 { -1.0 } else { 1.0 };
             return Some(if length < TINY {
                 // The foot that the vertex itself has in that direction.
                 let distance = way.dot(&unit);
-                Foot { place: place - unit * distance, outward: unit, distance }
+                Foot { position: position - unit * distance, outward: unit, distance }
             } else {
-                Foot { place: at, outward: way * (sign / length), distance: sign * length }
+                Foot { position: at, outward: way * (sign / length), distance: sign * length }
             });
         }
         at -= unit * (share * f64::from(phi));
@@ -55,9 +55,9 @@ pub fn foot(sampler: &mut Sampler<'_>, place: DVec3) -> Option<Foot> {
 }
 
 impl Foot {
-    /// The place (cells) at a distance (cells), negative inside.
+    /// The position (cells) at a distance (cells), negative inside.
     pub fn at(&self, distance: f64) -> DVec3 {
-        self.place + self.outward * distance
+        self.position + self.outward * distance
     }
 }
 
@@ -73,20 +73,20 @@ mod tests {
     fn feet_are_outward_and_distances_negative_inside() {
         let ctx = Context::new(Pool::new(1).unwrap());
         let grid = (0..17 * 17 * 17).map(|n| [n / 289, n / 17 % 17, n % 17].map(|x| f64::from(x) - 8.0));
-        let places: Vec<DVec3> = grid.map(DVec3::from).filter(|place| place.norm() < 7.0).collect();
-        let phi = Implicit::new(&ctx, &places, 1.0, 0.5).unwrap();
+        let positions: Vec<DVec3> = grid.map(DVec3::from).filter(|position| position.norm() < 7.0).collect();
+        let phi = Implicit::new(&ctx, &positions, 1.0, 0.5).unwrap();
         let distances = Distances::new(&ctx, &phi, &Isosurface::new(&phi), 6.0).unwrap();
         let mut sampler = Sampler::new(&distances);
         let way = DVec3::new(2.0, 1.0, 3.0).normalize();
         // Cells are half as long as spacings.
         let surface = foot(&mut sampler, way * 14.0).unwrap();
-        let height = surface.place.dot(&way);
+        let height = surface.position.dot(&way);
         for above in [-3.0, -0.5, -0.05, 0.05, 0.5, 3.0] {
-            let place = way * (height + above);
-            let foot = foot(&mut sampler, place).unwrap();
+            let position = way * (height + above);
+            let foot = foot(&mut sampler, position).unwrap();
             assert!((foot.distance - above).abs() < 0.15, "{above}: {foot:?}");
             assert!(foot.outward.dot(&way) > 0.9, "{above}: {foot:?}");
-            assert!((foot.at(foot.distance) - place).norm() < 1e-6, "{above}: {foot:?}");
+            assert!((foot.at(foot.distance) - position).norm() < 1e-6, "{above}: {foot:?}");
             // A vertex that drifted through the surface comes back to its own side.
             assert!((foot.at(-above) - way * (height - above)).norm() < 1.0, "{above}: {foot:?}");
         }

@@ -64,7 +64,7 @@ mod tests {
     /// A mesh of its surface that has followed it to a frame, and the mesh at the first one.
     fn followed(ctx: &Context, rebuild: bool, frame: i32) -> (Tracker, TriMesh) {
         let first = ball(0);
-        let mesh = own_surface(ctx, &first.places);
+        let mesh = own_surface(ctx, &first.positions);
         let params = Params { rebuild, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(ctx, params, &mesh, &first).unwrap();
         go_on(ctx, &mut tracker, [0, frame]);
@@ -79,16 +79,16 @@ mod tests {
 
     /// How far the mesh reaches over the middle of the ball (m).
     fn top(tracker: &Tracker, frame: i32) -> f64 {
-        tracker.vertices().iter().map(|place| (place - middle(frame)).y).fold(0.0, f64::max)
+        tracker.vertices().iter().map(|position| (position - middle(frame)).y).fold(0.0, f64::max)
     }
 
     /// The mesh of a frame with a bump on top.
     fn with_bump(tracker: &Tracker, frame: i32) -> TriMesh {
         let mut mesh = tracker.mesh();
-        for place in &mut mesh.positions {
-            let out = (place.cast::<f64>() - middle(frame)).normalize();
+        for position in &mut mesh.positions {
+            let out = (position.cast::<f64>() - middle(frame)).normalize();
             let share = ((out.y - 0.7) / 0.3).clamp(0.0, 1.0);
-            *place += (out * (HEIGHT * share)).cast::<f32>();
+            *position += (out * (HEIGHT * share)).cast::<f32>();
         }
         mesh
     }
@@ -151,7 +151,7 @@ mod tests {
         open.triangles.pop();
         refused(&mut tracker, &open, "not closed and 2-manifold by index");
         let mut far = tracker.mesh();
-        far.positions.iter_mut().for_each(|place| *place += Vec3::new(100.0, 0.0, 0.0));
+        far.positions.iter_mut().for_each(|position| *position += Vec3::new(100.0, 0.0, 0.0));
         refused(&mut tracker, &far, "same space");
         refused(&mut tracker, &TriMesh::default(), "");
         ctx.cancel();

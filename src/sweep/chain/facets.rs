@@ -110,10 +110,11 @@ pub fn facets(ctx: &Context, bins: &Bins, exposure: &Exposure) -> Result<Vec<Fac
 
 /// The faces sorted by bin, so that a bin's prisms stay cached.
 fn order(bins: &Bins) -> Vec<u32> {
-    let place = |id: usize| (bins.of_voxel(voxel_of(middle(&bins.faces[id].v))), id as u32);
-    let mut places: Vec<(Option<usize>, u32)> = (0..bins.faces.len()).into_par_iter().map(place).collect();
-    places.par_sort_unstable();
-    places.into_iter().map(|(_, id)| id).collect()
+    let position = |id: usize| (bins.of_voxel(voxel_of(middle(&bins.faces[id].v))), id as u32);
+    let mut positions: Vec<(Option<usize>, u32)> =
+        (0..bins.faces.len()).into_par_iter().map(position).collect();
+    positions.par_sort_unstable();
+    positions.into_iter().map(|(_, id)| id).collect()
 }
 
 /// The flags of each bin: whether it is a stack, and its faces' verdicts; and for each face the flags of all its bins.

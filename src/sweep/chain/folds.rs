@@ -1,7 +1,7 @@
 //! Self-inverting surfaces in a sweep.
 //!
 //! Where the winding number of a pose is negative, outward motion only brings it back to 0: the point is not swept, though
-//! the surface passed it outward. A point is swept when its winding number reaches 1 at some time. So near such places each
+//! the surface passed it outward. A point is swept when its winding number reaches 1 at some time. So near such positions each
 //! outward passage is tested at sample points: the winding number of the pose before, plus the passages earlier in the same
 //! step, must not be negative, or the passage does not count. Where the first pose has a negative winding number the chain
 //! starts below 0 too: the passage that brings it to 0 for the first time counts.
@@ -49,8 +49,10 @@ pub fn drop_returns(
         .collect::<Result<_>>()?;
     let early: Vec<Early> = found.iter().flat_map(|found| found.early.iter().copied()).collect();
     let first: HashSet<Place> = first_ones(ctx, &poses, early)?.into_iter().collect();
-    for place in found.iter().flat_map(|found| &found.places).filter(|place| !first.contains(place)) {
-        outward[place.triangle as usize * steps + place.step as usize] &= !(1 << place.part);
+    for position in
+        found.iter().flat_map(|found| &found.positions).filter(|position| !first.contains(position))
+    {
+        outward[position.triangle as usize * steps + position.step as usize] &= !(1 << position.part);
     }
     Ok(())
 }
@@ -150,7 +152,7 @@ fn folded_blocks(
     let simplices = topology.simplices.par_iter().with_min_len(GRAIN);
     let faces: Vec<Face> = simplices.map(|simplex| face(simplex, level)).filter(wanted).collect();
     let around = |block: [i32; 3]| {
-        let [low, high] = [-1, 1].map(|by| block.map(|place| place + by));
+        let [low, high] = [-1, 1].map(|by| block.map(|position| position + by));
         each_block(low, high)
     };
     Ok(negative_blocks(&faces, window).into_iter().flat_map(around).collect())
@@ -194,7 +196,7 @@ fn negative_blocks(faces: &[Face], window: &Window) -> Vec<[i32; 3]> {
 /// The passages of a step that return from inside out.
 #[derive(Default)]
 struct Returns {
-    places: Vec<Place>,
+    positions: Vec<Place>,
     /// Sample points of them with a negative winding number at the first pose, which may come to 0 for the first time.
     early: Vec<Early>,
 }
@@ -202,7 +204,7 @@ struct Returns {
 /// A point of a tetrahedron.
 #[derive(Clone, Copy)]
 struct Early {
-    place: Place,
+    position: Place,
     at: DVec3,
 }
 
@@ -224,18 +226,20 @@ fn returns(ctx: &Context, poses: &Poses<'_>, step: usize, triangles: &[u32]) -> 
         ctx.check()?;
         let mut early = Vec::new();
         for at in passage.samples() {
-            match during.change(passage.place, &at) {
+            match during.change(passage.position, &at) {
                 Change::Counts => return Ok(None),
-                Change::Rises if first.winding(&at) < 0 => early.push(Early { place: passage.place, at }),
+                Change::Rises if first.winding(&at) < 0 => {
+                    early.push(Early { position: passage.position, at })
+                }
                 Change::Rises | Change::Returns => {}
             }
         }
-        Ok(Some((passage.place, early)))
+        Ok(Some((passage.position, early)))
     };
     let tested = passages.par_iter().with_min_len(FEW).map(test).filter_map(Result::transpose);
     let found: Vec<_> = tested.collect::<Result<_>>()?;
-    let places = found.iter().map(|(place, _)| *place).collect();
-    Ok(Returns { places, early: found.into_iter().flat_map(|(_, early)| early).collect() })
+    let positions = found.iter().map(|(position, _)| *position).collect();
+    Ok(Returns { positions, early: found.into_iter().flat_map(|(_, early)| early).collect() })
 }
 
 /// The passages whose points no earlier step brings to 0.
@@ -243,8 +247,8 @@ fn first_ones(ctx: &Context, poses: &Poses<'_>, mut early: Vec<Early>) -> Result
     let mut first = Vec::new();
     for step in 0..poses.levels.len() - 1 {
         early.retain(|point| {
-            let is_now = point.place.step as usize == step;
-            first.extend(is_now.then_some(point.place));
+            let is_now = point.position.step as usize == step;
+            first.extend(is_now.then_some(point.position));
             !is_now
         });
         if early.is_empty() {

@@ -70,15 +70,15 @@ impl Patches<'_> {
             return;
         }
         let (centre, [u, v]) = (spot.at(), across(normal));
-        let place = |[a, b]: [f64; 2], part: f64| {
+        let position = |[a, b]: [f64; 2], part: f64| {
             [0, 1, 2].map(|axis| centre[axis] + (a * u[axis] + b * v[axis]) * part * REACH)
         };
         let ways: [[f64; 2]; WAYS] = std::array::from_fn(|way| {
             let (sin, cos) = libm::sincos(std::f64::consts::TAU * way as f64 / WAYS as f64);
             [cos, sin]
         });
-        let reaches = ways.map(|way| self.reach(&normal, |part| place(way, part)));
-        let rim: [Point; WAYS] = std::array::from_fn(|index| place(ways[index], reaches[index]));
+        let reaches = ways.map(|way| self.reach(&normal, |part| position(way, part)));
+        let rim: [Point; WAYS] = std::array::from_fn(|index| position(ways[index], reaches[index]));
         let facet = |index: usize| [centre, rim[index], rim[(index + 1) % WAYS]].map(fixed);
         out.extend((0..WAYS).map(|index| Facet { v: facet(index), face, sure: true }));
         if reaches.iter().sum::<f64>() < LEAST * WAYS as f64 {
@@ -91,23 +91,23 @@ impl Patches<'_> {
         let slope = normal[spot.axis.index()].abs();
         let beside = (-1..=1).flat_map(|p| (-1..=1).map(move |q| [p, q])).filter(|beside| *beside != [0, 0]);
         beside.into_iter().all(|[p, q]| {
-            let place = on_plane(spot, normal, [p, q].map(f64::from))[spot.axis.index()];
-            self.exposure.agrees(spot, [spot.line[0] + p, spot.line[1] + q], place, OFF_BESIDE / slope)
+            let position = on_plane(spot, normal, [p, q].map(f64::from))[spot.axis.index()];
+            self.exposure.agrees(spot, [spot.line[0] + p, spot.line[1] + q], position, OFF_BESIDE / slope)
         })
     }
 
     /// How far (0 to 1) along a path from the spot its plane is the surface.
-    fn reach(&mut self, normal: &Point, place: impl Fn(f64) -> Point) -> f64 {
+    fn reach(&mut self, normal: &Point, position: impl Fn(f64) -> Point) -> f64 {
         let (mut first, mut last) = (0.0, 0.5);
-        if self.is_surface(place(0.5), normal) {
-            if self.is_surface(place(1.0), normal) {
+        if self.is_surface(position(0.5), normal) {
+            if self.is_surface(position(1.0), normal) {
                 return 1.0;
             }
             (first, last) = (0.5, 1.0);
         }
         for _ in 0..HALVINGS {
             let half = (first + last) / 2.0;
-            let good = self.is_surface(place(half), normal);
+            let good = self.is_surface(position(half), normal);
             (first, last) = if good { (half, last) } else { (first, half) };
         }
         (first + last) / 2.0
@@ -116,8 +116,8 @@ impl Patches<'_> {
     /// Whether the volume lies close behind a point of a plane, and not in front.
     fn is_surface(&mut self, at: Point, normal: &Point) -> bool {
         let mut winding = |side: f64| {
-            let place = [0, 1, 2].map(|axis| (at[axis] + side * OFF * normal[axis]) * f64::from(UNITS));
-            self.bins.windings(place, place, &mut self.prisms)[0]
+            let position = [0, 1, 2].map(|axis| (at[axis] + side * OFF * normal[axis]) * f64::from(UNITS));
+            self.bins.windings(position, position, &mut self.prisms)[0]
         };
         winding(1.0) < 1 && winding(-1.0) >= 1
     }

@@ -59,10 +59,10 @@ impl Prisms {
             self.chain = chain;
             self.bins.clear();
         }
-        if let Some(place) = self.bins.iter().position(|&other| other == bin) {
-            return &mut self.groups[place];
+        if let Some(position) = self.bins.iter().position(|&other| other == bin) {
+            return &mut self.groups[position];
         }
-        let place = if self.bins.len() < KEPT {
+        let position = if self.bins.len() < KEPT {
             self.bins.push(bin);
             self.bins.len() - 1
         } else {
@@ -70,11 +70,11 @@ impl Prisms {
             self.bins[self.oldest] = bin;
             self.oldest
         };
-        if place == self.groups.len() {
+        if position == self.groups.len() {
             self.groups.push(BinPrisms::default());
         }
-        self.groups[place].replace(prisms());
-        &mut self.groups[place]
+        self.groups[position].replace(prisms());
+        &mut self.groups[position]
     }
 }
 

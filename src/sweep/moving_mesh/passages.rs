@@ -41,7 +41,7 @@ pub struct Place {
 /// A tetrahedron that the surface passes through.
 pub struct Passage {
     /// Which one.
-    pub place: Place,
+    pub position: Place,
     /// 1 when the surface moves outward, -1 when inward.
     pub sign: i32,
     corners: [DVec3; 4],
@@ -74,9 +74,9 @@ impl Poses<'_> {
         let [a, b] = self.prism(step, triangle);
         let still = STILL * (a[1] - a[0]).cross(&(a[2] - a[0])).norm();
         let sign = i32::from(self.topology.simplices[triangle as usize].sign);
-        let place = move |part| Place { triangle, step: step as u32, part };
+        let position = move |part| Place { triangle, step: step as u32, part };
         let tetrahedra = tetrahedra(a, b).into_iter().zip(0..);
-        tetrahedra.filter_map(move |(corners, part)| Passage::new(place(part), corners, sign, still))
+        tetrahedra.filter_map(move |(corners, part)| Passage::new(position(part), corners, sign, still))
     }
 
     /// A triangle before and after a step.
@@ -150,11 +150,11 @@ impl Step {
     }
 
     /// What a passage does at one of the points.
-    pub fn change(&self, place: Place, p: &DVec3) -> Change {
+    pub fn change(&self, position: Place, p: &DVec3) -> Change {
         let mut winding = self.before.winding(p);
         let mut was_nonnegative = winding >= 0;
         for (_, passage) in self.passing(p) {
-            if passage.place == place {
+            if passage.position == position {
                 return match (winding >= 0, was_nonnegative) {
                     (true, _) => Change::Counts,
                     (false, true) => Change::Returns,
@@ -202,15 +202,15 @@ impl Boxes {
         let mut out =
             Self { low, edge, size: size(&edge).map(|value| value as usize), items: Lists::one(Vec::new()) };
         let mut used = vec![false; out.size.iter().product()];
-        points.for_each(|p| used[out.number(out.place(&p))] = true);
+        points.for_each(|p| used[out.number(out.position(&p))] = true);
         let mut pairs = Vec::new();
         for ((from, to), id) in items.iter().zip(0..) {
             if (0..3).any(|axis| to[axis] < low[axis] || from[axis] > high[axis]) {
                 continue;
             }
-            let [first, last] = [from, to].map(|p| out.place(p).map(|place| place as i32));
+            let [first, last] = [from, to].map(|p| out.position(p).map(|position| position as i32));
             for at in each_block(first, last) {
-                let number = out.number(at.map(|place| place as usize));
+                let number = out.number(at.map(|position| position as usize));
                 if used[number] {
                     pairs.push((number as u32, id));
                 }
@@ -222,13 +222,13 @@ impl Boxes {
 
     /// The items that touch the box around a point.
     fn at(&self, p: &DVec3) -> &[u32] {
-        self.items.get(self.number(self.place(p)))
+        self.items.get(self.number(self.position(p)))
     }
 
     /// The box around a point, or the nearest one.
-    fn place(&self, p: &DVec3) -> [usize; 3] {
-        let place = (p - self.low).component_div(&self.edge);
-        [0, 1, 2].map(|axis| (place[axis].max(0.0) as usize).min(self.size[axis] - 1))
+    fn position(&self, p: &DVec3) -> [usize; 3] {
+        let position = (p - self.low).component_div(&self.edge);
+        [0, 1, 2].map(|axis| (position[axis].max(0.0) as usize).min(self.size[axis] - 1))
     }
 
     fn number(&self, [x, y, z]: [usize; 3]) -> usize {
@@ -244,15 +244,15 @@ fn tetrahedra([a0, a1, a2]: [DVec3; 3], [b0, b1, b2]: [DVec3; 3]) -> [[DVec3; 4]
 
 impl Passage {
     /// The tetrahedron of a triangle of this sign; none when the surface does not move in it.
-    fn new(place: Place, corners: [DVec3; 4], sign: i32, still: f64) -> Option<Self> {
+    fn new(position: Place, corners: [DVec3; 4], sign: i32, still: f64) -> Option<Self> {
         let [u, v, w] = [1, 2, 3].map(|corner| corners[corner] - corners[0]);
         let volume = u.cross(&v).dot(&w);
         if volume.abs() <= still || volume == 0.0 {
             return None;
         }
-        let outward = ((volume > 0.0) == (place.part != 1)) == (sign > 0);
+        let outward = ((volume > 0.0) == (position.part != 1)) == (sign > 0);
         let weights = [v.cross(&w) / volume, w.cross(&u) / volume, u.cross(&v) / volume];
-        Some(Self { place, sign: if outward { 1 } else { -1 }, corners, weights })
+        Some(Self { position, sign: if outward { 1 } else { -1 }, corners, weights })
     }
 
     /// Its sample points.
@@ -269,7 +269,7 @@ impl Passage {
         let way = p - self.corners[0];
         let [u, v, w] = self.weights.map(|row| row.dot(&way));
         let is_within = u >= 0.0 && v >= 0.0 && w >= 0.0 && u + v + w <= 1.0;
-        is_within.then_some([w, v + w, u + v + w][self.place.part as usize])
+        is_within.then_some([w, v + w, u + v + w][self.position.part as usize])
     }
 }
 

@@ -1,6 +1,6 @@
 //! Splits edges whose ends move differently.
 //!
-//! A moving edge sweeps a bilinear patch; the chain has two triangles in its place, which differ from
+//! A moving edge sweeps a bilinear patch; the chain has two triangles in its position, which differ from
 //! it by at most |db - da| / 4 (da, db: the displacements of the edge's ends in a step).
 
 use rayon::prelude::*;
@@ -124,8 +124,8 @@ impl Split {
         let [c, a, b] = [0, 1, 2].map(|i| v[(base + i) % 3]);
         let [across, left, right] = [0, 1, 2].map(|i| edges[(base + i) % 3]);
         let [count, lefts, rights] = [across, left, right].map(|edge| self.edges[edge].1);
-        let on_left = |place: u32| self.vertex(left, b, a, place);
-        let on_right = |place: u32| self.vertex(right, b, c, place);
+        let on_left = |position: u32| self.vertex(left, b, a, position);
+        let on_right = |position: u32| self.vertex(right, b, c, position);
         let (mut i, mut j) = (1, 1);
         let mut tip = b;
         while (i, j) != (lefts, rights) {
@@ -134,20 +134,20 @@ impl Split {
             tip = if go_left { on_left(i) } else { on_right(j) };
             (i, j) = if go_left { (i + 1, j) } else { (i, j + 1) };
         }
-        for place in 0..count {
-            let part = [self.vertex(across, c, a, place), self.vertex(across, c, a, place + 1)];
+        for position in 0..count {
+            let part = [self.vertex(across, c, a, position), self.vertex(across, c, a, position + 1)];
             emit([part[1], tip, part[0]]);
         }
     }
 
-    /// The vertex that ends the first `place` pieces of an edge, counted from one of its ends to the other.
-    fn vertex(&self, edge: usize, from: u32, to: u32, place: u32) -> u32 {
+    /// The vertex that ends the first `position` pieces of an edge, counted from one of its ends to the other.
+    fn vertex(&self, edge: usize, from: u32, to: u32, position: u32) -> u32 {
         let (first, pieces) = self.edges[edge];
-        match place {
+        match position {
             0 => from,
-            _ if place == pieces => to,
-            _ if from < to => first + place - 1,
-            _ => first + pieces - place - 1,
+            _ if position == pieces => to,
+            _ if from < to => first + position - 1,
+            _ => first + pieces - position - 1,
         }
     }
 }

@@ -182,10 +182,10 @@ impl Topology {
         let mut sorted = vec![(0, Incidence { triangle: 0, side: 0 }); self.simplices.len() * 3];
         for (triangle, simplex) in self.simplices.iter().enumerate() {
             for (side, (i, j)) in SIDES.into_iter().enumerate() {
-                let place = &mut next[simplex.v[i] as usize];
+                let position = &mut next[simplex.v[i] as usize];
                 let at = Incidence { triangle: triangle as u32, side: side as u8 };
-                sorted[*place as usize] = (simplex.v[j], at);
-                *place += 1;
+                sorted[*position as usize] = (simplex.v[j], at);
+                *position += 1;
             }
         }
         self.edges.clear();

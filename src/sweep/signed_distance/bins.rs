@@ -64,12 +64,12 @@ impl Bins {
     pub fn new(faces: Vec<Face>, region: Region, marked: &[bool], lines: Lines) -> Self {
         let normals: Vec<Point> = faces.par_iter().map(normal).collect();
         let mut slots = vec![NONE; marked.len()];
-        let places: Vec<[i32; 3]> =
-            (0..marked.len()).filter(|&block| marked[block]).map(|block| region.place(block)).collect();
-        places.iter().enumerate().for_each(|(slot, &block)| slots[region.index(block)] = slot as u32);
-        let lists = by_block(&faces, &normals, &region, &slots, places.len());
-        let sort = |(slot, &place)| BlockFaces::new(place, lists.get(slot).to_vec(), &faces, &normals);
-        let mut blocks: Vec<BlockFaces> = places.par_iter().enumerate().map(sort).collect();
+        let positions: Vec<[i32; 3]> =
+            (0..marked.len()).filter(|&block| marked[block]).map(|block| region.position(block)).collect();
+        positions.iter().enumerate().for_each(|(slot, &block)| slots[region.index(block)] = slot as u32);
+        let lists = by_block(&faces, &normals, &region, &slots, positions.len());
+        let sort = |(slot, &position)| BlockFaces::new(position, lists.get(slot).to_vec(), &faces, &normals);
+        let mut blocks: Vec<BlockFaces> = positions.par_iter().enumerate().map(sort).collect();
         let mut count = 0;
         for block in &mut blocks {
             block.first = count;
@@ -86,7 +86,7 @@ impl Bins {
     }
 
     /// The blocks.
-    pub fn places(&self) -> impl Iterator<Item = [i32; 3]> {
+    pub fn positions(&self) -> impl Iterator<Item = [i32; 3]> {
         self.blocks.iter().map(|block| block.corner.map(|corner| corner >> 3))
     }
 
@@ -95,7 +95,7 @@ impl Bins {
         self.blocks.par_iter().for_each_init(Vec::new, |ids, block| {
             for bin in 0..block.bins.count() {
                 ids.clear();
-                ids.extend(block.bins.get(bin).iter().map(|&place| block.ids[place as usize]));
+                ids.extend(block.bins.get(bin).iter().map(|&position| block.ids[position as usize]));
                 see(block.first + bin, ids);
             }
         });
@@ -122,8 +122,8 @@ impl Bins {
     }
 
     fn block_of(&self, voxel: [i32; 3]) -> Option<&BlockFaces> {
-        let place = voxel.map(|value| value >> 3);
-        let slot = if self.region.holds(place) { self.slots[self.region.index(place)] } else { NONE };
+        let position = voxel.map(|value| value >> 3);
+        let slot = if self.region.holds(position) { self.slots[self.region.index(position)] } else { NONE };
         (slot != NONE).then(|| &self.blocks[slot as usize])
     }
 
@@ -138,9 +138,9 @@ impl Bins {
             [0, 1, 2].map(|axis| begin[axis] + (p[axis] / f64::from(UNITS) - f64::from(voxel[axis])) as f32)
         };
         let bin = block.bin(voxel);
-        let prism = |&place: &u32| {
-            let id = block.ids[place as usize];
-            (block.prisms[place as usize], id, self.faces[id as usize].coef)
+        let prism = |&position: &u32| {
+            let id = block.ids[position as usize];
+            (block.prisms[position as usize], id, self.faces[id as usize].coef)
         };
         let faces = prisms.of(self.id, block.first + bin, || block.bins.get(bin).iter().map(prism));
         let change = faces.query(begin, local(point), local(beside));
@@ -178,8 +178,8 @@ impl Bins {
 }
 
 impl BlockFaces {
-    fn new(place: [i32; 3], ids: Vec<u32>, faces: &[Face], normals: &[Point]) -> Self {
-        let corner = place.map(|block| block * 8);
+    fn new(position: [i32; 3], ids: Vec<u32>, faces: &[Face], normals: &[Point]) -> Self {
+        let corner = position.map(|block| block * 8);
         let prism = |&id: &u32| Prism::new(&faces[id as usize].v, &normals[id as usize], corner);
         let prisms = ids.iter().map(prism).collect();
         let bins = if ids.len() <= FEW {
@@ -198,9 +198,9 @@ impl BlockFaces {
 /// For each bin of a block the block's faces that may pass through it.
 fn by_bin(corner: [i32; 3], ids: &[u32], faces: &[Face], normals: &[Point]) -> Lists<u32> {
     let mut pairs = Vec::with_capacity(ids.len() * 4);
-    for (place, &id) in ids.iter().enumerate() {
+    for (position, &id) in ids.iter().enumerate() {
         let (v, normal) = (&faces[id as usize].v, &normals[id as usize]);
-        each_bin(v, normal, corner, |voxel| pairs.push((inner(voxel) as u32, place as u32)));
+        each_bin(v, normal, corner, |voxel| pairs.push((inner(voxel) as u32, position as u32)));
     }
     Lists::new(512, &[pairs])
 }
@@ -228,7 +228,7 @@ fn by_block(faces: &[Face], normals: &[Point], region: &Region, slots: &[u32], c
             let mut out = Vec::with_capacity(faces.len() * 2);
             for (index, face) in faces.iter().enumerate() {
                 let id = chunk * GRAIN + index;
-                each_place(&face.v, &normals[id], region, |block| {
+                each_position(&face.v, &normals[id], region, |block| {
                     let slot = slots[region.index(block)];
                     if slot != NONE {
                         out.push((slot, id as u32));
@@ -242,7 +242,7 @@ fn by_block(faces: &[Face], normals: &[Point], region: &Region, slots: &[u32], c
 }
 
 /// Calls `see` with the blocks of a region whose bins a triangle may pass through.
-fn each_place(v: &[Fixed; 3], normal: &Point, region: &Region, mut see: impl FnMut([i32; 3])) {
+fn each_position(v: &[Fixed; 3], normal: &Point, region: &Region, mut see: impl FnMut([i32; 3])) {
     let (first, last) = region.touched(extent(v), 0.5);
     let slab = Slab::new(v, normal, 4.0);
     each_block(first, last)
@@ -261,7 +261,7 @@ fn each_bin(v: &[Fixed; 3], normal: &Point, corner: [i32; 3], mut see: impl FnMu
 
 /// Calls `see` with the voxels of a region whose bins a triangle may pass through.
 pub fn each_voxel(v: &[Fixed; 3], normal: &Point, region: &Region, mut see: impl FnMut([i32; 3])) {
-    each_place(v, normal, region, |block| each_bin(v, normal, block.map(|b| b * 8), &mut see));
+    each_position(v, normal, region, |block| each_bin(v, normal, block.map(|b| b * 8), &mut see));
 }
 
 /// Tests which cubes of one size the plane of a triangle meets.

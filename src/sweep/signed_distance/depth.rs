@@ -74,7 +74,7 @@ impl<'a> Near<'a> {
         if gap(before, at) < SAME {
             return answer;
         }
-        let place = at;
+        let position = at;
         let units = f64::from(UNITS);
         let at = [0, 1, 2].map(|axis| (f64::from(self.corner[axis]) + f64::from(at[axis])) * units);
         let way = [0, 1, 2].map(|axis| v.iter().map(|p| f64::from(p[axis])).sum::<f64>() / 3.0 - at[axis]);
@@ -83,7 +83,7 @@ impl<'a> Near<'a> {
         let at = [0, 1, 2].map(|axis| at[axis] + part * way[axis]);
         let Volume { bins, exposure, .. } = self.volume;
         let open = is_open(bins, exposure, *face, at, &mut self.prisms.borrow_mut());
-        self.queried.borrow_mut()[index as usize] = (place, open);
+        self.queried.borrow_mut()[index as usize] = (position, open);
         open
     }
 
@@ -205,19 +205,19 @@ impl Near<'_> {
         let mut order: Vec<(f32, usize)> =
             squares.filter(|(square, _)| *square < self.limit * self.limit).collect();
         order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let open = |(_, place): &(f32, usize)| {
-            let Offsets { x, y, z, .. } = &offsets[*place];
-            self.is_open(ids[*place], [p[0] - x[lane], p[1] - y[lane], p[2] - z[lane]])
+        let open = |(_, position): &(f32, usize)| {
+            let Offsets { x, y, z, .. } = &offsets[*position];
+            self.is_open(ids[*position], [p[0] - x[lane], p[1] - y[lane], p[2] - z[lane]])
         };
         let first = order.iter().position(open).unwrap_or(order.len());
         let mut best = order.get(first).map_or(self.limit, |(square, _)| square.sqrt());
         // Nearer facets are not open at their nearest point, but may be open elsewhere.
-        for (square, place) in &order[..first] {
+        for (square, position) in &order[..first] {
             let distance = square.sqrt();
             if distance > CLIPPED || distance > best - SLACK {
                 break;
             }
-            best = self.distance_of_open(ids[*place], p, best);
+            best = self.distance_of_open(ids[*position], p, best);
         }
         best
     }

@@ -67,7 +67,7 @@ struct Along {
 /// See [`Spot`].
 #[derive(Debug, Clone, Copy, Default)]
 struct Meeting {
-    place: f64,
+    position: f64,
     face: u32,
     enters: bool,
 }
@@ -79,8 +79,8 @@ pub struct Spot {
     pub axis: Axis,
     /// The line's coordinates.
     pub line: [i32; 2],
-    /// The place along it (cells from the origin voxel).
-    pub place: f64,
+    /// The position along it (cells from the origin voxel).
+    pub position: f64,
     /// Whether the line enters the volume there, in the direction of its axis.
     pub enters: bool,
     /// The face that is outermost there.
@@ -91,7 +91,7 @@ impl Spot {
     /// Position (cells from the origin voxel).
     pub fn at(&self) -> Point {
         let mut at = self.axis.voxel(self.line, 0).map(f64::from);
-        at[self.axis.index()] = self.place;
+        at[self.axis.index()] = self.position;
         at
     }
 }
@@ -161,10 +161,10 @@ impl Exposure {
         spots.into_iter().map(|(_, spot)| spot).collect()
     }
 
-    /// Whether a line parallel to that of `spot` has a meeting of the same direction within `off` cells of `place`.
-    pub fn agrees(&self, spot: &Spot, line: [i32; 2], place: f64, off: f64) -> bool {
+    /// Whether a line parallel to that of `spot` has a meeting of the same direction within `off` cells of `position`.
+    pub fn agrees(&self, spot: &Spot, line: [i32; 2], position: f64, off: f64) -> bool {
         let mut meetings = self.along[spot.axis.index()].line(line).iter();
-        meetings.any(|other| (other.place - place).abs() <= off && other.enters == spot.enters)
+        meetings.any(|other| (other.position - position).abs() <= off && other.enters == spot.enters)
     }
 
     /// Calls `see` with the voxels of a block that are within a cell of a meeting on a line through them, and with that
@@ -175,13 +175,15 @@ impl Exposure {
             let (first, [p, q]) = (corner[axis.index()], axis.line(corner));
             for line in (0..8).flat_map(|i| (0..8).map(move |j| [p + i, q + j])) {
                 let meetings = along.line(line);
-                let begin = meetings.partition_point(|meeting| meeting.place < f64::from(first - 1));
+                let begin = meetings.partition_point(|meeting| meeting.position < f64::from(first - 1));
                 let end = f64::from(first + 8);
-                for meeting in meetings[begin..].iter().take_while(|meeting| meeting.place < end) {
-                    let below = floor(meeting.place);
-                    for place in (below..=below + 1).filter(|place| (first..first + 8).contains(place)) {
-                        let [x, y, z] = axis.voxel(line, place).map(|value| (value & 7) as usize);
-                        see(offset(x, y, z), (meeting.place - f64::from(place)).abs() as f32);
+                for meeting in meetings[begin..].iter().take_while(|meeting| meeting.position < end) {
+                    let below = floor(meeting.position);
+                    for position in
+                        (below..=below + 1).filter(|position| (first..first + 8).contains(position))
+                    {
+                        let [x, y, z] = axis.voxel(line, position).map(|value| (value & 7) as usize);
+                        see(offset(x, y, z), (meeting.position - f64::from(position)).abs() as f32);
                     }
                 }
             }
@@ -215,8 +217,8 @@ impl Along {
             (self.axis.line(low.map(|v| v.ceil() as i32)), self.axis.line(high.map(|v| v.floor() as i32)));
         let along = self.axis.index();
         let inside = |meeting: &Meeting| {
-            let place = meeting.place as f32;
-            meeting.face == face && place >= low[along] && place <= high[along]
+            let position = meeting.position as f32;
+            meeting.face == face && position >= low[along] && position <= high[along]
         };
         self.columns.between(first, last).any(|line| self.meetings.get(line).iter().any(inside))
     }
@@ -225,10 +227,10 @@ impl Along {
     fn spots(&self) -> impl Iterator<Item = Spot> {
         let Self { axis, columns, meetings } = self;
         (0..meetings.count()).flat_map(move |line| {
-            let spot = move |&Meeting { place, face, enters }: &Meeting| Spot {
+            let spot = move |&Meeting { position, face, enters }: &Meeting| Spot {
                 axis: *axis,
                 line: columns.coordinates(line),
-                place,
+                position,
                 enters,
                 face,
             };
@@ -240,13 +242,13 @@ impl Along {
 /// The columns of the lines along an axis through the bins' blocks.
 fn columns(bins: &Bins, axis: Axis) -> Columns {
     let mut columns = Columns::new(axis.line(bins.region.low), axis.line(bins.region.high));
-    bins.places().for_each(|block| columns.add(axis.line(block)));
+    bins.positions().for_each(|block| columns.add(axis.line(block)));
     columns
 }
 
 /// Every crossing of the lines along an axis within the bins' blocks, and the number of them in each bin.
 fn crossings(bins: &Bins, axis: Axis, columns: &Columns, counts: &[AtomicU16]) -> Lists<Crossing> {
-    let corner = |block: [i32; 3], more: i32| block.map(|place| place * 8 + more);
+    let corner = |block: [i32; 3], more: i32| block.map(|position| position * 8 + more);
     let bounds = axis.bounds(corner(bins.region.low, 0), corner(bins.region.high, 7));
     let cross = |(chunk, faces): (usize, &[Face])| {
         let mut out = Vec::with_capacity(faces.len());
@@ -274,9 +276,9 @@ fn stacks(bins: &Bins, counts: &[AtomicU16]) -> Vec<bool> {
         let count =
             |voxel| bins.of_voxel(voxel).map_or(0, |bin| u32::from(counts[bin].load(Ordering::Relaxed)));
         let beside = |axis: usize, step: i32| {
-            let mut place = voxel;
-            place[axis] += step;
-            count(place)
+            let mut position = voxel;
+            position[axis] += step;
+            count(position)
         };
         let around: u32 = (0..3).map(|axis| beside(axis, -1) + beside(axis, 1)).sum();
         stacks[bin].store(count(voxel) + around >= STACK, Ordering::Relaxed);
@@ -310,10 +312,10 @@ fn walk(
                 continue;
             }
             // Entered again right after it was left: a closed gap.
-            if enters && out[begin..].last().is_some_and(|last| at - last.place < CLOSED) {
+            if enters && out[begin..].last().is_some_and(|last| at - last.position < CLOSED) {
                 out.pop();
             } else {
-                out.push(Meeting { place: at, enters, face });
+                out.push(Meeting { position: at, enters, face });
             }
         }
         let slope = |face: u32| {
@@ -323,7 +325,7 @@ fn walk(
         let meetings = &out[begin..];
         for meeting in meetings {
             let slope = slope(meeting.face);
-            let close = run.iter().filter(|crossing| (crossing.at - meeting.place).abs() * slope <= CLOSE);
+            let close = run.iter().filter(|crossing| (crossing.at - meeting.position).abs() * slope <= CLOSE);
             if close.count() >= BUNDLE {
                 let ends = [edge, edge + 1].map(|along| bins.of_voxel(axis.voxel(coordinates, along)));
                 ends.into_iter().flatten().for_each(|bin| marks.bundles[bin].store(true, Ordering::Relaxed));
@@ -331,7 +333,8 @@ fn walk(
         }
         for crossing in run {
             let slope = slope(crossing.face);
-            let shallow = meetings.iter().any(|meeting| (crossing.at - meeting.place).abs() * slope <= THIN);
+            let shallow =
+                meetings.iter().any(|meeting| (crossing.at - meeting.position).abs() * slope <= THIN);
             let mark = if shallow { OPEN } else { BURIED };
             marks.faces[crossing.face as usize].fetch_or(mark, Ordering::Relaxed);
         }

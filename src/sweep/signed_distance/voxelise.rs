@@ -175,13 +175,13 @@ impl Voxeliser {
         let mut slots = vec![NONE; count.len()];
         for (block, &count) in count.iter().enumerate().filter(|(_, count)| **count > 0) {
             slots[block] = self.near.len() as u32;
-            self.near.push(self.bins.region.place(block));
+            self.near.push(self.bins.region.position(block));
             self.start.push(self.start[self.start.len() - 1] + count);
         }
-        let mut place = self.start.clone();
+        let mut position = self.start.clone();
         self.ids = vec![0; self.start[self.start.len() - 1] as usize];
         for &(block, id) in pairs.iter().flatten() {
-            let slot = &mut place[slots[block as usize] as usize];
+            let slot = &mut position[slots[block as usize] as usize];
             self.ids[*slot as usize] = id;
             *slot += 1;
         }
@@ -322,7 +322,7 @@ fn mark_wanted(
 ) -> Result<Vec<bool>> {
     let near = mark_near(faces, region, reach);
     let blocks: Vec<[i32; 3]> =
-        (0..near.len()).filter(|&block| near[block]).map(|block| region.place(block)).collect();
+        (0..near.len()).filter(|&block| near[block]).map(|block| region.position(block)).collect();
     let mut marked = vec![false; region.blocks()];
     for (block, wanted) in blocks.iter().zip(wanted(&blocks)?) {
         marked[region.index(*block)] = wanted;

@@ -235,7 +235,7 @@ fn nth(mut headers: Vec<GridInfo>, at: usize) -> Option<Chosen> {
     let mut numbers: Vec<String> = (first..all).map(|number| number.to_string()).collect();
     numbers.sort();
     let unique = match before.checked_sub(first) {
-        Some(place) if all > 1 => format!("{name}[{}]", numbers.get(place)?),
+        Some(position) if all > 1 => format!("{name}[{}]", numbers.get(position)?),
         _ => name,
     };
     Some((at, headers.swap_remove(at), unique))

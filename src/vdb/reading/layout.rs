@@ -163,7 +163,7 @@ impl<R: Read + Seek> Walk<R> {
         self.go_to(self.at + count)
     }
 
-    /// Goes to a place that is known to lie within the file.
+    /// Goes to a position that is known to lie within the file.
     fn go_to(&mut self, at: u64) -> Result<(), Fault> {
         // Relative steps keep what is buffered.
         self.source.seek_relative(at as i64 - self.at as i64)?;
@@ -210,7 +210,7 @@ impl<R: Read + Seek> Walk<R> {
         Ok((self.name(part)?, self.name(part)?, self.u32(part)?.into()))
     }
 
-    /// Skips a list of metadata, which must end before a place.
+    /// Skips a list of metadata, which must end before a position.
     fn metadata(&mut self, before: u64, part: &str) -> Result<(), Fault> {
         let count = self.u32(part)?;
         for _ in 0..count {
@@ -290,8 +290,8 @@ mod tests {
             text(&mut bytes, "");
         }
         let begin = bytes.len() as i64 + 24;
-        let places = if offsets { [begin, begin + 20, begin + 50] } else { [0; 3] };
-        bytes.extend(places.iter().flat_map(|place| place.to_le_bytes()));
+        let positions = if offsets { [begin, begin + 20, begin + 50] } else { [0; 3] };
+        bytes.extend(positions.iter().flat_map(|position| position.to_le_bytes()));
         bytes.extend([0; 50]);
         bytes
     }

@@ -210,7 +210,7 @@ fn arrays<V>(parcel: &[u8], at: &mut usize, count: usize) -> Option<Arrays> {
     let [origins, masks, values] = arrays;
     let whole = |four: &[u8]| i32::from_ne_bytes([four[0], four[1], four[2], four[3]]);
     let origins: Vec<i32> = origins.chunks_exact(4).map(whole).collect();
-    origins.iter().all(|place| place % 8 == 0).then_some(())?;
+    origins.iter().all(|position| position % 8 == 0).then_some(())?;
     let addresses = |array: &[u8], size: usize| -> Vec<usize> {
         (0..count).map(|leaf| array.as_ptr() as usize + leaf * size).collect()
     };
@@ -249,7 +249,7 @@ impl Head {
         self.number(info.half.into());
         self.number(info.bbox.is_some().into());
         let (low, high) = info.bbox.unwrap_or_default();
-        low.iter().chain(&high).for_each(|&place| self.number(place as u64));
+        low.iter().chain(&high).for_each(|&position| self.number(position as u64));
         self.number(info.metadata.len() as u64);
         for (key, value) in &info.metadata {
             self.text(key);
@@ -283,7 +283,7 @@ impl Head {
         background.iter().for_each(|component| self.number(component.to_bits().into()));
         self.number(tiles.len() as u64);
         for tile in tiles {
-            let [x, y, z] = [tile.x, tile.y, tile.z].map(|place| place as u32);
+            let [x, y, z] = [tile.x, tile.y, tile.z].map(|position| position as u32);
             let [a, b, c] = tile.value.map(f32::to_bits);
             let words = [x, y, z, tile.level, tile.active.into(), a, b, c];
             self.0.extend(words.iter().flat_map(|word| word.to_ne_bytes()));
@@ -325,7 +325,7 @@ impl<'a> Cursor<'a> {
         let mut word = || Some(u32::from_ne_bytes(self.take(4)?.try_into().ok()?));
         let [x, y, z, level, active] = [word()?, word()?, word()?, word()?, word()?];
         let value = [word()?, word()?, word()?].map(f32::from_bits);
-        let [x, y, z] = [x, y, z].map(|place| place as i32);
+        let [x, y, z] = [x, y, z].map(|position| position as i32);
         let known = (1..=3).contains(&level);
         known.then_some(ffi::Tile { x, y, z, level, active: active != 0, value })
     }
@@ -336,8 +336,8 @@ impl<'a> Cursor<'a> {
         let (active_voxels, memory) = (self.option()?, self.option()?);
         let half = self.number()? != 0;
         let has_box = self.number()? != 0;
-        let mut place = || Some(self.number()? as i32);
-        let (low, high) = ([place()?, place()?, place()?], [place()?, place()?, place()?]);
+        let mut position = || Some(self.number()? as i32);
+        let (low, high) = ([position()?, position()?, position()?], [position()?, position()?, position()?]);
         let metadata = (0..self.number()?).map(|_| self.meta()).collect::<Option<_>>()?;
         let bbox = has_box.then_some((low, high));
         Some(GridInfo {

@@ -21,7 +21,7 @@ fn write(folder: &Path, name: &str, mesh: &TriMesh) {
 
 fn moved(mesh: &TriMesh, by: [f32; 3]) -> TriMesh {
     let mut mesh = mesh.clone();
-    mesh.positions.iter_mut().for_each(|place| *place += Vec3::from(by));
+    mesh.positions.iter_mut().for_each(|position| *position += Vec3::from(by));
     mesh
 }
 
@@ -119,10 +119,10 @@ fn a_part_that_one_mesh_lacks_is_seen_from_the_other_only() {
     assert_eq!(swapped["b_to_a"], found["a_to_b"]);
 }
 
-/// A cube of 1 m at places along x (m), a frame for each.
-fn write_ride(folder: &Path, name: &str, places: &[f32]) {
-    for (place, frame) in places.iter().zip(1..) {
-        write(folder, &format!("{name}.{frame:04}.ply"), &moved(&cuboid([1.0; 3]), [*place, 0.0, 0.0]));
+/// A cube of 1 m at positions along x (m), a frame for each.
+fn write_ride(folder: &Path, name: &str, positions: &[f32]) {
+    for (position, frame) in positions.iter().zip(1..) {
+        write(folder, &format!("{name}.{frame:04}.ply"), &moved(&cuboid([1.0; 3]), [*position, 0.0, 0.0]));
     }
 }
 

@@ -153,10 +153,10 @@ fn write_grains(folder: &Path) {
 
 /// Two frames of a particle cache.
 fn write_splash(folder: &Path) {
-    let place = |n: i32| {
+    let position = |n: i32| {
         format!("{} {} {}\n", 0.1 * f64::from(n % 5), 0.1 * f64::from(n / 5 % 5), 0.1 * f64::from(n / 25))
     };
-    fs::write(folder.join("splash.xyz"), (0..125).map(place).collect::<String>()).unwrap();
+    fs::write(folder.join("splash.xyz"), (0..125).map(position).collect::<String>()).unwrap();
     for frame in [1, 2] {
         works(folder, &format!("frazil convert splash.xyz splash.000{frame}.bgeo"));
     }

@@ -21,14 +21,14 @@ fn hill() -> TriMesh {
         let (x, z) = (f64::from(x) - 6.0, f64::from(z) - 6.0);
         ((0.8 - 0.02 * (x * x + z * z) + 0.03 * x * z) * 1024.0).round() / 1024.0
     };
-    let place = |n: u32| {
+    let position = |n: u32| {
         let (x, z) = (n % count, n / count);
         Vec3::new(x as f32 * 0.5 - 3.0, height(x, z) as f32, z as f32 * 0.5 - 3.0)
     };
     let square = |n: u32| [[n, n + count, n + count + 1], [n, n + count + 1, n + 1]];
     let is_square = |n: &u32| n % count + 1 < count && n / count + 1 < count;
     TriMesh {
-        positions: (0..count * count).map(place).collect(),
+        positions: (0..count * count).map(position).collect(),
         triangles: (0..count * count).filter(is_square).flat_map(square).collect(),
     }
 }
@@ -230,10 +230,10 @@ fn every_door_warns_of_what_lies_far_from_the_origin() {
 /// Text of any precision, and 64-bit numbers, keep what they hold.
 #[test]
 fn readers_subtract_an_origin_in_64_bits() {
-    let place = DVec3::new(652_301.000_123_4, -0.062_5, 5_182_300.999_876_5);
+    let position = DVec3::new(652_301.000_123_4, -0.062_5, 5_182_300.999_876_5);
     let origin = DVec3::new(652_301.0, 0.0, 5_182_300.0);
-    let expected: Vec3 = (place - origin).cast();
-    let vertices = [place, place + DVec3::x(), place + DVec3::y()];
+    let expected: Vec3 = (position - origin).cast();
+    let vertices = [position, position + DVec3::x(), position + DVec3::y()];
     let lines = |before: &str| -> String {
         vertices.iter().map(|p| format!("{before}{} {} {}\n", p.x, p.y, p.z)).collect()
     };

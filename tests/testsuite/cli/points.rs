@@ -13,8 +13,8 @@ use crate::program::{CUBE, fails, works};
 
 /// A few grains, with a file of them.
 fn grains(folder: &Path, name: &str) -> Points {
-    let places: Vec<DVec3> = (0..60).map(|n| DVec3::new(f64::from(n) * 0.013, 0.5, -1.0)).collect();
-    let mut grains = Points::at(0.01, &places).unwrap();
+    let positions: Vec<DVec3> = (0..60).map(|n| DVec3::new(f64::from(n) * 0.013, 0.5, -1.0)).collect();
+    let mut grains = Points::at(0.01, &positions).unwrap();
     let speed = |n: i32| [n as f32 * 0.5, -1.25, 0.0];
     grains.set("v", Values::Vector(Column::Each((0..60).map(speed).collect())));
     grains.set("id", Values::Long(Column::Each((0..60).collect())));
@@ -117,7 +117,7 @@ fn points_of_another_unit_and_axis_are_turned_with_their_vectors() {
     works(folder, "convert a.vtk a.ply --scale 0.01 --up z");
     let cloud = frazil::io::particles::read(&folder.join("a.ply")).unwrap();
     let near = |a: DVec3, b: [f64; 3]| assert!((a - DVec3::from(b)).norm() < 1e-6, "{a:?} {b:?}");
-    near(cloud.places[0], [1.0, 3.0, -2.0]);
+    near(cloud.positions[0], [1.0, 3.0, -2.0]);
     let vector = |name: &str, point: usize| match cloud.attribute(name) {
         Some(Values::Vector(column)) => DVec3::from(column.get(point).map(f64::from)),
         other => panic!("{name}: {other:?}"),
@@ -132,8 +132,8 @@ fn points_of_another_unit_and_axis_are_turned_with_their_vectors() {
     let back = points::read_own(&folder.join("h.vdb"), None).unwrap();
     assert_eq!(back.voxel_size, 0.02);
     let found = |id: f64| (0..60).find(|&point| back.attribute("id").unwrap().number(point) == id).unwrap();
-    let (place, now) = (given.position(0), back.position(found(given.attribute("id").unwrap().number(0))));
-    near(now, [2.0 * place.x, 2.0 * place.z, -2.0 * place.y]);
+    let (position, now) = (given.position(0), back.position(found(given.attribute("id").unwrap().number(0))));
+    near(now, [2.0 * position.x, 2.0 * position.z, -2.0 * position.y]);
 }
 
 #[test]

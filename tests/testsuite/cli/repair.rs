@@ -163,19 +163,19 @@ type Corner = [u64; 5];
 /// A triangle by where its corners lie, beginning with the least, with the numbers of these and of the face.
 type Placed = ([[u32; 3]; 3], ([Corner; 3], u64));
 
-fn by_places(detail: &DetailedMesh) -> Vec<Placed> {
+fn by_positions(detail: &DetailedMesh) -> Vec<Placed> {
     let DetailedMesh { mesh, uvs, arrays } = detail;
     let uvs = uvs.as_ref().unwrap();
     let values = |name: &str| &arrays.iter().find(|array| array.name == name).unwrap().values;
     let [dry, mask, red, part] = ["dry", "mask", "red", "part"].map(values);
     let triangle = |n: usize| {
-        let places = uvs.indices(&mesh.triangles, n).map(|index| uvs.places[index as usize]);
+        let positions = uvs.indices(&mesh.triangles, n).map(|index| uvs.positions[index as usize]);
         let mut corners = [0, 1, 2].map(|corner| {
             let vertex = mesh.triangles[n][corner] as usize;
-            let [u, v] = places[corner].map(|x| u64::from(x.to_bits()));
+            let [u, v] = positions[corner].map(|x| u64::from(x.to_bits()));
             let numbers = [dry[3 * n + corner], mask[vertex], red[vertex]].map(f64::to_bits);
-            let place: [f32; 3] = mesh.positions[vertex].into();
-            (place.map(f32::to_bits), [u, v, numbers[0], numbers[1], numbers[2]])
+            let position: [f32; 3] = mesh.positions[vertex].into();
+            (position.map(f32::to_bits), [u, v, numbers[0], numbers[1], numbers[2]])
         });
         let least = (0..3).min_by_key(|corner| corners[*corner].0).unwrap();
         corners.rotate_left(least);
@@ -203,22 +203,24 @@ fn what_is_not_rebuilt_keeps_its_arrays_bit_for_bit() {
         array("dry", On::Corners, Number::F32, (0..corners).map(|n| 0.125 * f64::from(n)).collect()),
     ];
     // Each corner has its own: seams everywhere.
-    let places = (0..corners).map(|n| [0.25 * n as f32, 1.0 + n as f32]).collect();
-    let uvs = Uvs { places, corners: Some((0..corners).collect()), missing: 0 };
+    let positions = (0..corners).map(|n| [0.25 * n as f32, 1.0 + n as f32]).collect();
+    let uvs = Uvs { positions, corners: Some((0..corners).collect()), missing: 0 };
     let arrays: Vec<&MeshArray> = arrays.iter().collect();
     let carried = mesh::Carried { uvs: Some(&uvs), arrays: &arrays, ..Default::default() };
     mesh::write_carried(&folder.join("two.ply"), &mesh, &carried).unwrap();
     works(folder, "mesh repair two.ply -o one.ply");
     let [before, after] = ["two.ply", "one.ply"].map(|name| mesh::read_detailed(&folder.join(name)).unwrap());
-    let known: BTreeMap<_, _> = by_places(&before).into_iter().collect();
-    let found = by_places(&after);
-    let same = found.iter().filter(|(places, _)| known.contains_key(places)).count();
+    let known: BTreeMap<_, _> = by_positions(&before).into_iter().collect();
+    let found = by_positions(&after);
+    let same = found.iter().filter(|(positions, _)| known.contains_key(positions)).count();
     assert!(same > 1300 && same < found.len(), "{same} of {}", found.len());
-    let differ = found.iter().filter(|(places, numbers)| known.get(places).is_some_and(|was| was != numbers));
+    let differ =
+        found.iter().filter(|(positions, numbers)| known.get(positions).is_some_and(|was| was != numbers));
     assert_eq!(differ.count(), 0);
     // What was made has what lies nearest.
     let mask = &after.arrays.iter().find(|array| array.name == "mask").unwrap().values;
-    let farthest = mask.iter().zip(&after.mesh.positions).map(|(x, place)| (x - f64::from(place.x)).abs());
+    let farthest =
+        mask.iter().zip(&after.mesh.positions).map(|(x, position)| (x - f64::from(position.x)).abs());
     assert!(farthest.fold(0.0, f64::max) < 0.1);
     // What a format cannot hold is said.
     let said = works(folder, "mesh repair two.ply -o one.obj");

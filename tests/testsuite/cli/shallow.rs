@@ -15,14 +15,14 @@ const CLI: &str = include_str!("../../../docs/cli.md");
 /// A dish of 8 cm: a sheet that rises towards its edge.
 fn write_dish(folder: &Path) {
     let count = 17u32;
-    let place = |index: u32| {
+    let position = |index: u32| {
         let [x, z] = [index % count, index / count].map(|at| 0.005 * (at as f32 - 8.0));
         Vec3::new(x, 8.0 * (x * x + z * z), z)
     };
     let is_square = |index: &u32| index % count + 1 < count && index / count + 1 < count;
     let square = |a: u32| [[a, a + count, a + count + 1], [a, a + count + 1, a + 1]];
     let triangles = (0..count * count).filter(is_square).flat_map(square).collect();
-    let dish = TriMesh { positions: (0..count * count).map(place).collect(), triangles };
+    let dish = TriMesh { positions: (0..count * count).map(position).collect(), triangles };
     mesh::write(&folder.join("dish.obj"), &dish).unwrap();
 }
 

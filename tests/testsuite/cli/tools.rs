@@ -185,7 +185,7 @@ fn mesh_check_finds_parts_that_are_inside_out() {
 }
 
 #[test]
-fn mesh_check_says_what_joining_vertices_by_place_hides() {
+fn mesh_check_says_what_joining_vertices_by_position_hides() {
     let folder = folder();
     let whole = shapes::cuboid([1.0; 3]);
     let positions: Vec<_> =

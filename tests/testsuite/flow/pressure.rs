@@ -102,11 +102,11 @@ fn ball(tiles: &Tiles, cell: f32, radius: f32, speed: [f32; 3]) -> Solids {
         for cell in 0..512usize {
             let at = [cell >> 6, cell >> 3 & 7, cell & 7];
             for (axis, speed) in speed.into_iter().enumerate() {
-                let place = [0, 1, 2].map(|other| {
+                let position = [0, 1, 2].map(|other| {
                     let half = if other == axis { 0.0 } else { 0.5 };
                     (coord[other] * 8 + at[other] as i32) as f32 + half - 4.0 / wider
                 });
-                let distance = place.iter().map(|x| x * x).sum::<f32>().sqrt() - radius / wider;
+                let distance = position.iter().map(|x| x * x).sum::<f32>().sqrt() - radius / wider;
                 tile.open[axis][cell] = (0.5 + distance).clamp(0.0, 1.0);
                 tile.speed[axis][cell] = speed;
                 touches |= tile.open[axis][cell] < 1.0;

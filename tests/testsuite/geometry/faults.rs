@@ -60,14 +60,14 @@ fn bodies_that_share_an_edge_crowd_it() {
 }
 
 #[test]
-fn a_cube_of_loose_triangles_is_closed_by_place_only() {
+fn a_cube_of_loose_triangles_is_closed_by_position_only() {
     let cube = shapes::cuboid([1.0; 3]);
     let whole = Faults::of(&cube);
     assert!(whole.is_solid() && whole.is_embedded() && whole.by_index.is_watertight());
     let faults = Faults::of(&apart(&cube));
     assert!(faults.is_solid() && faults.is_embedded() && !faults.by_index.is_watertight());
     assert_eq!((faults.open_edges, faults.by_index.open_edges, faults.doubled_vertices), (0, 36, 28));
-    // Turned by index, and by place.
+    // Turned by index, and by position.
     let mut turned = cube.clone();
     turned.triangles[0].swap(0, 1);
     let faults = Faults::of(&turned);
@@ -158,9 +158,9 @@ fn sound_surfaces_have_no_faults_in_any_position() {
     // A sheet of squares in planes of every kind: all triangles around a vertex in one plane, many edges in line.
     let n = 12u32;
     let planes: [fn(f32, f32) -> [f32; 3]; 3] = [|s, t| [s, t, 0.0], |s, t| [s, s, t], |s, t| [s, t, s + t]];
-    for place in planes {
+    for position in planes {
         let positions: Vec<[f32; 3]> =
-            (0..n * n).map(|at| place((at / n) as f32 * 0.1, (at % n) as f32 * 0.1)).collect();
+            (0..n * n).map(|at| position((at / n) as f32 * 0.1, (at % n) as f32 * 0.1)).collect();
         let mut triangles = Vec::new();
         for corner in (0..n * n).filter(|at| at / n + 1 < n && at % n + 1 < n) {
             triangles.extend([[corner, corner + n, corner + n + 1], [corner, corner + n + 1, corner + 1]]);
@@ -213,16 +213,16 @@ fn many_triangles_around_a_vertex_meet_in_it_alone() {
         let (sin, cos) = (std::f64::consts::TAU * f64::from(at) / f64::from(n)).sin_cos();
         [1e3 * cos as f32, 1e3 * sin as f32, 0.0]
     };
-    let mut places: Vec<[f32; 3]> = (0..n).map(on_rim).chain([[0.0; 3]]).collect();
+    let mut positions: Vec<[f32; 3]> = (0..n).map(on_rim).chain([[0.0; 3]]).collect();
     let mut around: Vec<[u32; 3]> = (0..n).map(|at| [n, at, (at + 1) % n]).collect();
     let across = (3 * n / 4..5 * n / 4).map(|at| [n / 2, at % n, (at + 1) % n]);
     let from_rim: Vec<[u32; 3]> = across.collect();
-    assert_eq!(pairs(&mesh(&places, &around)), [0; 5]);
-    assert_eq!(pairs(&mesh(&places, &from_rim)), [0; 5]);
+    assert_eq!(pairs(&mesh(&positions, &around)), [0; 5]);
+    assert_eq!(pairs(&mesh(&positions, &from_rim)), [0; 5]);
     // One more at the centre: under the cap, then through one triangle of it.
-    places.extend([[400.0, -0.9, -1.0], [400.0, 1.1, -1.0]]);
+    positions.extend([[400.0, -0.9, -1.0], [400.0, 1.1, -1.0]]);
     around.push([n, n + 1, n + 2]);
-    assert_eq!(pairs(&mesh(&places, &around)), [0; 5]);
-    places[n as usize + 2][2] = 1.0;
-    assert_eq!(pairs(&mesh(&places, &around)), [0, 1, 0, 0, 0]);
+    assert_eq!(pairs(&mesh(&positions, &around)), [0; 5]);
+    positions[n as usize + 2][2] = 1.0;
+    assert_eq!(pairs(&mesh(&positions, &around)), [0, 1, 0, 0, 0]);
 }

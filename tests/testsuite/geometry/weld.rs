@@ -8,8 +8,8 @@ use crate::common::bodies::Dice;
 use crate::common::soups::solids;
 
 fn weld(mesh: &TriMesh) -> Weld {
-    let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
-    Weld::of(&places, &mesh.triangles)
+    let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
+    Weld::of(&positions, &mesh.triangles)
 }
 
 fn welded(mesh: &TriMesh, weld: &Weld) -> TriMesh {
@@ -43,9 +43,9 @@ fn soup_that_is_off_by_rounding_is_the_solid_that_it_was_made_of() {
                 assert!(whole.is_closed() && weld.ambiguous.is_empty(), "{what}: {weld:?}");
                 let ratio = whole.volume() / (solid.volume * size.powi(3));
                 assert!((ratio - 1.0).abs() < 0.01, "{what}: {ratio}");
-                let places = soup.positions.iter().map(|place| place.cast());
+                let positions = soup.positions.iter().map(|position| position.cast());
                 // Soup that closes where corners are equal keeps the order that this gives.
-                assert!(steps > 0 || weld.firsts == coincident(places), "{what}");
+                assert!(steps > 0 || weld.firsts == coincident(positions), "{what}");
                 assert!(weld.firsts.iter().enumerate().all(|(vertex, &first)| first as usize <= vertex));
                 let mut same = soup.positions.clone();
                 weld.unify(&mut same);
@@ -60,7 +60,10 @@ fn zero_and_what_a_turn_leaves_of_it_are_one() {
     let mut mesh = soup_of(&TriMesh::cuboid([-1.0, 0.0, -1.0], [1.0, 2.0, 1.0]));
     let noise = [0.0, -0.0, 1e-12, -3e-8, 1.2e-7];
     let mut next = (0..).map(|at| noise[at % noise.len()]);
-    mesh.positions.iter_mut().filter(|place| place.y == 0.0).for_each(|place| place.y = next.next().unwrap());
+    mesh.positions
+        .iter_mut()
+        .filter(|position| position.y == 0.0)
+        .for_each(|position| position.y = next.next().unwrap());
     let weld = weld(&mesh);
     assert!(welded(&mesh, &weld).is_manifold() && weld.ambiguous.is_empty(), "{weld:?}");
 }
@@ -68,9 +71,10 @@ fn zero_and_what_a_turn_leaves_of_it_are_one() {
 /// A cuboid whose top has come off by so many steps.
 fn with_slit(steps: usize) -> TriMesh {
     let mut mesh = TriMesh::cuboid([-0.5, 0.5, -0.5], [0.5, 1.5, 0.5]);
-    let is_top = |place: &Vec3| place.y == 1.5;
+    let is_top = |position: &Vec3| position.y == 1.5;
     let old = mesh.positions.clone();
-    mesh.positions.extend(old.iter().map(|place| Vec3::new(place.x, up(place.y, steps), place.z)));
+    mesh.positions
+        .extend(old.iter().map(|position| Vec3::new(position.x, up(position.y, steps), position.z)));
     for corners in
         mesh.triangles.iter_mut().filter(|corners| corners.iter().all(|at| is_top(&old[*at as usize])))
     {
@@ -96,7 +100,7 @@ fn a_slit_is_closed_up_to_four_steps_and_stays_beyond() {
     }
     // Far away along another axis, where coordinates are coarse: those along this one are as fine as they were.
     let mut far = with_slit(16);
-    far.positions.iter_mut().for_each(|place| place.x += 65536.0);
+    far.positions.iter_mut().for_each(|position| position.x += 65536.0);
     assert!(weld(&far).near.is_empty());
 }
 
@@ -105,8 +109,8 @@ fn open_meshes_stay_as_they_are() {
     let mut box_without_lid = TriMesh::cuboid([0.0; 3], [1.0; 3]);
     box_without_lid.triangles.truncate(10);
     for mesh in [box_without_lid.clone(), soup_of(&box_without_lid)] {
-        let places = mesh.positions.iter().map(|place| place.cast());
-        assert_eq!(weld(&mesh), Weld { firsts: coincident(places), ..Weld::default() });
+        let positions = mesh.positions.iter().map(|position| position.cast());
+        assert_eq!(weld(&mesh), Weld { firsts: coincident(positions), ..Weld::default() });
     }
 }
 
@@ -128,8 +132,8 @@ fn the_ends_of_an_edge_are_never_one() {
             triangles: vec![[0, 1, 2], [1, 3, 2], [1, 4, 3]],
         };
         let mut soup = soup_of(&sheet);
-        for place in &mut soup.positions {
-            *place = place.map(|value| up(value, dice.below(2)));
+        for position in &mut soup.positions {
+            *position = position.map(|value| up(value, dice.below(2)));
         }
         let weld = weld(&soup);
         let whole = welded(&soup, &weld);
@@ -142,7 +146,7 @@ fn what_rounding_does_not_decide_is_warned_of() {
     // Cells of 8 mm, where neighbouring numbers are 7.8 mm apart.
     let mut dice = Dice(3);
     let mut small = solids(&mut dice).swap_remove(4);
-    small.places.iter_mut().for_each(|place| *place *= 0.5);
+    small.positions.iter_mut().for_each(|position| *position *= 0.5);
     let soup = small.soup(1.0, DVec3::new(1e5, 1e5, 1e5), 4, &mut dice);
     let weld = weld(&soup);
     assert!(!welded(&soup, &weld).is_manifold());

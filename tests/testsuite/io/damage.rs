@@ -234,8 +234,8 @@ fn a_model_names_no_file_outside_its_folder() {
     fs::create_dir_all(inner.join("below")).unwrap();
     let triangle: Vec<u8> =
         [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|v| v.to_le_bytes()).collect();
-    for place in ["secret.bin", "in/own data.bin", "in/below/more.bin"] {
-        fs::write(folder.path().join(place), &triangle).unwrap();
+    for position in ["secret.bin", "in/own data.bin", "in/below/more.bin"] {
+        fs::write(folder.path().join(position), &triangle).unwrap();
     }
     let secret = folder.path().join("secret.bin");
     let secret = secret.display();

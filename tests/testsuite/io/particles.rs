@@ -7,7 +7,7 @@ use frazil::geometry::DVec3;
 use frazil::geometry::points::{Column, Points, Values};
 use frazil::io::particles::{self, Cloud};
 
-use crate::common::caches::{IDS, KINDS, PLACES, VELOCITIES, Vtu, bgeo, vtk, zipped};
+use crate::common::caches::{IDS, KINDS, POSITIONS, VELOCITIES, Vtu, bgeo, vtk, zipped};
 
 pub fn parse(name: &str, bytes: &[u8]) -> frazil::Result<Cloud> {
     particles::parse(Path::new(name), bytes)
@@ -16,8 +16,8 @@ pub fn parse(name: &str, bytes: &[u8]) -> frazil::Result<Cloud> {
 /// The four particles, whatever file they were in.
 #[track_caller]
 fn are_the_particles(cloud: &Cloud, what: &str) {
-    let places = PLACES.map(|place| DVec3::from(place.map(f64::from)));
-    assert_eq!(cloud.places, places, "{what}");
+    let positions = POSITIONS.map(|position| DVec3::from(position.map(f64::from)));
+    assert_eq!(cloud.positions, positions, "{what}");
     assert_eq!(
         cloud.attribute("id"),
         Some(&Values::Long(Column::Each(IDS.map(i64::from).to_vec()))),
@@ -97,7 +97,7 @@ fn bgeo_is_read_plain_and_in_gzip_and_houdinis_own_is_named() {
         ("a.bhclassic", plain.clone()),
     ] {
         let cloud = parse(name, &bytes).unwrap();
-        assert_eq!(cloud.places, PLACES.map(|place| DVec3::from(place.map(f64::from))));
+        assert_eq!(cloud.positions, POSITIONS.map(|position| DVec3::from(position.map(f64::from))));
         assert_eq!(cloud.attribute("id"), Some(&Values::Long(Column::Each(vec![-1, 0, 1, 2]))));
         assert_eq!(cloud.attribute("velocity"), Some(&Values::Vector(Column::Each(VELOCITIES.to_vec()))));
         assert_eq!(cloud.attribute("pscale"), Some(&Values::Float(Column::Uniform(0.125))));
@@ -124,12 +124,12 @@ fn bgeo_is_read_plain_and_in_gzip_and_houdinis_own_is_named() {
 
 #[test]
 fn xyz_is_text_or_binary_and_never_both() {
-    let places = PLACES.map(|place| DVec3::from(place.map(f64::from)));
-    let binary: Vec<u8> = PLACES.as_flattened().iter().flat_map(|part| part.to_le_bytes()).collect();
-    assert_eq!(parse("a.xyz", &binary).unwrap().places, places);
+    let positions = POSITIONS.map(|position| DVec3::from(position.map(f64::from)));
+    let binary: Vec<u8> = POSITIONS.as_flattened().iter().flat_map(|part| part.to_le_bytes()).collect();
+    assert_eq!(parse("a.xyz", &binary).unwrap().positions, positions);
     let text = "# particles\r\n0.1 -2.5 1e-7\n\n1,0,3\n4\t5 -6 0 1 0\n  0.25 .5 +0.75";
     let exact = [[0.1, -2.5, 1e-7], [1.0, 0.0, 3.0], [4.0, 5.0, -6.0], [0.25, 0.5, 0.75]].map(DVec3::from);
-    assert_eq!(parse("a.xyz", text.as_bytes()).unwrap().places, exact);
+    assert_eq!(parse("a.xyz", text.as_bytes()).unwrap().positions, exact);
     for (bytes, what) in [
         (&binary[..47], "47 bytes"),
         (b"4\ncomment\n", "line 1"),
@@ -145,7 +145,8 @@ fn xyz_is_text_or_binary_and_never_both() {
 #[test]
 fn points_pass_through_the_files_that_are_written() {
     let folder = tempfile::tempdir().unwrap();
-    let mut points = Points::at(1.0, &PLACES.map(|place| DVec3::from(place.map(f64::from)))).unwrap();
+    let mut points =
+        Points::at(1.0, &POSITIONS.map(|position| DVec3::from(position.map(f64::from)))).unwrap();
     points.set("v", Values::Vector(Column::Each(VELOCITIES.to_vec())));
     points.set("id", Values::Long(Column::Each(vec![5, -7, 1, 2])));
     points.set("pscale", Values::Float(Column::Uniform(0.1)));
@@ -155,7 +156,7 @@ fn points_pass_through_the_files_that_are_written() {
     for name in ["a.bgeo", "a.bgeo.gz", "a.ply", "a.xyz"] {
         let path = folder.path().join(name);
         particles::write(&path, &none, true).unwrap();
-        assert!(particles::read(&path).unwrap().places.is_empty(), "{name}");
+        assert!(particles::read(&path).unwrap().positions.is_empty(), "{name}");
         particles::write(&path, &points, false).unwrap();
         let cloud = particles::read(&path).unwrap();
         assert_eq!(cloud.voxel_size, None);

@@ -17,7 +17,7 @@ fn is_whole_or_refused(name: &str, bytes: &[u8], what: &str) -> Option<Cloud> {
     let cloud = match parse(name, bytes) {
         Ok(cloud) => {
             assert!(
-                cloud.places.iter().all(|place| place.iter().all(|part| part.is_finite())),
+                cloud.positions.iter().all(|position| position.iter().all(|part| part.is_finite())),
                 "{name} {what}"
             );
             for attribute in &cloud.attributes {
@@ -28,7 +28,7 @@ fn is_whole_or_refused(name: &str, bytes: &[u8], what: &str) -> Option<Cloud> {
                     Values::Bool(column) => column.stored().len(),
                     Values::Vector(column) => column.stored().len(),
                 };
-                assert!(stored == cloud.places.len() || attribute.values.is_uniform(), "{name} {what}");
+                assert!(stored == cloud.positions.len() || attribute.values.is_uniform(), "{name} {what}");
             }
             Some(cloud)
         }
@@ -55,13 +55,13 @@ fn cut_files_are_refused_or_lack_whole_arrays_only() {
             match name {
                 "a.bgeo" => assert!(cut == whole && length >= bytes.len() - 2, "{name} {what}"),
                 // The last number of a text may have lost digits.
-                "a.vtk" => assert!(cut.places.len() == whole.places.len(), "{name} {what}"),
+                "a.vtk" => assert!(cut.positions.len() == whole.positions.len(), "{name} {what}"),
                 "b.vtk" => {
                     let is_there = |attribute| whole.attributes.contains(attribute);
                     let are_there = cut.attributes.iter().all(is_there);
-                    assert!(cut.places == whole.places && are_there, "{name} {what}");
+                    assert!(cut.positions == whole.positions && are_there, "{name} {what}");
                 }
-                "a.xyz" => assert!(cut.places.len() <= whole.places.len(), "{name} {what}"),
+                "a.xyz" => assert!(cut.positions.len() <= whole.positions.len(), "{name} {what}"),
                 "b.xyz" => assert!(length == 12, "{name} {what}"),
                 _ => panic!("{name} {what} was accepted"),
             }
@@ -163,7 +163,7 @@ fn a_count_alone_takes_no_memory() {
 }
 
 #[test]
-fn a_place_that_is_not_finite_is_named() {
+fn a_position_that_is_not_finite_is_named() {
     let vtk = vtk(false, "3.0", "POLYDATA");
     let text =
         String::from_utf8(vtk).unwrap().replacen("POINTS 4 float\n0.1 -2.5", "POINTS 4 float\n0.1 nan", 1);
@@ -192,7 +192,7 @@ fn outside(name: &str) -> Option<Cloud> {
     path.map(|path| particles::read(&path).unwrap())
 }
 
-/// A file of another program with its count, first and last place, and attributes, as meshio (.vtk, .vtu) and Python's struct
+/// A file of another program with its count, first and last position, and attributes, as meshio (.vtk, .vtu) and Python's struct
 /// (.bgeo) read them.
 type Known = (&'static str, usize, [[f64; 3]; 2], &'static [&'static str]);
 const KNOWN: [Known; 9] = [
@@ -271,8 +271,8 @@ const FLUID: [[f64; 3]; 2] = [
 fn files_of_other_programs_have_the_particles_that_other_readers_find() {
     for (name, count, ends, attributes) in KNOWN {
         let Some(cloud) = outside(name) else { return };
-        assert_eq!(cloud.places.len(), count, "{name}");
-        assert_eq!([cloud.places[0], cloud.places[count - 1]], ends.map(DVec3::from), "{name}");
+        assert_eq!(cloud.positions.len(), count, "{name}");
+        assert_eq!([cloud.positions[0], cloud.positions[count - 1]], ends.map(DVec3::from), "{name}");
         let names: Vec<&str> = cloud.attributes.iter().map(|attribute| &attribute.name[..]).collect();
         assert_eq!(names, attributes, "{name}");
         if let Some(Values::Long(ids)) = cloud.attribute("id").or(cloud.attribute("index")) {

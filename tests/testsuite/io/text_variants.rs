@@ -17,8 +17,8 @@ fn read(name: &str, bytes: &[u8]) -> frazil::Result<TriMesh> {
     polygons(name, bytes).map(PolygonMesh::into_triangles)
 }
 
-fn places(bytes: &[u8]) -> frazil::Result<Vec<DVec3>> {
-    particles::parse(Path::new("a.xyz"), bytes).map(|cloud| cloud.places)
+fn positions(bytes: &[u8]) -> frazil::Result<Vec<DVec3>> {
+    particles::parse(Path::new("a.xyz"), bytes).map(|cloud| cloud.positions)
 }
 
 /// How a text is written.
@@ -248,12 +248,12 @@ proptest! {
         separator in 0usize..6,
         more in any::<bool>(),
     ) {
-        let decimal = |(digits, places): (i64, u32)| {
-            let ten = 10i64.pow(places);
+        let decimal = |(digits, positions): (i64, u32)| {
+            let ten = 10i64.pow(positions);
             let sign = if digits < 0 { "-" } else { "" };
             let (whole, part) = (digits.abs() / ten, digits.abs() % ten);
-            let point = format!("{sign}{whole}.{part:0width$}", width = places as usize);
-            if places == 0 { format!("{sign}{whole}") } else { point }
+            let point = format!("{sign}{whole}.{part:0width$}", width = positions as usize);
+            if positions == 0 { format!("{sign}{whole}") } else { point }
         };
         let rows: Vec<[String; 3]> = rows.iter().map(|row| row.map(decimal)).collect();
         let expected: Vec<DVec3> =
@@ -277,7 +277,7 @@ proptest! {
                 });
             }
             let text = style.joined(&lines);
-            let found = places(&text);
+            let found = positions(&text);
             prop_assert_eq!(found.unwrap(), expected.clone(), "{}", String::from_utf8_lossy(&text));
         }
     }
@@ -290,7 +290,7 @@ const FACET: &str =
 #[track_caller]
 fn refusal(name: &str, bytes: &[u8]) -> String {
     let error = match name {
-        "a.xyz" => places(bytes).map(drop).unwrap_err(),
+        "a.xyz" => positions(bytes).map(drop).unwrap_err(),
         "a.vtk" => particles::parse(Path::new(name), bytes).map(drop).unwrap_err(),
         _ => polygons(name, bytes).map(drop).unwrap_err(),
     };
@@ -375,7 +375,7 @@ fn decimal_commas_utf_16_and_other_kinds_of_text_are_named() {
     }
     let cr = vtk.replace("0,5", "0.5").replace('\n', "\r");
     let cloud = particles::parse(Path::new("a.vtk"), cr.as_bytes()).unwrap();
-    assert_eq!(cloud.places, [DVec3::new(0.5, 1.0, 2.0)]);
+    assert_eq!(cloud.positions, [DVec3::new(0.5, 1.0, 2.0)]);
 }
 
 /// A changed copy of a text: bytes, words and lines are others, doubled or gone.
@@ -448,7 +448,7 @@ fn damaged_texts_are_a_mesh_or_a_sentence() {
         for (seed, bytes) in cuts.chain(changed) {
             let start = Instant::now();
             let outcome = match name {
-                "a.xyz" => places(&bytes).map(drop),
+                "a.xyz" => positions(&bytes).map(drop),
                 _ => read(name, &bytes).map(|mesh| mesh.validate().unwrap()),
             };
             if let Err(error) = outcome {

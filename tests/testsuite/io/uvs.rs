@@ -25,13 +25,15 @@ fn corners(path: &Path) -> (Vec<[f32; 3]>, Vec<Vec<Corner>>) {
 fn of_polygons(polygons: PolygonMesh) -> (Vec<[f32; 3]>, Vec<Vec<Corner>>) {
     let (mesh, uvs) = polygons.into_textured();
     let uvs = uvs.expect("there are UVs");
-    let places: Vec<[f32; 3]> = mesh.positions.iter().map(|&p| p.into()).collect();
+    let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|&p| p.into()).collect();
     let triangle = |index: usize| {
         let at = uvs.indices(&mesh.triangles, index);
-        (0..3).map(|i| (places[mesh.triangles[index][i] as usize], uvs.places[at[i] as usize])).collect()
+        (0..3)
+            .map(|i| (positions[mesh.triangles[index][i] as usize], uvs.positions[at[i] as usize]))
+            .collect()
     };
     let triangles = (0..mesh.triangles.len()).map(triangle).collect();
-    (places, triangles)
+    (positions, triangles)
 }
 
 /// The corners of a mesh in a .usda file of one frame.
@@ -39,7 +41,7 @@ fn usda(path: &Path, seams: bool) -> (Vec<[f32; 3]>, Vec<Vec<Corner>>) {
     let text = fs::read_to_string(path).unwrap();
     let numbers = |attribute: &str| numbers(&text, attribute);
     let points: Vec<[f32; 3]> = numbers("points").chunks(3).map(|p| [p[0], p[1], p[2]]).collect();
-    let places: Vec<[f32; 2]> = numbers("primvars:st").chunks(2).map(|p| [p[0], p[1]]).collect();
+    let positions: Vec<[f32; 2]> = numbers("primvars:st").chunks(2).map(|p| [p[0], p[1]]).collect();
     assert!(numbers("faceVertexCounts").iter().all(|&count| count == 3.0));
     let faces: Vec<usize> = numbers("faceVertexIndices").iter().map(|&i| i as usize).collect();
     let kind = if seams { "faceVarying" } else { "vertex" };
@@ -50,23 +52,23 @@ fn usda(path: &Path, seams: bool) -> (Vec<[f32; 3]>, Vec<Vec<Corner>>) {
     let at = if seams {
         numbers("primvars:st:indices").iter().map(|&i| i as usize).collect()
     } else {
-        assert_eq!(places.len(), points.len());
+        assert_eq!(positions.len(), points.len());
         faces.clone()
     };
     assert_eq!(at.len(), faces.len());
-    let all: Vec<Corner> = faces.iter().zip(&at).map(|(&p, &t)| (points[p], places[t])).collect();
+    let all: Vec<Corner> = faces.iter().zip(&at).map(|(&p, &t)| (points[p], positions[t])).collect();
     (points, all.chunks(3).map(<[Corner]>::to_vec).collect())
 }
 
 /// Moves a mesh by whole quarters of a metre, which changes no bit of the cube's coordinates but by rounding.
 fn moved(
-    (places, triangles): (Vec<[f32; 3]>, Vec<Vec<Corner>>),
+    (positions, triangles): (Vec<[f32; 3]>, Vec<Vec<Corner>>),
     by: [f64; 3],
 ) -> (Vec<[f32; 3]>, Vec<Vec<Corner>>) {
     let there = |p: [f32; 3]| [0, 1, 2].map(|axis| (f64::from(p[axis]) + by[axis]) as f32);
-    let places = places.into_iter().map(there).collect();
+    let positions = positions.into_iter().map(there).collect();
     let corner = |(p, uv): Corner| (there(p), uv);
-    (places, triangles.into_iter().map(|corners| corners.into_iter().map(corner).collect()).collect())
+    (positions, triangles.into_iter().map(|corners| corners.into_iter().map(corner).collect()).collect())
 }
 
 /// Runs a shot of one object that is carried through the snow.
@@ -241,24 +243,24 @@ type TextureCoordinates = Vec<[f32; 2]>;
 
 /// A cube in a .gltf file: four vertices for each face, whose triangles name them backwards; every face its own UVs.
 fn gltf(folder: &Path) -> (Places, TextureCoordinates, Vec<[usize; 3]>) {
-    let (mut places, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut positions, mut uvs, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
     for axis in 0..3 {
         for side in [-0.2f32, 0.2] {
-            let first = places.len();
+            let first = positions.len();
             for (i, (a, b)) in
                 [(-0.2f32, -0.2f32), (0.2, -0.2), (0.2, 0.2), (-0.2, 0.2)].into_iter().enumerate()
             {
                 let mut p = [side; 3];
                 (p[(axis + 1) % 3], p[(axis + 2) % 3]) = (a, b);
                 p[1] += 0.2;
-                places.push(p);
+                positions.push(p);
                 uvs.push([0.125 * first as f32 + 0.0625 * i as f32, 0.25 * i as f32]);
             }
             let turn = |t: [usize; 3]| if side > 0.0 { t } else { [t[0], t[2], t[1]] };
             triangles.extend([[3, 1, 2], [0, 1, 3]].map(turn).map(|t| t.map(|i| first + i)));
         }
     }
-    let mut bytes: Vec<u8> = places.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
+    let mut bytes: Vec<u8> = positions.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
     bytes.extend(uvs.as_flattened().iter().flat_map(|v: &f32| v.to_le_bytes()));
     bytes.extend(triangles.as_flattened().iter().flat_map(|&i| (i as u16).to_le_bytes()));
     fs::write(folder.join("cube.bin"), &bytes).unwrap();
@@ -278,18 +280,18 @@ fn gltf(folder: &Path) -> (Places, TextureCoordinates, Vec<[usize; 3]>) {
         bytes.len()
     );
     fs::write(folder.join("cube.gltf"), json).unwrap();
-    (places, uvs, triangles)
+    (positions, uvs, triangles)
 }
 
 #[test]
 fn a_gltf_keeps_its_vertices_though_those_that_move_alike_are_joined() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let (places, uvs, triangles) = gltf(folder);
+    let (positions, uvs, triangles) = gltf(folder);
     // v points down in glTF.
-    let corner = |i: usize| (places[i], [uvs[i][0], 1.0 - uvs[i][1]]);
+    let corner = |i: usize| (positions[i], [uvs[i][0], 1.0 - uvs[i][1]]);
     let want: Vec<Vec<Corner>> = triangles.iter().map(|t| t.map(corner).to_vec()).collect();
-    let want = (places, want);
+    let want = (positions, want);
     shot(folder, "cube.gltf", "out");
     same_objects(folder, "out", &want, false);
     let said = works(folder, "check shot.toml");

@@ -132,7 +132,7 @@ fn skins_share_their_joints_and_equal_vertices_are_welded() {
     assert_eq!(whole.vertex_count(), 4);
     close(pose(&whole, 1.0)[0], [2.0, 0.0, 9.0]);
     assert_eq!(Body::new(Box::new(whole), 0.0).unwrap().closed_loops(), 1);
-    // One corner that hangs on its joints in another way stays a vertex of its own, though the places are equal.
+    // One corner that hangs on its joints in another way stays a vertex of its own, though the positions are equal.
     let torn = open(&strip(true).write(&folder));
     assert_eq!(torn.vertex_count(), 5);
     close(pose(&torn, 1.0)[3], [1.0 + 3.0, 0.0, 9.0]);
@@ -255,9 +255,9 @@ proptest! {
         thread_local!(static FILE: (TempDir, Vec<u8>) = (tempfile::tempdir().unwrap(), strip(true).glb()));
         FILE.with(|(folder, whole)| {
             let mut bytes = whole.clone();
-            for (place, value) in at {
-                let place = place % bytes.len();
-                bytes[place] = value;
+            for (position, value) in at {
+                let position = position % bytes.len();
+                bytes[position] = value;
             }
             let path = folder.path().join("flipped.glb");
             fs::write(&path, &bytes).unwrap();

@@ -43,8 +43,8 @@ fn pixel() -> f64 {
     2.0 * 2.0 * 15.0f64.to_radians().tan() / 90.0
 }
 
-/// Pixels of that view with their places (x and z, m).
-fn places(picture: &Picture) -> impl Iterator<Item = ([f64; 2], [u8; 3])> + '_ {
+/// Pixels of that view with their positions (x and z, m).
+fn positions(picture: &Picture) -> impl Iterator<Item = ([f64; 2], [u8; 3])> + '_ {
     picture.pixels.iter().enumerate().map(|(n, rgb)| {
         let (column, row) = ((n % 120) as f64 + 0.5 - 60.0, (n / 120) as f64 + 0.5 - 45.0);
         ([column * pixel(), row * pixel()], *rgb)
@@ -61,7 +61,7 @@ fn the_distances_of_a_ball_change_sign_at_its_radius() {
     let folder = with_ball();
     let picture = picture(folder.path(), &format!("ball.vdb {VIEW}"));
     let mut on_line = 0u32;
-    for ([x, z], rgb) in places(&picture) {
+    for ([x, z], rgb) in positions(&picture) {
         let across = (x * x + z * z).sqrt();
         // From the circle in which the plane meets the ball, in the plane (pixels), and from the ball itself (m).
         let off = (across - (0.25 - HEIGHT * HEIGHT).sqrt()) / pixel();
@@ -93,7 +93,7 @@ fn a_mesh_is_a_line_on_the_colours_of_a_grid() {
     let before = picture(folder, &format!("ball.vdb {VIEW}"));
     let after = picture(folder, &format!("ball.vdb cube.obj {VIEW}"));
     let mut on_line = 0u32;
-    for (([x, z], rgb), old) in places(&after).zip(&before.pixels) {
+    for (([x, z], rgb), old) in positions(&after).zip(&before.pixels) {
         let off = (x.abs().max(z.abs()) - 0.2) / pixel();
         if is_ink(rgb) {
             assert!(off.abs() < 1.3, "{x} {z}");

@@ -144,11 +144,11 @@ fn everything_is_in_one_picture_the_same_from_any_number_of_threads() {
 #[test]
 fn fog_takes_some_of_the_sun_from_the_ground_below_it() {
     // The ground below the middle of the fog, seen below the fog's lower edge, and ground far from it.
-    let at = |picture: &Picture, place: DVec3| {
+    let at = |picture: &Picture, position: DVec3| {
         let camera =
             Camera { eye: DVec3::new(0.0, 4.0, 8.0), target: DVec3::new(0.0, -1.0, 0.0), fov_deg: 40.0 };
         let [right, up, ahead] = camera.axes();
-        let (off, half) = (place - camera.eye, 20.0f64.to_radians().tan());
+        let (off, half) = (position - camera.eye, 20.0f64.to_radians().tan());
         let x = 48.0 + 32.0 * off.dot(&right) / off.dot(&ahead) / half;
         let y = 32.0 - 32.0 * off.dot(&up) / off.dot(&ahead) / half;
         light_of(picture, x as u32, y as u32)[0]

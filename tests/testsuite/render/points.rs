@@ -8,11 +8,11 @@ use frazil::{Context, Pool};
 const SIZE: Size = Size { width: 200, height: 120 };
 
 /// Points with a radius (m).
-fn cloud(places: &[[f64; 3]], radius: f32) -> Cloud {
-    let places: Vec<DVec3> = places.iter().map(|place| DVec3::from(*place)).collect();
-    let mut points = Points::at(0.1, &places).unwrap();
+fn cloud(positions: &[[f64; 3]], radius: f32) -> Cloud {
+    let positions: Vec<DVec3> = positions.iter().map(|position| DVec3::from(*position)).collect();
+    let mut points = Points::at(0.1, &positions).unwrap();
     points.set("pscale", Values::Float(Column::Uniform(radius)));
-    points.set("id", Values::Long(Column::Each((0..places.len() as i64).collect())));
+    points.set("id", Values::Long(Column::Each((0..positions.len() as i64).collect())));
     Cloud::new(&points, Some("id")).unwrap()
 }
 
@@ -67,14 +67,14 @@ fn spheres_and_meshes_hide_each_other() {
 
 #[test]
 fn the_picture_does_not_depend_on_threads_or_on_which_sphere_comes_first() {
-    let places: Vec<[f64; 3]> = (0..3000)
+    let positions: Vec<[f64; 3]> = (0..3000)
         .map(|n| [f64::from(n % 60) * 0.1 - 3.0, f64::from(n / 60) * 0.07 - 1.7, f64::from(n % 7)])
         .collect();
-    let one = draw(1, vec![], vec![cloud(&places, 0.08)]);
+    let one = draw(1, vec![], vec![cloud(&positions, 0.08)]);
     for threads in [0, 2, 8] {
-        assert!(draw(threads, vec![], vec![cloud(&places, 0.08)]) == one, "{threads} threads");
+        assert!(draw(threads, vec![], vec![cloud(&positions, 0.08)]) == one, "{threads} threads");
     }
     // Grains far smaller than a pixel are seen all the same.
     let empty = draw(1, vec![], vec![]);
-    assert!(changed(&empty, &draw(1, vec![], vec![cloud(&places, 1e-6)])).len() > 2500);
+    assert!(changed(&empty, &draw(1, vec![], vec![cloud(&positions, 1e-6)])).len() > 2500);
 }

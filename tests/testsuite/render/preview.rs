@@ -19,7 +19,7 @@ fn picture(folder: &Path, files: &str, options: &str) -> Picture {
     Picture::open(&folder.join("out.png"))
 }
 
-/// Mean brightness (0 to 255) of the pixels around a place (parts of width and height).
+/// Mean brightness (0 to 255) of the pixels around a position (parts of width and height).
 fn brightness(picture: &Picture, x: f32, y: f32) -> f32 {
     let (cx, cy) = ((x * picture.width as f32) as usize, (y * picture.height as f32) as usize);
     let near = (cx - 3..cx + 3).flat_map(|x| (cy - 3..cy + 3).map(move |y| (x, y)));

@@ -15,7 +15,7 @@ const SPACING: f64 = 0.0125;
 
 /// The mesh where the formula puts it at a frame.
 fn at(mesh: &TriMesh, frame: i32) -> TriMesh {
-    let positions = mesh.positions.iter().map(|place| moved(place.cast(), frame).cast()).collect();
+    let positions = mesh.positions.iter().map(|position| moved(position.cast(), frame).cast()).collect();
     TriMesh { positions, ..mesh.clone() }
 }
 
@@ -23,18 +23,18 @@ fn at(mesh: &TriMesh, frame: i32) -> TriMesh {
 fn the_motion_keeps_volumes_stays_above_the_ground_and_is_not_hasty() {
     let jelly = Jelly::new(2.0 * SPACING, 60);
     for frame in 1..=FRAMES {
-        for place in &jelly.places {
-            let now = moved(*place, frame);
-            assert!(now.y > 0.0, "{place:?} is below the ground at frame {frame}");
-            let way = (now - moved(*place, (frame - 1).max(1))).norm();
-            assert!(way < 9.0 * SPACING, "{place:?} moves by {way} m to frame {frame}");
+        for position in &jelly.positions {
+            let now = moved(*position, frame);
+            assert!(now.y > 0.0, "{position:?} is below the ground at frame {frame}");
+            let way = (now - moved(*position, (frame - 1).max(1))).norm();
+            assert!(way < 9.0 * SPACING, "{position:?} moves by {way} m to frame {frame}");
             let by = |axis: usize| {
                 let mut step = DVec3::zeros();
                 step[axis] = 1e-6;
-                (moved(place + step, frame) - moved(place - step, frame)) / 2e-6
+                (moved(position + step, frame) - moved(position - step, frame)) / 2e-6
             };
             let rate = Matrix3::from_columns(&[0, 1, 2].map(by));
-            assert!((rate.determinant() - 1.0).abs() < 1e-6, "{place:?}, frame {frame}");
+            assert!((rate.determinant() - 1.0).abs() < 1e-6, "{position:?}, frame {frame}");
         }
         let volume = at(&jelly.mesh, frame).volume() / jelly.mesh.volume();
         assert!((volume - 1.0).abs() < 0.005, "frame {frame}: {volume} of the volume");
@@ -44,7 +44,7 @@ fn the_motion_keeps_volumes_stays_above_the_ground_and_is_not_hasty() {
 #[test]
 fn it_is_small_and_its_mesh_is_sound_and_detailed() {
     let jelly = Jelly::new(SPACING, 190);
-    assert!((10_000..20_000).contains(&jelly.places.len()), "{} particles", jelly.places.len());
+    assert!((10_000..20_000).contains(&jelly.positions.len()), "{} particles", jelly.positions.len());
     assert!((100_000..200_000).contains(&jelly.mesh.triangles.len()));
     assert!((24..=48).contains(&FRAMES));
     assert!(jelly.mesh.is_manifold());
@@ -54,8 +54,8 @@ fn it_is_small_and_its_mesh_is_sound_and_detailed() {
     // Letters stand out towards +z, and nowhere else.
     let paint = jelly.paint();
     let letters = jelly.mesh.positions.iter().zip(&paint.values).filter(|(_, paint)| **paint > 0.99);
-    let (count, behind) =
-        letters.fold((0, 0), |(count, behind), (place, _)| (count + 1, behind + usize::from(place.z < 0.0)));
+    let (count, behind) = letters
+        .fold((0, 0), |(count, behind), (position, _)| (count + 1, behind + usize::from(position.z < 0.0)));
     assert!(count > 400 && behind == 0, "{count} vertices of letters, {behind} of them behind");
 }
 
@@ -66,8 +66,8 @@ fn commands(spacing: f64) -> Vec<String> {
         let line = line.replace("$(DEMO)/", "");
         let mut words: Vec<String> = line.split_whitespace().map(String::from).collect();
         for (option, value) in [("--size", "80x60".to_string()), ("--spacing", spacing.to_string())] {
-            if let Some(place) = words.iter().position(|word| word == option) {
-                words[place + 1] = value;
+            if let Some(position) = words.iter().position(|word| word == option) {
+                words[position + 1] = value;
             }
         }
         words.join(" ")

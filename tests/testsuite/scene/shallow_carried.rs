@@ -142,7 +142,7 @@ fn bumps_of_a_mesh_do_not_show_through_films() {
     // Bumps between the middles of cells, on a sheet that is deeper in its middle, and may move.
     let bumpy = |high: f32| {
         let count = 81u32;
-        let place = |index: u32| {
+        let position = |index: u32| {
             let [x, z] = [index % count, index / count].map(|at| 0.001 * (at as f32 - 40.0));
             let bump = if (index % count + index / count).is_multiple_of(4) { high } else { 0.0 };
             Vec3::new(x, 2.0 * (x * x + z * z) + bump, z)
@@ -150,7 +150,7 @@ fn bumps_of_a_mesh_do_not_show_through_films() {
         let is_square = |index: &u32| index % count + 1 < count && index / count + 1 < count;
         let square = |a: u32| [[a, a + count, a + count + 1], [a, a + count + 1, a + 1]];
         let triangles = (0..count * count).filter(is_square).flat_map(square).collect();
-        TriMesh { positions: (0..count * count).map(place).collect(), triangles }
+        TriMesh { positions: (0..count * count).map(position).collect(), triangles }
     };
     for frame in 1..=4 {
         mesh::write(&folder.join(format!("bumpy.{frame:04}.ply")), &bumpy(0.0004 + 0.0001 * frame as f32))
@@ -165,7 +165,7 @@ fn bumps_of_a_mesh_do_not_show_through_films() {
         let liquid = mesh::read_detailed(&folder.join(out).join("liquid/liquid.0004.ply")).unwrap();
         let depths = liquid.of_vertices("depth").unwrap();
         let wet = liquid.mesh.positions.iter().zip(&depths).filter(|(_, depth)| **depth > 1e-4);
-        let heights: Vec<f32> = wet.map(|(place, _)| place.y).collect();
+        let heights: Vec<f32> = wet.map(|(position, _)| position.y).collect();
         assert!(heights.len() > 100, "{}", heights.len());
         heights.iter().sum::<f32>() / heights.len() as f32
     };
@@ -223,13 +223,13 @@ fn liquid_stains_the_terrain_and_resumes_with_its_stains() {
     write_shot(folder, "border = \"closed\"\nstains = true\nlifts = false\n", tables);
     // Corners of squares of 2 mm: a floor with vertices between which liquid flows.
     let count = 41u32;
-    let place = |index: u32| {
+    let position = |index: u32| {
         Vec3::new(0.002 * (index % count) as f32 - 0.04, 0.0, 0.002 * (index / count) as f32 - 0.04)
     };
     let is_square = |index: &u32| index % count + 1 < count && index / count + 1 < count;
     let square = |a: u32| [[a, a + count, a + count + 1], [a, a + count + 1, a + 1]];
     let triangles = (0..count * count).filter(is_square).flat_map(square).collect();
-    let floor = TriMesh { positions: (0..count * count).map(place).collect(), triangles };
+    let floor = TriMesh { positions: (0..count * count).map(position).collect(), triangles };
     mesh::write(&folder.join("shelf.ply"), &floor).unwrap();
     let shot = "shallow spill.toml";
     works(folder, &format!("{shot} -o whole"));

@@ -13,14 +13,14 @@ use crate::program::{fails, works};
 /// A sheet of 40 x 40 cm in squares of 2 cm that has slid along x (m) and falls along its own x.
 fn sheet(slid: f32, slope: f32) -> TriMesh {
     let count = 21u32;
-    let place = |index: u32| {
+    let position = |index: u32| {
         let [x, z] = [index % count, index / count].map(|at| 0.02 * (at as f32 - 10.0));
         Vec3::new(x + slid, -slope * x, z)
     };
     let is_square = |index: &u32| index % count + 1 < count && index / count + 1 < count;
     let square = |a: u32| [[a, a + count, a + count + 1], [a, a + count + 1, a + 1]];
     let triangles = (0..count * count).filter(is_square).flat_map(square).collect();
-    TriMesh { positions: (0..count * count).map(place).collect(), triangles }
+    TriMesh { positions: (0..count * count).map(position).collect(), triangles }
 }
 
 /// A scene of 8 frames over the middle 8 x 8 cm of a terrain, which stays within 2 cm of 0, with more lines of [shallow], and tables.
@@ -39,28 +39,39 @@ fn write_ground(folder: &Path, frames: i32, ground: impl Fn(i32) -> TriMesh) {
     }
 }
 
-/// Places of the surface at a frame, each with its depth (m) and layer.
+/// Positions of the surface at a frame, each with its depth (m) and layer.
 fn surface(folder: &Path, out: &str, frame: i32) -> Vec<(Vec3, f64, f64)> {
     let surface = mesh::read_detailed(&folder.join(format!("{out}/liquid/liquid.{frame:04}.ply"))).unwrap();
     let of = |name: &str| surface.of_vertices(name).unwrap();
     let numbers = of("depth").into_iter().zip(of("layer"));
-    surface.mesh.positions.iter().zip(numbers).map(|(place, (depth, layer))| (*place, depth, layer)).collect()
+    surface
+        .mesh
+        .positions
+        .iter()
+        .zip(numbers)
+        .map(|(position, (depth, layer))| (*position, depth, layer))
+        .collect()
 }
 
 /// Least and greatest x and z of what is wet (m).
 #[track_caller]
 fn wet(folder: &Path, out: &str, frame: i32) -> [f32; 4] {
     let surface = surface(folder, out, frame);
-    let wet = || surface.iter().filter(|(_, depth, _)| *depth > 0.0).map(|(place, ..)| place);
+    let wet = || surface.iter().filter(|(_, depth, _)| *depth > 0.0).map(|(position, ..)| position);
     assert!(wet().next().is_some(), "{out} is dry");
     let most = |number: fn(&Vec3) -> f32| wet().map(number).fold(f32::NEG_INFINITY, f32::max);
-    [-most(|place| -place.x), most(|place| place.x), -most(|place| -place.z), most(|place| place.z)]
+    [
+        -most(|position| -position.x),
+        most(|position| position.x),
+        -most(|position| -position.z),
+        most(|position| position.z),
+    ]
 }
 
-/// Mean depth within 4 mm of a place (m).
+/// Mean depth within 4 mm of a position (m).
 fn depth(folder: &Path, out: &str, frame: i32, [x, z]: [f32; 2]) -> f64 {
     let surface = surface(folder, out, frame);
-    let is_near = |place: &Vec3| (place.x - x).hypot(place.z - z) < 0.004;
+    let is_near = |position: &Vec3| (position.x - x).hypot(position.z - z) < 0.004;
     let near: Vec<f64> = surface.iter().filter(|at| is_near(&at.0)).map(|at| at.1).collect();
     near.iter().sum::<f64>() / near.len().max(1) as f64
 }
@@ -123,8 +134,11 @@ fn a_source_stays_on_its_shelf() {
     works(folder, "shallow spill.toml -o rides");
     lies_within(wet(folder, "rides", 8), [0.004, 0.012], [-0.004, 0.004]);
     let top = f64::from(0.03f32 + 0.014);
-    for (place, depth, layer) in surface(folder, "rides", 8).into_iter().filter(|at| at.1 > 0.0) {
-        assert!(layer == 1.0 && (f64::from(place.y) - depth - top).abs() < 1e-4, "{place:?}, layer {layer}");
+    for (position, depth, layer) in surface(folder, "rides", 8).into_iter().filter(|at| at.1 > 0.0) {
+        assert!(
+            layer == 1.0 && (f64::from(position.y) - depth - top).abs() < 1e-4,
+            "{position:?}, layer {layer}"
+        );
     }
 }
 
@@ -197,7 +211,7 @@ fn what_leaves_the_area_rests_until_it_comes_back() {
         "{said}"
     );
     assert!(!said.contains("beside it"), "{said}");
-    // High above a slope the nearest place is another one than that below.
+    // High above a slope the nearest position is another one than that below.
     let said = works(folder, "check spill.toml --set source.2.at=[0,0.3,0]");
     assert!(
         said.contains("source.2: the place of the terrain that is nearest to it")

@@ -13,7 +13,7 @@ use crate::program::{command, fails, kill_at, works};
 /// A sheet of 40 x 40 cells of 2 mm that falls along x, whose bumps are so high (m), raised by a height (m).
 fn slope(bumps: f32, raised: f32) -> TriMesh {
     let count = 41u32;
-    let place = |index: u32| {
+    let position = |index: u32| {
         let [x, z] = [index % count, index / count].map(|at| 0.002 * (at as f32 - 20.0));
         let wave = |at: f32| 4.0 * at * at * 625.0 - (at * at * 625.0) * (at * at * 625.0);
         Vec3::new(x, raised - 0.2 * x + bumps * wave(x) * wave(z), z)
@@ -21,7 +21,7 @@ fn slope(bumps: f32, raised: f32) -> TriMesh {
     let is_square = |index: &u32| index % count + 1 < count && index / count + 1 < count;
     let square = |a: u32| [[a, a + count, a + count + 1], [a, a + count + 1, a + 1]];
     let triangles = (0..count * count).filter(is_square).flat_map(square).collect();
-    TriMesh { positions: (0..count * count).map(place).collect(), triangles }
+    TriMesh { positions: (0..count * count).map(position).collect(), triangles }
 }
 
 const LIQUID: &str = "[[pour]]\nat = [-0.02, 0.05, 0]\nradius = 0.008\nvolume_ml = 1.5\n\

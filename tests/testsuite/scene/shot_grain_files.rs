@@ -270,8 +270,8 @@ fn made_up(at: &Path, changes: &Points, metadata: Vec<(String, MetaValue)>) -> P
 
 /// Grains of these identities.
 fn grains_of(ids: &[i64]) -> Points {
-    let places: Vec<DVec3> = ids.iter().map(|id| DVec3::new(0.1, 0.1 * *id as f64, 0.0)).collect();
-    let mut points = Points::at(0.1, &places).unwrap();
+    let positions: Vec<DVec3> = ids.iter().map(|id| DVec3::new(0.1, 0.1 * *id as f64, 0.0)).collect();
+    let mut points = Points::at(0.1, &positions).unwrap();
     points.voxel_size = 0.1;
     points.set("id", Values::Long(Column::Each(ids.to_vec())));
     points.set("trapped", Values::Bool(Column::Uniform(false)));

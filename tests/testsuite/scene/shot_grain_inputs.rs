@@ -19,9 +19,9 @@ fn points(all: &[[&str; 6]]) -> String {
     out
 }
 
-/// Places of the grains after a frame.
-fn places(at: &Path, frame: i32) -> Vec<DVec3> {
-    ply::read(&at.join(format!("out/grains/grains.{frame:04}.ply"))).unwrap().places
+/// Positions of the grains after a frame.
+fn positions(at: &Path, frame: i32) -> Vec<DVec3> {
+    ply::read(&at.join(format!("out/grains/grains.{frame:04}.ply"))).unwrap().positions
 }
 
 fn report(at: &Path, frame: i32) -> serde_json::Value {
@@ -45,16 +45,16 @@ fn a_layer_of_a_file_may_have_a_ground_on_which_grains_lie() {
     // Without a ground it falls on and on.
     write("");
     works(at, "snow shot.toml -o out -q");
-    assert!(places(at, 20).iter().all(|place| place.y < -1.0));
+    assert!(positions(at, 20).iter().all(|position| position.y < -1.0));
     for (ground, height) in [("ground = 0.0", 0.0), ("ground = \"plane.obj\"", -0.05)] {
         write(ground);
         works(at, "check shot.toml");
         // The layer is as it is: another ground changes the grains only.
         fails(at, "snow shot.toml -o out -q", 2, &["stage grains", "snow.ground"]);
         works(at, "snow shot.toml -o out -q --stage grains --from 1");
-        let places = places(at, 20);
-        assert_eq!(places.len(), 1);
-        assert!((places[0].y - height - 0.006).abs() < 0.001, "{places:?}");
+        let positions = positions(at, 20);
+        assert_eq!(positions.len(), 1);
+        assert!((positions[0].y - height - 0.006).abs() < 0.001, "{positions:?}");
     }
     write("ground = 0.0\narea = [-1, -1, 1, 1]");
     fails(at, "snow shot.toml -o none -q", 2, &["shot.toml", "`area`", ".vdb"]);
@@ -111,7 +111,7 @@ fn points_in_the_snow_or_below_the_ground_are_left_out_and_counted() {
     assert_eq!(warned.len(), 1, "{said}");
     assert!(warned[0].contains("drift.ply: 2 of 5 points"), "{said}");
     assert_eq!((&report(at, 1)["left_out"], &report(at, 1)["grains"]), (&2.into(), &3.into()));
-    assert_eq!(places(at, 1).len(), 3);
+    assert_eq!(positions(at, 1).len(), 3);
     assert!((1..=10).all(|frame| report(at, frame)["trapped"].as_u64().unwrap_or(0) == 0));
     // A run that resumes has the same grains.
     let files = grains(at, "out");

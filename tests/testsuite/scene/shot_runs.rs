@@ -165,7 +165,7 @@ fn from_the_first_frame_starts_anew() {
 fn a_mesh_that_changed_is_noticed_wherever_it_lies() {
     let folder = folder(3, 0.04, "");
     works(folder.path(), "snow shot.toml -o out -q");
-    // The same content in another place is the same input.
+    // The same content in another position is the same input.
     fs::create_dir(folder.path().join("moved")).unwrap();
     fs::rename(folder.path().join("cube.obj"), folder.path().join("moved/box.obj")).unwrap();
     works(folder.path(), "snow shot.toml -o out -q --set object.1.file=moved/box.obj");

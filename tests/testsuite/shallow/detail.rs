@@ -205,8 +205,8 @@ fn hump(near: [std::ops::Range<usize>; 2], frames: usize) -> Vec<[f64; 2]> {
         let at = -0.2 + 0.002 * (f64::from(x) + 0.5);
         let high = 1e-4 * libm::exp(-(at / 0.012) * (at / 0.012));
         for z in 0..4 {
-            let place = [at, 0.0, -0.004 + 0.002 * (f64::from(z) + 0.5)];
-            detail.pour_at(place, 0.0012, high * 4e-6).unwrap();
+            let position = [at, 0.0, -0.004 + 0.002 * (f64::from(z) + 0.5)];
+            detail.pour_at(position, 0.0012, high * 4e-6).unwrap();
         }
     }
     for _ in 0..frames {

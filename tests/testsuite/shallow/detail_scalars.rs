@@ -223,9 +223,9 @@ fn turned_and_mirrored_dye_is_the_same() {
         let solids = Solids::new(grid, heights, cells);
         let mut detail = Detail::new(&ctx, &solids, Params::default(), near([[6, 6], [16, 14]])).unwrap();
         detail.set_scalars(&[Scalar::dye("dye")]).unwrap();
-        for (place, level) in [([10.0, 10.0], 0.9), ([20.0, 8.0], 0.1)] {
+        for (position, level) in [([10.0, 10.0], 0.9), ([20.0, 8.0], 0.1)] {
             detail.set_poured(&[level]).unwrap();
-            let at = turn.place(place, size);
+            let at = turn.position(position, size);
             let at = [origin[0] + at[0] * cell, 0.03, origin[1] + at[1] * cell];
             detail.pour_at(at, 6.0 * cell, 3e-7).unwrap();
         }

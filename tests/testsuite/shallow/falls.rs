@@ -470,16 +470,16 @@ fn drops_and_strands_are_a_mesh_in_buffers_of_known_capacity() {
             assert!(numbers[..3 * counts.vertices].iter().all(|number| number.is_finite()));
             assert!(numbers[3 * counts.vertices..].iter().all(|number| number.is_nan()));
         }
-        let place = |list: &[f32], at: u32| [0, 1, 2].map(|n| f64::from(list[3 * at as usize + n]));
+        let position = |list: &[f32], at: u32| [0, 1, 2].map(|n| f64::from(list[3 * at as usize + n]));
         for triangle in indices[..counts.indices].as_chunks::<3>().0 {
-            let [a, b, c] = triangle.map(|at| place(&vectors[0], at));
+            let [a, b, c] = triangle.map(|at| position(&vectors[0], at));
             let (p, q) = ([0, 1, 2].map(|n| b[n] - a[n]), [0, 1, 2].map(|n| c[n] - a[n]));
             let up = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
-            let normal = place(&vectors[1], triangle[0]);
+            let normal = position(&vectors[1], triangle[0]);
             assert!((0..3).map(|n| up[n] * normal[n]).sum::<f64>() > 0.0, "{up:?} {normal:?}");
         }
         let vertical = if up == Up::Y { 1 } else { 2 };
-        let first = place(&vectors[0], 0);
+        let first = position(&vectors[0], 0);
         let [_, y, _] = drops[0].position;
         assert!((first[vertical] - 100.0 * y).abs() <= 100.0 * drops[0].radius * 1.2);
         for (at, drop) in of_drops[..counts.vertices].iter().enumerate() {

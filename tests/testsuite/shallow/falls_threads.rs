@@ -38,15 +38,15 @@ fn last_of(liquid: &Shallow) -> Vec<Droplet> {
 #[test]
 fn a_film_leaves_an_edge_in_threads_that_stay_where_they_are() {
     let liquid = over_an_edge(4e-6, 90, Falls::default());
-    let mut places: Vec<f64> = last_of(&liquid).iter().map(|drop| drop.position[2]).collect();
-    places.sort_unstable_by(f64::total_cmp);
+    let mut positions: Vec<f64> = last_of(&liquid).iter().map(|drop| drop.position[2]).collect();
+    positions.sort_unstable_by(f64::total_cmp);
     // The film is wider than that, and 4 mm are between threads at least.
-    assert!((4..=15).contains(&places.len()), "{places:?}");
-    assert!(places.windows(2).all(|two| two[1] - two[0] > 0.0039), "{places:?}");
+    assert!((4..=15).contains(&positions.len()), "{positions:?}");
+    assert!(positions.windows(2).all(|two| two[1] - two[0] > 0.0039), "{positions:?}");
     let later = over_an_edge(4e-6, 120, Falls::default());
     let stays = last_of(&later);
-    let stays = stays.iter().filter(|drop| places.iter().any(|at| (at - drop.position[2]).abs() < 1e-9));
-    assert!(stays.count() * 3 >= places.len() * 2, "{places:?}");
+    let stays = stays.iter().filter(|drop| positions.iter().any(|at| (at - drop.position[2]).abs() < 1e-9));
+    assert!(stays.count() * 3 >= positions.len() * 2, "{positions:?}");
 }
 
 #[test]
@@ -65,7 +65,7 @@ fn a_strand_joins_the_lip_and_its_last_drop() {
     let drops: Vec<Droplet> = liquid.drops().collect();
     for drop in &drops {
         let Some(lip) = drop.lip else { continue };
-        let [x, y, z] = lip.place;
+        let [x, y, z] = lip.position;
         assert!((x - EDGE + 0.5 * CELL).abs() < 1e-9 && (z - drop.position[2]).abs() < 1e-9, "{lip:?}");
         assert!((y - 0.5 * lip.depth - 0.01 - HEIGHT).abs() < 1e-9 && lip.edge == [0.0, 0.0, 1.0]);
         assert!(drops.iter().all(|other| other.source != drop.source || other.number <= drop.number));

@@ -70,9 +70,9 @@ fn random_cell(dice: &mut Dice) -> Vec<Solid> {
 }
 
 fn random_body(dice: &mut Dice) -> Shape {
-    let mut place =
+    let mut position =
         || DVec3::new(dice.between(-0.05, 0.45), dice.between(-0.9, 0.9), dice.between(-0.05, 0.3));
-    let (a, b) = (place(), place());
+    let (a, b) = (position(), position());
     match dice.below(3) {
         0 => Shape::Sphere { centre: a, radius: dice.between(0.005, 0.2) },
         1 => Shape::Capsule { ends: [a, b], radius: dice.between(0.005, 0.1) },
@@ -214,7 +214,7 @@ fn a_capsule_in_a_pool_lifts_it_and_lets_it_sink_back() {
 }
 
 #[test]
-fn a_ball_in_a_pool_carries_what_was_in_its_place() {
+fn a_ball_in_a_pool_carries_what_was_in_its_position() {
     let ctx = context();
     let grid = grid(20, 20);
     let mut shallow = Shallow::new(&ctx, &floor(grid, -0.1), params()).unwrap();
@@ -226,7 +226,7 @@ fn a_ball_in_a_pool_carries_what_was_in_its_place() {
     let units: i64 = on_it.map(|column| i64::from(shallow.depths()[column])).sum();
     let above = units as f64 * heights().unit * 1e-4;
     assert!((above - moved.displaced).abs() < 1e-12, "{above} m3 of {}", moved.displaced);
-    // The ball's place, and the room above it.
+    // The ball's position, and the room above it.
     let volume = 4.0 / 3.0 * std::f64::consts::PI * 0.03f64.powi(3);
     assert!(above > volume && above < 3.0 * volume, "{above} m3 above {volume} m3");
     let below = columns.column([10, 10], 0).unwrap();
@@ -259,7 +259,7 @@ fn a_terrain_that_swallows_all_liquid_gives_it_back() {
         assert_eq!((balance.inside, balance.held, balance.lost, balance.error), (0.0, all, 0.0, 0));
         let moved = shallow.update_terrain(&ground).unwrap();
         assert_eq!(moved.held, 0.0);
-        // Each cell's liquid is back at its lowest place.
+        // Each cell's liquid is back at its lowest position.
         for z in 0..20 {
             for x in 0..33 {
                 let sum = |depths: &[i32]| -> i32 {
@@ -434,7 +434,7 @@ fn mirrored_and_turned_scenes_move_alike() {
 }
 
 #[test]
-fn sources_stay_in_their_places_when_layers_appear() {
+fn sources_stay_in_their_positions_when_layers_appear() {
     let ctx = context();
     let grid = grid(20, 20);
     let mut shallow = Shallow::new(&ctx, &floor(grid, 0.0), params()).unwrap();

@@ -42,8 +42,9 @@ fn scene(ctx: &Context, plan: &Plan, turn: Turn, scalars: &[Scalar], poured: &[f
 /// A ball somewhere in a domain, or a pillar that leaves no room for what is in its middle, or nothing.
 fn body(dice: &mut Dice, liquid: &Shallow) -> Vec<Shape> {
     let Grid { cell, origin, size } = liquid.columns().grid;
-    let place = |axis: usize, at: f64| origin[axis] + at * size[axis] as f64 * cell;
-    let at = [place(0, dice.between(0.0, 1.0)), dice.between(0.0, 0.06), place(1, dice.between(0.0, 1.0))];
+    let position = |axis: usize, at: f64| origin[axis] + at * size[axis] as f64 * cell;
+    let at =
+        [position(0, dice.between(0.0, 1.0)), dice.between(0.0, 0.06), position(1, dice.between(0.0, 1.0))];
     let (centre, radius) = (DVec3::from(at), dice.between(1.0, 6.0) * cell);
     let pillar =
         Shape::Cuboid { centre, axes: [DVec3::x(), DVec3::y(), DVec3::z()], half: [radius, 1.0, radius] };

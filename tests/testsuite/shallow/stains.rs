@@ -17,7 +17,7 @@ const CELL: f64 = 0.002;
 /// A trough along x with walls at its ends, its vertices half a cell apart and not on the cells, moved by some cells along x.
 fn trough(moved: f64) -> TriMesh {
     let [nx, nz] = [81_u32, 41];
-    let place = |at: u32| {
+    let position = |at: u32| {
         let [x, z] = [f64::from(at % nx), f64::from(at / nx)];
         let across = (z - 20.0) / 20.0;
         let bump = 0.002 * (0.3 * x).sin();
@@ -34,7 +34,7 @@ fn trough(moved: f64) -> TriMesh {
         let [a, b, c, d] = [corner(x, z), corner(x + 1, z), corner(x + 1, z + 1), corner(x, z + 1)];
         [[a, c, b], [a, d, c]]
     });
-    TriMesh { positions: (0..nx * nz).map(place).collect(), triangles: triangles.collect() }
+    TriMesh { positions: (0..nx * nz).map(position).collect(), triangles: triangles.collect() }
 }
 
 fn solids(mesh: &TriMesh) -> frazil::shallow::terrain::Solids {
@@ -50,8 +50,8 @@ fn liquid(ctx: &Context, mesh: &TriMesh) -> Shallow {
 }
 
 /// Depth at the cell of a vertex (m); 0 outside.
-fn depth_at(liquid: &Shallow, place: &Vec3) -> f64 {
-    let at = [f64::from(place.x), f64::from(place.y), f64::from(place.z)];
+fn depth_at(liquid: &Shallow, position: &Vec3) -> f64 {
+    let at = [f64::from(position.x), f64::from(position.y), f64::from(position.z)];
     liquid.view().at(at).map_or(0.0, |reading| reading.depth)
 }
 
@@ -69,7 +69,7 @@ fn a_stain_comes_while_it_is_wet_and_halves_when_it_is_dry() {
     let mut stains = Stains::new(&liquid, &mesh.positions, &mesh.triangles, staining).unwrap();
     liquid.set_poured(&[0.8]).unwrap();
     liquid.fill(0.02);
-    let wet: Vec<bool> = mesh.positions.iter().map(|place| depth_at(&liquid, place) > 1e-5).collect();
+    let wet: Vec<bool> = mesh.positions.iter().map(|position| depth_at(&liquid, position) > 1e-5).collect();
     assert!((200..3000).contains(&wet.iter().filter(|wet| **wet).count()));
     for _ in 0..60 {
         liquid.step(&ctx, FRAME).unwrap();

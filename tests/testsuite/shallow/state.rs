@@ -91,7 +91,7 @@ fn run(shallow: &mut Shallow, ctx: &Context, frames: usize) {
     }
 }
 
-/// The first place where bytes differ.
+/// The first position where bytes differ.
 fn difference(one: &[u8], other: &[u8]) -> Option<usize> {
     let differs = one.iter().zip(other).position(|(one, other)| one != other);
     differs.or((one.len() != other.len()).then_some(one.len().min(other.len())))

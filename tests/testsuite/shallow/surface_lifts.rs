@@ -146,13 +146,13 @@ fn no_lift_reaches_through_a_ceiling_or_changes_triangles() {
         for fade in [0.0, 0.01] {
             let mesh = self::lifted(&columns, &lifts, &depth, fade);
             assert_eq!((&mesh.triangles, &mesh.columns), (&plain.triangles, &plain.columns));
-            for (place, &column) in mesh.positions.iter().zip(&mesh.columns).filter(|of| *of.1 != NONE) {
+            for (position, &column) in mesh.positions.iter().zip(&mesh.columns).filter(|of| *of.1 != NONE) {
                 let column = column as usize;
                 let ceiling = columns.heights.metres(columns.ceilings()[column]);
-                assert!(f64::from(place[1]) <= ceiling + 1e-6, "seed {seed}: {place:?} over {ceiling}");
+                assert!(f64::from(position[1]) <= ceiling + 1e-6, "seed {seed}: {position:?} over {ceiling}");
                 let shown = columns.heights.metres(columns.bases()[column] + depth[column]);
-                let is_high = f64::from(place[1]) >= shown - 1e-6;
-                assert!(is_high || depth[column] < units(0.01), "seed {seed}: {place:?} under {shown}");
+                let is_high = f64::from(position[1]) >= shown - 1e-6;
+                assert!(is_high || depth[column] < units(0.01), "seed {seed}: {position:?} under {shown}");
             }
         }
     }
@@ -202,7 +202,7 @@ fn lifts_turn_and_mirror_with_the_ground() {
             (|[x, y, z]| [-z, y, x], |[x, z], n| [n - 1 - z, x], false),
             (|[x, y, z]| [-x, y, z], |[x, z], n| [n - 1 - x, z], true),
         ];
-        for (place, cell, is_mirror) in moves {
+        for (position, cell, is_mirror) in moves {
             let mut cells = vec![Vec::new(); n * n];
             for index in columns.indices() {
                 let [x, z] = cell(columns.cell(index), n);
@@ -211,7 +211,7 @@ fn lifts_turn_and_mirror_with_the_ground() {
             cells.iter_mut().for_each(|cell| cell.sort_unstable());
             let moved = Columns::new(&Solids::new(columns.grid, columns.heights, cells));
             let positions: Vec<Vec3> =
-                ground.positions.iter().map(|at| Vec3::from(place((*at).into()))).collect();
+                ground.positions.iter().map(|at| Vec3::from(position((*at).into()))).collect();
             let face = |[a, b, c]: [u32; 3]| if is_mirror { [a, c, b] } else { [a, b, c] };
             let faces: Vec<[u32; 3]> = ground.faces.iter().map(|corners| face(*corners)).collect();
             let mut other = Lifts::default();
@@ -256,9 +256,10 @@ impl Changing {
 
     fn move_vertex(&mut self, dice: &mut Dice, cell: usize) {
         let [x, z] = [(cell % SIZE[0]) as f64, (cell / SIZE[0]) as f64];
-        let place =
+        let position =
             |along: f64, origin: f64, dice: &mut Dice| origin + (along + dice.between(0.0, 1.0)) * CELL;
-        let at = [place(x, -1.0, dice), self.heights[cell] + dice.between(-0.1, 0.2), place(z, 2.0, dice)];
+        let at =
+            [position(x, -1.0, dice), self.heights[cell] + dice.between(-0.1, 0.2), position(z, 2.0, dice)];
         self.positions[cell] = Vec3::from(at.map(|length| length as f32));
     }
 

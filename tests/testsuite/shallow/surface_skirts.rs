@@ -29,7 +29,7 @@ fn skirted(columns: &Columns, depth: &[i32], ledges: &Ledges) -> Mesh {
     build_with(&mut Surface::default(), columns, &liquid, &Layout::default())
 }
 
-/// Edges of one triangle only, as places: vertices of the mesh may be doubled where none is.
+/// Edges of one triangle only, as positions: vertices of the mesh may be doubled where none is.
 fn open_edges(mesh: &Mesh) -> Vec<[u32; 2]> {
     let edges = mesh.edges();
     edges.keys().filter(|&&[a, b]| !edges.contains_key(&[b, a])).copied().collect()

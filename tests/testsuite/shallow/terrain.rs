@@ -89,9 +89,9 @@ fn a_sphere_is_the_same_from_triangles_distances_and_its_formula() {
     let heights = Heights::between(-1.0, 1.0).unwrap();
     let mesh = shapes::sphere(0.5, 40);
     let cast = triangles::solids(&mesh.positions, &mesh.triangles, grid, heights).unwrap();
-    let sampled = sampler::solids(grid, heights, 0.02, [-0.6, 0.6], |places, out| {
+    let sampled = sampler::solids(grid, heights, 0.02, [-0.6, 0.6], |positions, out| {
         out.clear();
-        out.extend(places.iter().map(|place| (place.norm() - 0.5) as f32));
+        out.extend(positions.iter().map(|position| (position.norm() - 0.5) as f32));
         Ok(())
     });
     let sampled = sampled.unwrap();
@@ -115,7 +115,7 @@ fn a_sheet_of_triangles_is_the_height_field_of_its_vertices() {
     let mut dice = Dice(7);
     let tops: Vec<f32> = (0..grid.cells()).map(|_| dice.between(-0.9, 0.9) as f32).collect();
     let [nx, nz] = grid.size;
-    let place = |index: usize| {
+    let position = |index: usize| {
         let [x, z] = grid.centre([index % nx, index / nx]);
         Vec3::new(x as f32, tops[index], z as f32)
     };
@@ -124,7 +124,7 @@ fn a_sheet_of_triangles_is_the_height_field_of_its_vertices() {
         [[a, b, b + 1], [a, b + 1, a + 1]]
     };
     let sheet = TriMesh {
-        positions: (0..grid.cells()).map(place).collect(),
+        positions: (0..grid.cells()).map(position).collect(),
         triangles: (0..nz - 1).flat_map(|z| (0..nx - 1).flat_map(move |x| square(x, z))).collect(),
     };
     let field = height::solids(tops.iter().map(|&top| top.into()), grid, heights).unwrap();

@@ -50,7 +50,7 @@ fn what_hangs_over_any_edge_of_the_snow_removes_all_that_it_covers() {
     let whole = mesh_volume(&ctx, &snow(&ctx));
     let removed = |at: [f32; 3], size: [f32; 3]| {
         let mut block = cuboid(size);
-        block.positions.iter_mut().for_each(|place| *place += Vec3::from(at));
+        block.positions.iter_mut().for_each(|position| *position += Vec3::from(at));
         let body = Body::new(Box::new(Rigid::new(block, Keys::default())), 0.0).unwrap();
         let mut base = BaseLayer::new(&ctx, snow(&ctx), exact()).unwrap();
         let report = base.step(&ctx, &[body], 0.0, 1.0, 1).unwrap();

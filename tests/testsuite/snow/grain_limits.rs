@@ -17,13 +17,13 @@ fn context() -> Context {
     Context::new(Pool::new(2).unwrap())
 }
 
-fn ball(places: &[[f64; 3]]) -> Body {
+fn ball(positions: &[[f64; 3]]) -> Body {
     let key = |(frame, at): (i32, &[f64; 3])| Key {
         time: f64::from(frame) * FRAME,
         at: DVec3::from(*at),
         turn: DVec3::zeros(),
     };
-    let keys = Keys::new((0..).zip(places).map(key).collect()).unwrap();
+    let keys = Keys::new((0..).zip(positions).map(key).collect()).unwrap();
     Body::new(Box::new(Rigid::new(sphere(0.1, 24), keys)), 0.0).unwrap()
 }
 
@@ -32,14 +32,14 @@ fn grains_that_lie_in_each_other_part_by_half_a_diameter_in_a_sub_step() {
     let params = Params { gravity: 0.0, ..Params::for_cell(1.5) };
     let mut heap = Heap::new(2.0 * params.radius);
     let d = diameter(&params);
-    let places: Vec<DVec3> = (0..13)
+    let positions: Vec<DVec3> = (0..13)
         .map(|id: i32| {
             let turn = f64::from(id) * 2.4;
             DVec3::repeat(4.0) * d + DVec3::new(turn.cos(), 0.2 * f64::from(id - 6), turn.sin()) * 0.1 * d
         })
         .collect();
-    for (id, place) in (0..).zip(&places) {
-        heap.add(id, *place, [0.0; 3]).unwrap();
+    for (id, position) in (0..).zip(&positions) {
+        heap.add(id, *position, [0.0; 3]).unwrap();
     }
     let division = Division { dt: 1.0e-3, sub_steps: 1 };
     let coefficients = params.coefficients(&division);
@@ -47,8 +47,11 @@ fn grains_that_lie_in_each_other_part_by_half_a_diameter_in_a_sub_step() {
     let step = || heap.step(&ctx, division, coefficients, &mut Colliders::default());
     ctx.step(1, || ctx.phase("move", step)).unwrap();
     let ids = heap.ids().to_vec();
-    let ways: Vec<f64> =
-        ids.iter().zip(heap.places()).map(|(id, place)| (place - places[*id as usize]).norm()).collect();
+    let ways: Vec<f64> = ids
+        .iter()
+        .zip(heap.positions())
+        .map(|(id, position)| (position - positions[*id as usize]).norm())
+        .collect();
     let farthest = ways.iter().copied().fold(0.0, f64::max) / d;
     assert!((0.2..0.501).contains(&farthest), "{farthest} diameters");
 }
@@ -64,9 +67,9 @@ fn fastest(speed: f64, sub_steps: u32) -> f64 {
     let ground = Ground::Plane { height: 0.0, area: [-0.4, -0.3, 0.4, 0.3] };
     let snow = layer(&ctx, &ground, &[], &Cover::Depth(0.15), cell, 3.0).unwrap();
     let mut base = BaseLayer::new(&ctx, snow, BaseParams::for_cell(cell)).unwrap();
-    let places: Vec<[f64; 3]> =
+    let positions: Vec<[f64; 3]> =
         (0..=6).map(|frame| [f64::from(frame) * speed * FRAME - 0.25, 0.1, 0.0]).collect();
-    let body = ball(&places);
+    let body = ball(&positions);
     let params = Params { sub_steps: Some(sub_steps), compression: 0.5, ..Params::for_cell(cell) };
     let mut grains = Grains::new(params).unwrap();
     let mut fastest = 0.0f64;
@@ -97,10 +100,10 @@ fn an_object_that_jumps_carries_no_grains_along() {
     let params = Params::for_cell(0.03);
     let mut grains = Grains::new(params).unwrap();
     let d = diameter(&params);
-    let places: Vec<DVec3> = (0..40 * 40)
+    let positions: Vec<DVec3> = (0..40 * 40)
         .map(|n: i32| DVec3::new(f64::from(n % 40 - 20) * d, 0.5 * d, f64::from(n / 40 - 20) * d))
         .collect();
-    grains.emit(&places, &[], 0).unwrap();
+    grains.emit(&positions, &[], 0).unwrap();
     let body = ball(&[[0.0, 0.3, 0.0], [0.0, 0.3, 0.0], [90.0, 0.1, 0.0], [90.0, 0.1, 0.0]]);
     for frame in 1..=3 {
         let objects = [Object::new(&body, 0.3)];

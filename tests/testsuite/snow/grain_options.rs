@@ -24,7 +24,7 @@ fn params() -> Params {
     Params { radius: RADIUS, active_distance: Some(DISTANCE), ..Params::for_cell(3.0 * RADIUS) }
 }
 
-/// A ball over a height (m) that is at a place along x (m) until a time (s), and a second later at another one.
+/// A ball over a height (m) that is at a position along x (m) until a time (s), and a second later at another one.
 fn ball(low: f64, time: f64, from: f64, to: f64) -> Body {
     let key = |time, x: f64| Key { time, at: DVec3::new(x, low + BALL, 0.0), turn: DVec3::zeros() };
     let keys = Keys::new(vec![key(time, from), key(time + 1.0, to)]).unwrap();
@@ -51,10 +51,12 @@ fn row() -> Vec<DVec3> {
     (-200..=200).map(|index| DVec3::new(f64::from(index) * 1.5 * 2.0 * RADIUS, RADIUS, 0.0)).collect()
 }
 
-/// The places of those on the floor that are awake, along x (m).
+/// The positions of those on the floor that are awake, along x (m).
 fn awake(grains: &Grains) -> Vec<f64> {
-    let all = grains.places().zip(grains.awake());
-    all.filter(|(place, awake)| *awake && place.y < 1.5 * RADIUS).map(|(place, _)| place.x).collect()
+    let all = grains.positions().zip(grains.awake());
+    all.filter(|(position, awake)| *awake && position.y < 1.5 * RADIUS)
+        .map(|(position, _)| position.x)
+        .collect()
 }
 
 #[test]
@@ -78,7 +80,7 @@ fn slow_grains_far_from_objects_and_fast_grains_rest_at_once() {
     let (reach, spare) = (0.185, 0.02 + 2.0 * 3f64.sqrt() * 0.25 * DISTANCE);
     let near = |awake: &[f64], middle: f64, distance: f64| {
         let within = |most: f64| move |x: &&f64| (**x - middle).abs() < most;
-        let all = row().iter().filter(|place| (place.x - middle).abs() < distance).count();
+        let all = row().iter().filter(|position| (position.x - middle).abs() < distance).count();
         assert_eq!(awake.iter().filter(within(distance)).count(), all, "none nearer than the distance rests");
         assert!(all > 20);
         awake.iter().filter(within(distance + spare)).count()
@@ -105,7 +107,7 @@ fn grains_in_the_air_fall_and_woken_ones_wait() {
     let id = grains.emit(&[DVec3::new(0.0, 0.5, 0.0)], &[], 1).unwrap();
     assert!(step(&ctx, &mut grains, None, 2) > row().len() / 2);
     let at = grains.ids().iter().position(|other| *other == id).unwrap();
-    let fallen = 0.5 - grains.places().nth(at).unwrap().y;
+    let fallen = 0.5 - grains.positions().nth(at).unwrap().y;
     assert!((fallen / (0.5 * 9.81 / 576.0) - 1.0).abs() < 0.1, "{fallen}");
     // What gravity wakes does not rest in the same step.
     grains.set_params(Params { gravity: -5.0, ..params() }).unwrap();
@@ -121,7 +123,7 @@ fn a_ball_wakes_what_the_rule_put_to_rest() {
     let body = ball(UNDER, 0.5, -0.6, 0.6);
     let rests = |grains: &Grains, id: u32| {
         let at = grains.ids().iter().position(|other| *other == id).unwrap();
-        (!grains.awake().nth(at).unwrap(), grains.places().nth(at).unwrap())
+        (!grains.awake().nth(at).unwrap(), grains.positions().nth(at).unwrap())
     };
     // The one in the middle of the row, which the ball comes to.
     let middle = 200;
@@ -137,15 +139,16 @@ fn a_ball_wakes_what_the_rule_put_to_rest() {
 fn the_options_give_the_same_bytes_from_one_and_two_threads_and_after_a_resume() {
     let params = Params { air_by_density: true, active_distance: Some(0.05), ..params() };
     let body = ball(UNDER, 0.0, -0.3, 0.3);
-    let mut places = row();
+    let mut positions = row();
     for layer in 1..5u32 {
-        places
-            .extend(row().iter().map(|place| place + DVec3::new(0.0, 2.2 * RADIUS, 0.0) * f64::from(layer)));
+        positions.extend(
+            row().iter().map(|position| position + DVec3::new(0.0, 2.2 * RADIUS, 0.0) * f64::from(layer)),
+        );
     }
     let run = |threads: usize, cut: Option<i32>| {
         let ctx = context(threads);
         let mut grains = Grains::new(params).unwrap();
-        grains.emit(&places, &[], 0).unwrap();
+        grains.emit(&positions, &[], 0).unwrap();
         let mut resting = 0;
         for frame in 1..=20 {
             resting = step(&ctx, &mut grains, Some(&body), frame);
@@ -156,7 +159,7 @@ fn the_options_give_the_same_bytes_from_one_and_two_threads_and_after_a_resume()
         (grains.save(), resting)
     };
     let once = run(1, None);
-    assert!(once.1 > places.len() / 2 && once.1 < places.len(), "{}", once.1);
+    assert!(once.1 > positions.len() / 2 && once.1 < positions.len(), "{}", once.1);
     assert!(once == run(2, None) && once == run(2, Some(9)));
 }
 
@@ -167,13 +170,13 @@ fn a_grain_among_others_feels_less_of_the_air() {
     // A cube of grains that all but touch, and one on its own, through which air blows.
     let apart = 2.1 * RADIUS;
     let site = |index: i32| DVec3::from([index / 25, index / 5 % 5, index % 5].map(f64::from)) * apart;
-    let mut places: Vec<DVec3> = (0..125).map(site).collect();
-    places.push(DVec3::new(0.5, 0.5, 0.5));
+    let mut positions: Vec<DVec3> = (0..125).map(site).collect();
+    positions.push(DVec3::new(0.5, 0.5, 0.5));
     let speeds = |air_by_density: bool, sub_steps: u32| -> Vec<f64> {
         let params =
             Params { gravity: 0.0, air: 0.01, air_by_density, sub_steps: Some(sub_steps), ..params() };
         let mut grains = Grains::new(params).unwrap();
-        grains.emit(&places, &vec![[0.0, 1.0, 0.0]; places.len()], 0).unwrap();
+        grains.emit(&positions, &vec![[0.0, 1.0, 0.0]; positions.len()], 0).unwrap();
         let around = Surroundings {
             base: Base::Missing,
             objects: &[],
@@ -183,7 +186,7 @@ fn a_grain_among_others_feels_less_of_the_air() {
             lowest: -1.0,
         };
         grains.step(&ctx, &around, [0.0, dt], 1).unwrap();
-        let mut speeds = vec![0.0; places.len()];
+        let mut speeds = vec![0.0; positions.len()];
         grains
             .ids()
             .iter()

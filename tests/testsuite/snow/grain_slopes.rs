@@ -32,7 +32,7 @@ fn a_grain_slides_where_the_slope_is_steeper_than_its_friction() {
         for _ in 0..24 {
             ctx.phase("move", || heap.step(&ctx, division, coefficients, &mut colliders)).unwrap();
         }
-        heap.places().next().unwrap().x
+        heap.positions().next().unwrap().x
     };
     let angle = 0.3f64.atan().to_degrees();
     assert!(moved(angle - 3.0).abs() < 1e-4, "{}", moved(angle - 3.0));
@@ -49,9 +49,9 @@ fn a_grain_lies_on_a_base_up_to_its_angle_of_repose() {
     let slid = |degrees: f64, attraction: f64| {
         let (sine, cosine) = degrees.to_radians().sin_cos();
         let mut slab = cuboid([1.2, 0.2, 0.2]);
-        for place in &mut slab.positions {
-            let [x, y] = [place.x, place.y - 0.1].map(f64::from);
-            (place.x, place.y) = ((x * cosine - y * sine) as f32, (x * sine + y * cosine) as f32);
+        for position in &mut slab.positions {
+            let [x, y] = [position.x, position.y - 0.1].map(f64::from);
+            (position.x, position.y) = ((x * cosine - y * sine) as f32, (x * sine + y * cosine) as f32);
         }
         let base = ctx.phase("base", || from_mesh(&ctx, &slab, CELL, 3.0)).unwrap();
         let friction = of_repose(REPOSE, attraction > 0.0);
@@ -71,8 +71,8 @@ fn a_grain_lies_on_a_base_up_to_its_angle_of_repose() {
             let times = [frame - 1, frame].map(|frame| f64::from(frame) / 24.0);
             grains.step(&ctx, &around, times, frame).unwrap();
         }
-        let place = grains.places().next().unwrap();
-        -place.x * cosine - place.y * sine
+        let position = grains.positions().next().unwrap();
+        -position.x * cosine - position.y * sine
     };
     for attraction in [0.0, 0.01] {
         let [below, above] = [slid(REPOSE - 3.0, attraction), slid(REPOSE + 3.0, attraction)];
@@ -108,7 +108,7 @@ fn a_grain_that_slides_is_slowed_by_the_friction_between_grains() {
             heap.add(0, DVec3::new(0.0, params.radius, 0.0), [speed, 0.0, 0.0]).unwrap();
             step_on_floor(&mut heap, &params, hold, degrees, 36);
             assert_eq!(heap.resting(), 1, "{speed} m/s on {degrees} degrees");
-            heap.places().next().unwrap().x
+            heap.positions().next().unwrap().x
         };
         let slows = FRICTION * 9.81 * degrees.to_radians().cos();
         let (lies, slid, expected) = (way(0.0), way(1.0), 0.5 / slows);
@@ -135,13 +135,13 @@ fn columns_run_as_far_on_rough_ground_as_on_smooth() {
             for (x, z) in (-ACROSS..=ACROSS).flat_map(|x| (-ACROSS..=ACROSS).map(move |z| (x, z))) {
                 if x * x + z * z <= ACROSS * ACROSS {
                     let site = DVec3::new(f64::from(x), f64::from(layer) + 0.5, f64::from(z)) * 1.1;
-                    let place = site + DVec3::new(off(), off(), off()) * 0.1;
-                    heap.add(heap.count() as u32, place * (2.0 * params.radius), [0.0; 3]).unwrap();
+                    let position = site + DVec3::new(off(), off(), off()) * 0.1;
+                    heap.add(heap.count() as u32, position * (2.0 * params.radius), [0.0; 3]).unwrap();
                 }
             }
         }
         step_on_floor(&mut heap, &params, floor, 0.0, 24);
-        let mut distances: Vec<f64> = heap.places().map(|place| place.xz().norm()).collect();
+        let mut distances: Vec<f64> = heap.positions().map(|position| position.xz().norm()).collect();
         distances.sort_by(f64::total_cmp);
         distances[distances.len() * 98 / 100] / (2.2 * params.radius * f64::from(ACROSS)) - 1.0
     };

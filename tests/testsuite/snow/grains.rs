@@ -130,13 +130,15 @@ fn grains_stay_out_of_the_ball_and_the_base() {
     let mut centre = Vec::new();
     story.body.motion().pose(0.5, &mut centre).unwrap();
     let middle = centre.iter().sum::<DVec3>() / centre.len() as f64;
-    let places: Vec<DVec3> = (0..points.count()).map(|index| points.position(index)).collect();
+    let positions: Vec<DVec3> = (0..points.count()).map(|index| points.position(index)).collect();
     let radius = params().radius;
     let mut distances = Vec::new();
-    story.layers[FRAMES as usize].sample_linear(&ctx, &places, &mut distances).unwrap();
-    let apart =
-        places.iter().zip(&distances).map(|(place, base)| [(place - middle).norm() - 0.1, f64::from(*base)]);
-    // Those between the ball and the snow have no room there: no place near theirs is a radius away from both.
+    story.layers[FRAMES as usize].sample_linear(&ctx, &positions, &mut distances).unwrap();
+    let apart = positions
+        .iter()
+        .zip(&distances)
+        .map(|(position, base)| [(position - middle).norm() - 0.1, f64::from(*base)]);
+    // Those between the ball and the snow have no room there: no position near theirs is a radius away from both.
     let (pressed, others): (Vec<_>, Vec<_>) = apart.partition(|[ball, base]| ball + base < 2.0 * radius);
     let deep = |[ball, base]: &&[f64; 2]| ball.min(*base) < 0.8 * radius;
     let inside = others.iter().filter(deep).count();
@@ -197,8 +199,8 @@ fn loose_grains_are_added_or_refused_all_together() {
         (&[at(3.0)], &[[0.0; 3]; 2], "velocities: 2 elements, but there are 1 places"),
         (&[at(3.0), at(4.0)], &[], "more than max = 4"),
     ];
-    for (places, velocities, words) in refused {
-        let error = grains.emit(places, velocities, 6).unwrap_err().to_string();
+    for (positions, velocities, words) in refused {
+        let error = grains.emit(positions, velocities, 6).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
         assert!(grains.save() == before);
     }
@@ -291,7 +293,11 @@ fn grains_that_are_pressed_are_not_thrown_when_they_are_free() {
     let mut fastest: f32 = 0.0;
     for (frame, ends) in heights.windows(2).enumerate() {
         let at = |height: f64| -> Vec<DVec3> {
-            plate.positions.iter().map(|place| place.cast::<f64>() + DVec3::new(0.0, height, 0.0)).collect()
+            plate
+                .positions
+                .iter()
+                .map(|position| position.cast::<f64>() + DVec3::new(0.0, height, 0.0))
+                .collect()
         };
         let shell = Shell::new(0.3, plate.triangles.clone(), true, at(ends[0]));
         let pose = |share: f64, out: &mut Vec<DVec3>| {
@@ -307,7 +313,7 @@ fn grains_that_are_pressed_are_not_thrown_when_they_are_free() {
         }
     }
     assert!(fastest < 1.0, "{fastest}");
-    assert!(heap.places().all(|place| place.y < 3.0 * diameter && place.y > 0.0));
+    assert!(heap.positions().all(|position| position.y < 3.0 * diameter && position.y > 0.0));
 }
 
 /// Grains of a small heap on a plane, so many layers high.
@@ -337,7 +343,7 @@ fn settle(heap: &mut Heap, params: &Params, frames: usize, visits_all: bool, bal
         let at = |share: f64| -> Vec<DVec3> {
             let x = (frame as f64 + share - 12.0) * params.radius;
             let middle = DVec3::new(x, 4.0 * params.radius, 8.0 * params.radius);
-            mesh.positions.iter().map(|place| place.cast::<f64>() + middle).collect()
+            mesh.positions.iter().map(|position| position.cast::<f64>() + middle).collect()
         };
         let floor = Some(Floor { height: 0.0, friction: 0.3 });
         let mut colliders = Colliders { floor, ..Colliders::default() };
@@ -362,9 +368,9 @@ fn a_heap_comes_to_rest_and_a_ball_wakes_what_it_pushes() {
     assert_eq!(heap.resting(), 0);
     settle(&mut heap, &params, 96, false, false);
     assert_eq!((heap.resting(), heap.fastest()), (heap.count(), 0.0));
-    let places: Vec<DVec3> = heap.places().collect();
+    let positions: Vec<DVec3> = heap.positions().collect();
     settle(&mut heap, &params, 24, false, false);
-    assert!(heap.places().eq(places.iter().copied()), "grains that rest stay where they are");
+    assert!(heap.positions().eq(positions.iter().copied()), "grains that rest stay where they are");
     settle(&mut heap, &params, 24, false, true);
     let awake = heap.count() - heap.resting();
     assert!(awake > heap.count() / 20 && awake < heap.count(), "{awake} of {}", heap.count());
@@ -380,7 +386,11 @@ fn leaving_out_what_rests_changes_no_bit() {
         settle(&mut heap, &params, 40, visits_all, false);
         let some = heap.resting();
         settle(&mut heap, &params, 20, visits_all, true);
-        (some, heap.resting(), heap.places().map(|x| [x.x, x.y, x.z].map(f64::to_bits)).collect::<Vec<_>>())
+        (
+            some,
+            heap.resting(),
+            heap.positions().map(|x| [x.x, x.y, x.z].map(f64::to_bits)).collect::<Vec<_>>(),
+        )
     };
     let (skipped, all) = (run(false), run(true));
     assert!(skipped.0 > 100 && skipped.1 > 100 && skipped.1 < skipped.2.len(), "{} {}", skipped.0, skipped.1);
@@ -509,11 +519,11 @@ fn grains_grow_old_and_leave_their_box() {
         (report.count, report.expired, report.dropped)
     };
     assert_eq!(step(&mut grains, 8), (2, 0, 0));
-    let place = DVec3::new(0.13, 1.0, 1.0);
-    grains.set_params(Params { keep_box: Some([-place, place]), ..*grains.params() }).unwrap();
+    let position = DVec3::new(0.13, 1.0, 1.0);
+    grains.set_params(Params { keep_box: Some([-position, position]), ..*grains.params() }).unwrap();
     assert_eq!(step(&mut grains, 8), (1, 0, 1));
     assert_eq!(step(&mut grains, 9), (0, 1, 0));
-    assert!(Grains::new(Params { keep_box: Some([place, place]), ..params() }).is_err());
+    assert!(Grains::new(Params { keep_box: Some([position, position]), ..params() }).is_err());
     assert!(Grains::new(Params { lifetime: Some(0.0), ..params() }).is_err());
 }
 
@@ -540,7 +550,7 @@ fn pressed_grains_are_moved_out_or_trapped() {
         let points = grains.points();
         let Some(Values::Bool(marks)) = points.attribute("trapped") else { panic!() };
         assert_eq!(grains.trapped().len(), usize::from(marks.get(0)));
-        (marks.get(0), grains.places().next().unwrap().y / radius)
+        (marks.get(0), grains.positions().next().unwrap().y / radius)
     };
     let (free, low) = pressed(2.05 * radius);
     assert!(!free && (low - 1.0).abs() < 0.1, "{low}");

@@ -34,7 +34,7 @@ fn height_below(end: f32) -> f64 {
         let times = [frame - 1, frame].map(|frame| f64::from(frame) / 24.0);
         grains.step(&ctx, &around, times, frame).unwrap();
     }
-    grains.places().next().unwrap().y
+    grains.positions().next().unwrap().y
 }
 
 #[test]

@@ -30,11 +30,11 @@ fn times(frame: i32) -> [f64; 2] {
     [frame, frame + 1].map(|frame| f64::from(frame) * FRAME)
 }
 
-fn grain(place: [f64; 3], velocity: [f32; 3]) -> Source {
-    Source { place: DVec3::from(place), velocity, radius: 0.006, start: None }
+fn grain(position: [f64; 3], velocity: [f32; 3]) -> Source {
+    Source { position: DVec3::from(position), velocity, radius: 0.006, start: None }
 }
 
-/// A body that moves along x at a speed (m/s) from a place (m).
+/// A body that moves along x at a speed (m/s) from a position (m).
 fn moving(mesh: frazil::geometry::TriMesh, from: [f64; 3], speed: f64) -> Body {
     let key =
         |time: f64| Key { time, at: DVec3::from(from) + DVec3::x() * (speed * time), turn: DVec3::zeros() };
@@ -51,7 +51,7 @@ fn faces(surroundings: &Surroundings<'_>) -> (Tiles, Solids) {
     (tiles, solids)
 }
 
-/// Calls `each` with the place (m) of the centre of every lower face of active cells, its axis, open share and speed.
+/// Calls `each` with the position (m) of the centre of every lower face of active cells, its axis, open share and speed.
 fn each_face(tiles: &Tiles, solids: &Solids, mut each: impl FnMut(DVec3, usize, f32, f32)) {
     let all_open = Faces::open();
     for slot in 0..tiles.active() {
@@ -59,11 +59,11 @@ fn each_face(tiles: &Tiles, solids: &Solids, mut each: impl FnMut(DVec3, usize, 
         for cell in 0..512usize {
             let at = [cell >> 6, cell >> 3 & 7, cell & 7];
             for axis in 0..3 {
-                let place = [0, 1, 2].map(|other| {
+                let position = [0, 1, 2].map(|other| {
                     let half = if other == axis { 0.0 } else { 0.5 };
                     (f64::from(tiles.coords()[slot][other] * 8 + at[other] as i32) + half) * CELL
                 });
-                each(DVec3::from(place), axis, faces.open[axis][cell], faces.speed[axis][cell]);
+                each(DVec3::from(position), axis, faces.open[axis][cell], faces.speed[axis][cell]);
             }
         }
     }
@@ -73,12 +73,12 @@ fn each_face(tiles: &Tiles, solids: &Solids, mut each: impl FnMut(DVec3, usize, 
 fn a_floor_closes_what_lies_below_it_and_cuts_the_faces_that_it_crosses() {
     let floor = 0.013;
     let (tiles, solids) = faces(&Surroundings { base: None, bodies: &[], removing: &[], floor: Some(floor) });
-    each_face(&tiles, &solids, |place, axis, open, speed| {
+    each_face(&tiles, &solids, |position, axis, open, speed| {
         let wanted = match axis {
-            1 => f64::from(u8::from(place.y >= floor)),
-            _ => (0.5 + (place.y - floor) / CELL).clamp(0.0, 1.0),
+            1 => f64::from(u8::from(position.y >= floor)),
+            _ => (0.5 + (position.y - floor) / CELL).clamp(0.0, 1.0),
         };
-        assert!((f64::from(open) - wanted).abs() < 0.02, "{place} {axis}: {open} {wanted}");
+        assert!((f64::from(open) - wanted).abs() < 0.02, "{position} {axis}: {open} {wanted}");
         assert_eq!(speed, 0.0);
     });
 }
@@ -90,15 +90,15 @@ fn faces_of_a_ball_that_moves_cover_it_and_move_as_it_does() {
     let (tiles, solids) = faces(&Surroundings { base: None, bodies: &[&ball], removing: &[], floor: None });
     let centre = DVec3::new(0.011 + speed * FRAME, 0.004, -0.007);
     let mut covered = [0.0; 3];
-    each_face(&tiles, &solids, |place, axis, open, own| {
+    each_face(&tiles, &solids, |position, axis, open, own| {
         covered[axis] += f64::from(1.0 - open) * CELL.powi(3);
-        let off = (place - centre).norm() - 0.1;
+        let off = (position - centre).norm() - 0.1;
         if off.abs() > CELL {
-            assert_eq!(open, f32::from(u8::from(off > 0.0)), "{place} {axis} {off}");
+            assert_eq!(open, f32::from(u8::from(off > 0.0)), "{position} {axis} {off}");
         }
         let wanted = if axis == 0 && open < 1.0 { speed as f32 } else { 0.0 };
         if off.abs() < CELL {
-            assert!((own - wanted).abs() < 1e-3, "{place} {axis}: {own} m/s, open {open}");
+            assert!((own - wanted).abs() < 1e-3, "{position} {axis}: {own} m/s, open {open}");
         }
     });
     let volume = 4.0 / 3.0 * std::f64::consts::PI * 0.001;
@@ -124,9 +124,9 @@ fn snow_opens_where_an_object_has_moved_through_it_within_the_step() {
         walls.faces(&ctx, &tiles, CELL as f32, 0.5 * share).unwrap();
         let solids = walls.faces(&ctx, &tiles, CELL as f32, share).unwrap();
         let mut sum = (0.0, 0);
-        each_face(&tiles, &solids, |place, axis, open, _| {
-            let is_there = (place.x - at).abs() < 0.6 * CELL && place.z.abs() < 0.1;
-            if axis == 1 && is_there && (0.05..0.15).contains(&place.y) {
+        each_face(&tiles, &solids, |position, axis, open, _| {
+            let is_there = (position.x - at).abs() < 0.6 * CELL && position.z.abs() < 0.1;
+            if axis == 1 && is_there && (0.05..0.15).contains(&position.y) {
                 sum = (sum.0 + open, sum.1 + 1);
             }
         });
@@ -153,13 +153,13 @@ fn an_open_mesh_closes_the_faces_that_it_crosses() {
     let sheet = moving(sheet, [0.0, -0.04, 0.0], 0.0);
     let (tiles, solids) = faces(&Surroundings { base: None, bodies: &[&sheet], removing: &[], floor: None });
     let mut closed = 0;
-    each_face(&tiles, &solids, |place, axis, open, _| {
-        let is_inside = place.x.abs() < 0.09 && place.z.abs() < 0.09;
-        if axis == 1 && is_inside && (place.y - 0.01).abs() < 0.6 * CELL {
-            assert_eq!(open, 0.0, "{place}");
+    each_face(&tiles, &solids, |position, axis, open, _| {
+        let is_inside = position.x.abs() < 0.09 && position.z.abs() < 0.09;
+        if axis == 1 && is_inside && (position.y - 0.01).abs() < 0.6 * CELL {
+            assert_eq!(open, 0.0, "{position}");
             closed += 1;
         }
-        assert!((place.y - 0.01).abs() < 2.0 * CELL || open == 1.0, "{place}");
+        assert!((position.y - 0.01).abs() < 2.0 * CELL || open == 1.0, "{position}");
     });
     assert!(closed >= 2 * 64, "{closed}");
 }
@@ -182,8 +182,9 @@ fn busy(threads: usize, frames: std::ops::Range<i32>, state: Option<&[u8]>) -> M
                 grain([0.01 * f64::from(n) - 0.2, 0.1, 0.003 * f64::from(n % 7)], [1.0, 3.0, 0.1 * n as f32])
             })
             .collect();
-        let wind =
-            |_: &Context, places: &[DVec3]| Ok(places.iter().map(|at| [at.y as f32, 0.0, 1.0]).collect());
+        let wind = |_: &Context, positions: &[DVec3]| {
+            Ok(positions.iter().map(|at| [at.y as f32, 0.0, 1.0]).collect())
+        };
         let around =
             Around { sources: &sources, boundary: &boundary, fastest: 1.0, wind: Some(&Wind(&wind)) };
         let report = mist.step(&ctx, &around, times(frame)).unwrap();
@@ -263,12 +264,12 @@ fn what_a_step_cannot_take_is_named() {
     refuses(Source { radius: 50.0, ..grain([0.0; 3], [0.0, 5.0, 0.0]) }, "radius");
     refuses(Source { radius: f64::NAN, ..grain([0.0; 3], [0.0, 5.0, 0.0]) }, "radius");
     refuses(grain([0.0; 3], [0.0, 1e7, 0.0]), "mist moves at");
-    let nan = |_: &Context, places: &[DVec3]| Ok(vec![[f32::NAN; 3]; places.len()]);
+    let nan = |_: &Context, positions: &[DVec3]| Ok(vec![[f32::NAN; 3]; positions.len()]);
     let source = [grain([0.0; 3], [0.0, 5.0, 0.0])];
     let around = Around { wind: Some(&Wind(&nan)), ..around(&source, &open) };
     let error = mist.step(&ctx, &around, times(0)).unwrap_err().to_string();
     assert!(error.contains("the wind at (") && error.contains("1000 m/s"), "{error}");
-    let storm = |_: &Context, places: &[DVec3]| Ok(vec![[0.0, 1.0e20, 0.0]; places.len()]);
+    let storm = |_: &Context, positions: &[DVec3]| Ok(vec![[0.0, 1.0e20, 0.0]; positions.len()]);
     let around = Around { wind: Some(&Wind(&storm)), ..around };
     assert!(mist.step(&ctx, &around, times(0)).unwrap_err().to_string().contains("1000 m/s"));
     assert!(mist.step(&ctx, &around, [1.0, 1.0]).is_err());
@@ -288,8 +289,8 @@ fn middle(mist: &Mist) -> DVec3 {
     for (coord, tile) in mist.flow().tiles().coords().iter().zip(mist.flow().density()) {
         for (cell, density) in tile.iter().enumerate() {
             let at = [cell >> 6, cell >> 3 & 7, cell & 7];
-            let place = [0, 1, 2].map(|axis| (f64::from(coord[axis] * 8 + at[axis] as i32) + 0.5) * CELL);
-            sum += DVec3::from(place) * f64::from(*density);
+            let position = [0, 1, 2].map(|axis| (f64::from(coord[axis] * 8 + at[axis] as i32) + 0.5) * CELL);
+            sum += DVec3::from(position) * f64::from(*density);
             weights += f64::from(*density);
         }
     }
@@ -308,7 +309,7 @@ fn wind_carries_mist_and_a_field_of_it_draws_it_along() {
             (f32::from(u8::from(square < 12)), velocity)
         });
         let start = middle(&mist);
-        let sample = |_: &Context, places: &[DVec3]| Ok(vec![field.unwrap_or_default(); places.len()]);
+        let sample = |_: &Context, positions: &[DVec3]| Ok(vec![field.unwrap_or_default(); positions.len()]);
         let field = Wind(&sample);
         for frame in 0..12 {
             let wind = (wind == [0.0; 3]).then_some(&field);
@@ -341,8 +342,8 @@ fn mirrored_winds_make_mirrored_mist() {
             ((3.5 - square.sqrt()).clamp(0.0, 1.0), [0.0, 1.0, 0.0])
         });
         // Air runs together in the middle, and apart on the other side.
-        let sample = |_: &Context, places: &[DVec3]| {
-            Ok(places.iter().map(|at| [along * (1.0 + at.y as f32), 0.0, 0.0]).collect())
+        let sample = |_: &Context, positions: &[DVec3]| {
+            Ok(positions.iter().map(|at| [along * (1.0 + at.y as f32), 0.0, 0.0]).collect())
         };
         let field = Wind(&sample);
         for frame in 0..6 {
@@ -391,17 +392,17 @@ fn thrown(fps: f64) -> (f64, DVec3) {
         match time > 0.0 {
             true => {
                 let now = velocity - DVec3::y() * (9.81 * time);
-                let place = from + (velocity + now) * (0.5 * time);
-                Start { place, velocity: [now.x as f32, now.y as f32, now.z as f32] }
+                let position = from + (velocity + now) * (0.5 * time);
+                Start { position, velocity: [now.x as f32, now.y as f32, now.z as f32] }
             }
-            false => Start { place: from, velocity: [0.0; 3] },
+            false => Start { position: from, velocity: [0.0; 3] },
         }
     };
     for frame in 0..(fps / 6.0).round() as i32 {
         let times = [frame, frame + 1].map(|frame| f64::from(frame) / fps);
         let source = |n: i32| {
-            let Start { place, velocity } = at(n, times[1]);
-            Source { place, velocity, radius: 0.006, start: Some(at(n, times[0])) }
+            let Start { position, velocity } = at(n, times[1]);
+            Source { position, velocity, radius: 0.006, start: Some(at(n, times[0])) }
         };
         let sources: Vec<Source> = (0..35).map(source).collect();
         mist.step(&ctx, &around(&sources, &open), times).unwrap();
@@ -422,10 +423,10 @@ fn a_grain_that_is_hit_raises_mist_from_where_it_lay() {
     let from = DVec3::new(0.11, 0.01, 0.01);
     // It was hit half way through the frame; its velocity then led it here.
     let velocity = [0.0, 6.0f32, 0.0];
-    let place = from + DVec3::y() * (6.0 * 0.5 * FRAME);
+    let position = from + DVec3::y() * (6.0 * 0.5 * FRAME);
     let lowest = |start: Option<Start>| {
         let mut mist = Mist::new(Params { noise: 0.0, gravity: 0.0, ..Params::for_cell(CELL) }).unwrap();
-        let source = Source { start, ..grain(place.into(), velocity) };
+        let source = Source { start, ..grain(position.into(), velocity) };
         mist.step(&ctx, &around(&[source], &open), times(0)).unwrap();
         let mut lowest = f64::INFINITY;
         for (coord, tile) in mist.flow().tiles().coords().iter().zip(mist.flow().density()) {
@@ -435,7 +436,7 @@ fn a_grain_that_is_hit_raises_mist_from_where_it_lay() {
         }
         lowest
     };
-    let known = lowest(Some(Start { place: from, velocity: [0.0; 3] }));
+    let known = lowest(Some(Start { position: from, velocity: [0.0; 3] }));
     assert!(known > from.y - 2.0 * CELL, "{known}");
     // Nothing is known of where it was: it came from as far below.
     let unknown = lowest(None);

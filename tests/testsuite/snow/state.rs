@@ -112,10 +112,10 @@ fn a_state_of_another_layer_is_refused() {
     let mut newer = state.clone();
     newer[8] = 2;
     assert_eq!(refused(snow(&ctx, 0.3), &newer), "the saved state has format 2, this library reads 1");
-    for place in (0..state.len()).step_by(state.len() / 40) {
+    for position in (0..state.len()).step_by(state.len() / 40) {
         let mut flipped = state.clone();
-        flipped[place] ^= 0x10;
+        flipped[position] ^= 0x10;
         assert!(refused(snow(&ctx, 0.3), &flipped).starts_with("the saved state "));
-        assert!(refused(snow(&ctx, 0.3), &state[..place]).starts_with("the saved state "));
+        assert!(refused(snow(&ctx, 0.3), &state[..position]).starts_with("the saved state "));
     }
 }

@@ -20,7 +20,7 @@ fn snow(ctx: &Context) -> FloatGrid {
     layer(ctx, &ground, &[], &Cover::Depth(0.15), CELL, 3.0).unwrap()
 }
 
-/// Places that fill a box of 2 x 0.6 x 0.6 grains' radii times ten, also across the origin: the same ones every time.
+/// Positions that fill a box of 2 x 0.6 x 0.6 grains' radii times ten, also across the origin: the same ones every time.
 fn scattered(count: usize) -> Vec<DVec3> {
     let mut seed = 7u64;
     let mut next = || {
@@ -91,18 +91,18 @@ fn without_grains_the_united_surface_is_the_base() {
     assert_eq!((fine.class(), fine.voxel_size()), (GridClass::LevelSet, CELL / 5.0));
     let leaves = fine.leaves().unwrap();
     let width = f64::from(fine.background());
-    let mut places = Vec::new();
+    let mut positions = Vec::new();
     for leaf in leaves.iter().step_by(7) {
         let at = |voxel: usize| {
             let voxel = [voxel >> 6, voxel >> 3 & 7, voxel & 7];
             DVec3::from([0, 1, 2].map(|axis| f64::from(leaf.origin[axis] + voxel[axis] as i32))) * CELL / 5.0
         };
-        places.extend((0..512).map(at));
+        positions.extend((0..512).map(at));
     }
     let [mut of_base, mut of_fine] = [Vec::new(), Vec::new()];
-    base.sample_linear(&ctx, &places, &mut of_base).unwrap();
-    fine.sample_linear(&ctx, &places, &mut of_fine).unwrap();
-    for (at, (a, b)) in places.iter().zip(of_base.iter().zip(&of_fine)) {
+    base.sample_linear(&ctx, &positions, &mut of_base).unwrap();
+    fine.sample_linear(&ctx, &positions, &mut of_fine).unwrap();
+    for (at, (a, b)) in positions.iter().zip(of_base.iter().zip(&of_fine)) {
         let want = f64::from(*a).clamp(-width, width);
         assert!((want - f64::from(*b)).abs() < 1e-6, "{b} at {at:?}, where {want} should be");
     }
@@ -118,7 +118,7 @@ fn grains_that_touch_the_base_or_each_other_are_joined_to_it() {
     let ctx = context(2);
     let base = snow(&ctx);
     let top = level_set::to_mesh(&ctx, &base, 0.0, 0.0).unwrap().bounds().unwrap().1.y;
-    // A grain a tenth of a diameter above the snow, and another one on it; at several places within a voxel.
+    // A grain a tenth of a diameter above the snow, and another one on it; at several positions within a voxel.
     for shift in [0.0, 0.31, 0.57, 0.83] {
         let at = |height: f64| {
             DVec3::new(0.1 + shift * CELL / 5.0, f64::from(top) + height * RADIUS, 0.1 + 0.5 * shift * CELL)
@@ -172,8 +172,9 @@ fn threads_and_the_order_of_grains_change_no_byte() {
 fn what_no_volume_can_be_made_from_is_refused() {
     let ctx = context(1);
     let base = snow(&ctx);
-    let at = |place: DVec3| [place];
-    let fog = |places: &[DVec3], radius: f64, voxel: f64| fog::grains(&ctx, places, radius, voxel).err();
+    let at = |position: DVec3| [position];
+    let fog =
+        |positions: &[DVec3], radius: f64, voxel: f64| fog::grains(&ctx, positions, radius, voxel).err();
     let said = |error: Option<frazil::Error>| error.expect("an error").to_string();
     let near = at(DVec3::zeros());
     assert!(said(fog(&near, RADIUS, 0.51 * RADIUS)).contains("at most half"));

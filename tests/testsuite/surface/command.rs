@@ -12,8 +12,8 @@ use crate::program::{command, fails, works};
 
 /// A drop of 2,109 particles, 0.1 m apart, as text.
 fn write_drop(folder: &Path) {
-    let places = filled(0.1, 0.1, 1.0, |place| place.norm() < 0.8);
-    let lines: Vec<String> = places.iter().map(|p| format!("{} {} {}\n", p.x, p.y, p.z)).collect();
+    let positions = filled(0.1, 0.1, 1.0, |position| position.norm() < 0.8);
+    let lines: Vec<String> = positions.iter().map(|p| format!("{} {} {}\n", p.x, p.y, p.z)).collect();
     fs::write(folder.join("drop.xyz"), lines.concat()).unwrap();
 }
 
@@ -57,11 +57,11 @@ fn a_drop_becomes_a_closed_mesh_and_a_level_set() {
 fn specks_go_a_box_cuts_and_attributes_come_along() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let mut places = filled(0.1, 0.1, 1.0, |place| place.norm() < 0.8);
-    let whole = places.len();
-    places.extend((0..5).map(|n| DVec3::new(3.0, 0.1 * f64::from(n), 0.0)));
-    let mut points = Points::at(1.0, &places).unwrap();
-    let speed = places.iter().map(|p| [p.x as f32, 2.0, -1.0]).collect();
+    let mut positions = filled(0.1, 0.1, 1.0, |position| position.norm() < 0.8);
+    let whole = positions.len();
+    positions.extend((0..5).map(|n| DVec3::new(3.0, 0.1 * f64::from(n), 0.0)));
+    let mut points = Points::at(1.0, &positions).unwrap();
+    let speed = positions.iter().map(|p| [p.x as f32, 2.0, -1.0]).collect();
     points.attributes.push(Attribute { name: "v".into(), values: Values::Vector(Column::Each(speed)) });
     points.attributes.push(Attribute { name: "heat".into(), values: Values::Float(Column::Uniform(0.25)) });
     points.attributes.push(Attribute { name: "kind".into(), values: Values::Int(Column::Uniform(3)) });
@@ -80,8 +80,8 @@ fn specks_go_a_box_cuts_and_attributes_come_along() {
     assert_eq!(parts(&out.mesh), 1);
     let array = |name: &str| &out.arrays.iter().find(|array| array.name == name).unwrap().values;
     assert_eq!(out.arrays.len(), 4);
-    for (vertex, place) in out.mesh.positions.iter().enumerate() {
-        assert!((array("vx")[vertex] - f64::from(place.x)).abs() < 0.15, "{}", array("vx")[vertex]);
+    for (vertex, position) in out.mesh.positions.iter().enumerate() {
+        assert!((array("vx")[vertex] - f64::from(position.x)).abs() < 0.15, "{}", array("vx")[vertex]);
         assert!((array("vy")[vertex] - 2.0).abs() < 1e-5 && (array("heat")[vertex] - 0.25).abs() < 1e-6);
     }
     works(folder, &format!("{make} --box-min=-1,-1,-1 --box-max=1,1,0 --attributes all"));

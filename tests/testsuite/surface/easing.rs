@@ -19,7 +19,7 @@ const FRAMES: i32 = 12;
 const EARLIER: i32 = 6;
 /// Frames ahead that are usual.
 const AHEAD: i32 = 4;
-/// Places that are nearer to each other than this are one (spacings): what 32 bits of a place and a velocity hold.
+/// Positions that are nearer to each other than this are one (spacings): what 32 bits of a position and a velocity hold.
 const SAME: f64 = 1e-5;
 
 const SHOT: &str = "surface -p two.%04d.bgeo --spacing 0.01 --set shot.frames=1-12";
@@ -30,17 +30,17 @@ fn path(folder: &Path, frame: i32) -> PathBuf {
 }
 
 /// The cache of two balls that come nearer to each other until they are one. They drift besides, for vertices not to lie where the grid
-/// is: what is cut there would lie at the places of those that go.
+/// is: what is cut there would lie at the positions of those that go.
 fn write_shot(folder: &Path) {
     let one = ball(5.0, 10, 0.1);
     for frame in 1..=FRAMES {
         let time = f64::from(frame);
         let drift = DVec3::new(0.0, 0.03, 0.02) * time;
         let middle = |side: f64| (DVec3::new(8.26 - 0.26 * time, 0.1, 0.2) * side + drift) * SPACING;
-        let moved = |by: DVec3| one.places.iter().map(move |place| place + by);
-        let places: Vec<DVec3> = moved(middle(-1.0)).chain(moved(middle(1.0))).collect();
-        let mut points = Points::at(1.0, &places).unwrap();
-        let ids = Values::Long(Column::Each((0..places.len() as i64).collect()));
+        let moved = |by: DVec3| one.positions.iter().map(move |position| position + by);
+        let positions: Vec<DVec3> = moved(middle(-1.0)).chain(moved(middle(1.0))).collect();
+        let mut points = Points::at(1.0, &positions).unwrap();
+        let ids = Values::Long(Column::Each((0..positions.len() as i64).collect()));
         points.attributes.push(Attribute { name: "id".into(), values: ids });
         particles::write(&path(folder, frame), &points, false).unwrap();
     }
@@ -68,15 +68,15 @@ fn array<'a>(mesh: &'a DetailedMesh, name: &str) -> &'a [f64] {
 /// Where the vertices of a frame are in the next (m), as their velocities say.
 fn led(mesh: &DetailedMesh) -> Vec<DVec3> {
     let [x, y, z] = ["vx", "vy", "vz"].map(|name| array(mesh, name));
-    let place = |(vertex, place): (usize, &Vec3)| {
-        place.cast::<f64>() + DVec3::new(x[vertex], y[vertex], z[vertex]) / 24.0
+    let position = |(vertex, position): (usize, &Vec3)| {
+        position.cast::<f64>() + DVec3::new(x[vertex], y[vertex], z[vertex]) / 24.0
     };
-    mesh.mesh.positions.iter().enumerate().map(place).collect()
+    mesh.mesh.positions.iter().enumerate().map(position).collect()
 }
 
-/// Distance of two places (spacings).
-fn off(place: &Vec3, other: &DVec3) -> f64 {
-    (place.cast::<f64>() - other).norm() / SPACING
+/// Distance of two positions (spacings).
+fn off(position: &Vec3, other: &DVec3) -> f64 {
+    (position.cast::<f64>() - other).norm() / SPACING
 }
 
 /// Vertices that lie elsewhere than in a mesh of the same triangles.
@@ -92,7 +92,7 @@ fn is_then(now: &DetailedMesh, next: &DetailedMesh, led: &[DVec3], vertex: usize
     if now.mesh.triangles == next.mesh.triangles {
         return Some(vertex);
     }
-    next.mesh.positions.iter().position(|place| off(place, &led[vertex]) < SAME)
+    next.mesh.positions.iter().position(|position| off(position, &led[vertex]) < SAME)
 }
 
 /// Whether only those vertices are moved which a change takes away within so many frames; how many in all frames, and how far at most
@@ -123,7 +123,7 @@ fn only_what_goes_is_moved(shown: &[DetailedMesh], own: &[DetailedMesh], ahead: 
     (count, most)
 }
 
-/// Whether velocities lead to the next frame's places, between frames of the same triangles; how many of the vertices are on the way to a
+/// Whether velocities lead to the next frame's positions, between frames of the same triangles; how many of the vertices are on the way to a
 /// change.
 #[track_caller]
 fn velocities_lead_on(shown: &[DetailedMesh], own: &[DetailedMesh]) -> usize {
@@ -133,8 +133,8 @@ fn velocities_lead_on(shown: &[DetailedMesh], own: &[DetailedMesh]) -> usize {
         if now.mesh.triangles != next.mesh.triangles {
             continue;
         }
-        for (vertex, (place, led)) in next.mesh.positions.iter().zip(&led(now)).enumerate() {
-            let off = off(place, led);
+        for (vertex, (position, led)) in next.mesh.positions.iter().zip(&led(now)).enumerate() {
+            let off = off(position, led);
             assert!(off < SAME, "{off} spacings at frame {number}, vertex {vertex}");
         }
         on_the_way += moved(now, own).len();

@@ -13,10 +13,11 @@ use crate::program::{fails, works};
 /// Particles of a box, 0.1 m apart, at a frame; or none.
 fn write(folder: &Path, number: i32, is_full: bool) {
     let from = DVec3::new(0.02, -0.01, 0.0) * f64::from(number);
-    let place = |n: i32| DVec3::new(f64::from(n / 36), f64::from(n / 6 % 6), f64::from(n % 6)) * 0.1 + from;
-    let places: Vec<DVec3> = (0..if is_full { 216 } else { 0 }).map(place).collect();
-    let mut points = Points::at(0.1, &places).unwrap();
-    points.set("id", Values::Long(Column::Each((0..places.len() as i64).collect())));
+    let position =
+        |n: i32| DVec3::new(f64::from(n / 36), f64::from(n / 6 % 6), f64::from(n % 6)) * 0.1 + from;
+    let positions: Vec<DVec3> = (0..if is_full { 216 } else { 0 }).map(position).collect();
+    let mut points = Points::at(0.1, &positions).unwrap();
+    points.set("id", Values::Long(Column::Each((0..positions.len() as i64).collect())));
     particles::write(&folder.join(format!("p.{number:04}.bgeo")), &points, false).unwrap();
 }
 
@@ -85,9 +86,9 @@ fn check_and_run_warn_of_ids_that_are_row_numbers() {
     let folder = folder.path();
     for number in 1..=3 {
         // The rows of each frame are turned by one layer, so that rows name other particles though nothing moves.
-        let place = |n: usize| DVec3::new((n / 36) as f64, (n / 6 % 6) as f64, (n % 6) as f64) * 0.1;
-        let places: Vec<DVec3> = (0..216).map(|n| place((n + 110 * number) % 216)).collect();
-        let mut points = Points::at(0.1, &places).unwrap();
+        let position = |n: usize| DVec3::new((n / 36) as f64, (n / 6 % 6) as f64, (n % 6) as f64) * 0.1;
+        let positions: Vec<DVec3> = (0..216).map(|n| position((n + 110 * number) % 216)).collect();
+        let mut points = Points::at(0.1, &positions).unwrap();
         points.set("id", Values::Long(Column::Each((0..216).collect())));
         points.set("v", Values::Vector(Column::Each(vec![[0.0; 3]; 216])));
         particles::write(&folder.join(format!("p.{number:04}.bgeo")), &points, false).unwrap();

@@ -17,11 +17,11 @@ use crate::program::{GRAINS, fails, works};
 const SPACING: f64 = 0.1;
 const CELL: f64 = 0.05;
 
-/// A drop of 2,109 particles, which carry their places as velocities.
+/// A drop of 2,109 particles, which carry their positions as velocities.
 fn write_drop(folder: &Path, name: &str) {
-    let places = filled(SPACING, 0.1, 1.0, |place| place.norm() < 0.8);
-    let mut points = Points::at(1.0, &places).unwrap();
-    let speed = places.iter().map(|place| place.cast::<f32>().into()).collect();
+    let positions = filled(SPACING, 0.1, 1.0, |position| position.norm() < 0.8);
+    let mut points = Points::at(1.0, &positions).unwrap();
+    let speed = positions.iter().map(|position| position.cast::<f32>().into()).collect();
     points.attributes.push(Attribute { name: "v".into(), values: Values::Vector(Column::Each(speed)) });
     particles::write(&folder.join(name), &points, false).unwrap();
 }
@@ -53,8 +53,8 @@ fn near(value: f64, expected: f64, part: f64) {
 /// How far normals of a drop's surface turn from its middle's direction (rad): the root of the mean square.
 fn roughness(mesh: &TriMesh) -> f64 {
     let normals = mesh.normals();
-    let turned = |(normal, place): (&frazil::geometry::Vec3, &frazil::geometry::Vec3)| {
-        f64::from((normal - place.normalize()).norm_squared())
+    let turned = |(normal, position): (&frazil::geometry::Vec3, &frazil::geometry::Vec3)| {
+        f64::from((normal - position.normalize()).norm_squared())
     };
     let sum: f64 = normals.iter().zip(&mesh.positions).map(turned).sum();
     (sum / normals.len() as f64).sqrt()
@@ -134,12 +134,12 @@ fn a_box_takes_half_of_a_drop_whatever_its_cells() {
             near(cut.mesh.volume(), 0.5 * whole, 0.03);
             near(volume(folder, "cut.vdb"), 0.5 * whole, 0.03);
             // Nothing lies in the box, and the liquid reaches it.
-            let farthest = cut.mesh.positions.iter().map(|place| place.x).fold(f32::MIN, f32::max);
+            let farthest = cut.mesh.positions.iter().map(|position| position.x).fold(f32::MIN, f32::max);
             assert!(farthest.abs() < 0.01 * CELL as f32, "{farthest}");
             let speed = cut.arrays.iter().find(|array| array.name == "vx").unwrap();
             assert_eq!(speed.values.len(), cut.mesh.positions.len());
-            for (value, place) in speed.values.iter().zip(&cut.mesh.positions) {
-                assert!((value - f64::from(place.x)).abs() < 0.25, "{value} at {place}");
+            for (value, position) in speed.values.iter().zip(&cut.mesh.positions) {
+                assert!((value - f64::from(position.x)).abs() < 0.25, "{value} at {position}");
             }
         }
     }
@@ -294,12 +294,12 @@ fn all_level_sets_of_a_file_are_cut_out() {
 fn options_that_would_do_nothing_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let places = filled(SPACING, 0.1, 1.0, |place| place.norm() < 0.4);
-    let mut points = Points::at(1.0, &places).unwrap();
-    let speed = Values::Vector(Column::Each(vec![[1.0, 2.0, 3.0]; places.len()]));
+    let positions = filled(SPACING, 0.1, 1.0, |position| position.norm() < 0.4);
+    let mut points = Points::at(1.0, &positions).unwrap();
+    let speed = Values::Vector(Column::Each(vec![[1.0, 2.0, 3.0]; positions.len()]));
     points.attributes.push(Attribute { name: "v".into(), values: speed });
     for name in ["vx", "y"] {
-        let values = Values::Float(Column::Each(vec![4.0; places.len()]));
+        let values = Values::Float(Column::Each(vec![4.0; positions.len()]));
         points.attributes.push(Attribute { name: name.into(), values });
     }
     particles::write(&folder.join("drop.bgeo"), &points, false).unwrap();

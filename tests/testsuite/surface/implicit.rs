@@ -10,15 +10,15 @@ fn the_function_is_the_plain_sum() {
     let ctx = context(2);
     // Two clouds with a gap, where the mean moves fast.
     let spacing = 0.1;
-    let places = two_clouds(spacing);
-    let phi = Implicit::new(&ctx, &places, spacing, 0.5 * spacing).unwrap();
+    let positions = two_clouds(spacing);
+    let phi = Implicit::new(&ctx, &positions, spacing, 0.5 * spacing).unwrap();
     let mut compared = 0;
     for (index, patch) in phi.patches().iter().enumerate().step_by(3) {
         for node in (0..64).step_by(5) {
             let at = [node >> 4, node >> 2 & 3, node & 3];
             let at = DVec3::from([0, 1, 2].map(|axis| f64::from(4 * patch[axis] + at[axis]))) * phi.cell();
             let value = f64::from(phi.values(index)[node as usize]) * phi.cell();
-            let expected = plain_phi(&places, spacing, at);
+            let expected = plain_phi(&positions, spacing, at);
             if expected.is_finite() && expected < 2.0 * spacing {
                 assert!((value - expected).abs() < 1e-4 * spacing, "{value} is not {expected}");
                 compared += 1;
@@ -31,8 +31,8 @@ fn the_function_is_the_plain_sum() {
 #[test]
 fn the_surface_lies_half_a_spacing_above_the_outermost_particles() {
     let ctx = context(2);
-    let places = filled(1.0, 0.0, 12.0, |place| place.y < 0.0);
-    let phi = Implicit::new(&ctx, &places, 1.0, 0.5).unwrap();
+    let positions = filled(1.0, 0.0, 12.0, |position| position.y < 0.0);
+    let phi = Implicit::new(&ctx, &positions, 1.0, 0.5).unwrap();
     let mesh = Isosurface::new(&phi).mesh(&phi);
     let middle = mesh.positions.iter().filter(|p| p.x.abs() < 4.0 && p.z.abs() < 4.0 && p.y > -5.0);
     // The outermost centres are at -0.5.
@@ -43,7 +43,7 @@ fn the_surface_lies_half_a_spacing_above_the_outermost_particles() {
 fn the_surface_is_closed_and_whole() {
     let ctx = context(2);
     let ball = ball(8.0, 4, 0.0);
-    let phi = Implicit::new(&ctx, &ball.places, ball.spacing, 0.5 * ball.spacing).unwrap();
+    let phi = Implicit::new(&ctx, &ball.positions, ball.spacing, 0.5 * ball.spacing).unwrap();
     let mesh = Isosurface::new(&phi).mesh(&phi);
     assert!(mesh.is_manifold());
     assert_eq!(mesh.euler_characteristic(), 2);

@@ -23,7 +23,7 @@ fn the_mesh_is_one_where_the_particles_own_surface_is_one() {
     // they are 4.2 spacings apart; from that rate on no point is inside.
     for (gap, is_joined) in [(1.6, true), (2.6, true), (5.0, false)] {
         let at = |frame: usize| numbered(slabs(gap, frame));
-        let own = |frame: usize| own_surface(&ctx, &at(frame).places, 1.0);
+        let own = |frame: usize| own_surface(&ctx, &at(frame).positions, 1.0);
         let mut from = at(0);
         let params = Params { rebuild: true, min_drop: 8, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &own(0), &from).expect("a tracker");

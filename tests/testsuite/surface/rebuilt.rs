@@ -41,9 +41,9 @@ fn middle(side: f64, frame: i32) -> DVec3 {
     DVec3::new(7.25 - 0.25 * nearer, 0.1, 0.2) * (SPACING * side)
 }
 
-fn write_particles(path: &Path, places: &[DVec3], first_id: i64) {
-    let mut points = Points::at(1.0, places).unwrap();
-    let ids = Values::Long(Column::Each((first_id..first_id + places.len() as i64).collect()));
+fn write_particles(path: &Path, positions: &[DVec3], first_id: i64) {
+    let mut points = Points::at(1.0, positions).unwrap();
+    let ids = Values::Long(Column::Each((first_id..first_id + positions.len() as i64).collect()));
     points.attributes.push(Attribute { name: "id".into(), values: ids });
     particles::write(path, &points, false).unwrap();
 }
@@ -62,12 +62,12 @@ fn detailed(mesh: TriMesh) -> DetailedMesh {
         array("mask", On::Vertices, Number::F64, counted(vertices)),
         array("part", On::Faces, Number::I32, counted(faces)),
     ];
-    let place = |(corner, vertex): (usize, &u32)| {
-        let place = mesh.positions[*vertex as usize];
-        [(corner / (3 * CHART)) as f32 + place.y, place.z - place.x]
+    let position = |(corner, vertex): (usize, &u32)| {
+        let position = mesh.positions[*vertex as usize];
+        [(corner / (3 * CHART)) as f32 + position.y, position.z - position.x]
     };
-    let places = mesh.triangles.as_flattened().iter().enumerate().map(place).collect();
-    let uvs = Uvs { places, corners: Some((0..3 * faces as u32).collect()), missing: 0 };
+    let positions = mesh.triangles.as_flattened().iter().enumerate().map(position).collect();
+    let uvs = Uvs { positions, corners: Some((0..3 * faces as u32).collect()), missing: 0 };
     DetailedMesh { mesh, uvs: Some(uvs), arrays }
 }
 
@@ -75,7 +75,7 @@ fn detailed(mesh: TriMesh) -> DetailedMesh {
 fn write_shot(folder: &Path) -> DetailedMesh {
     let one = ball(5.0, SIDE, 0.1);
     for frame in 1..=FRAMES {
-        let moved = |side: f64| one.places.iter().map(move |place| place + middle(side, frame));
+        let moved = |side: f64| one.positions.iter().map(move |place| place + middle(side, frame));
         let places: Vec<DVec3> = moved(-1.0).chain(moved(1.0)).collect();
         write_particles(&folder.join(format!("two.{frame:04}.bgeo")), &places, 0);
     }
@@ -107,7 +107,7 @@ fn array<'a>(mesh: &'a DetailedMesh, name: &str) -> &'a [f64] {
 /// The texture coordinates of a triangle's corners.
 fn coordinates(mesh: &DetailedMesh, triangle: usize) -> [[f32; 2]; 3] {
     let uvs = mesh.uvs.as_ref().expect("texture coordinates");
-    uvs.indices(&mesh.mesh.triangles, triangle).map(|index| uvs.places[index as usize])
+    uvs.indices(&mesh.mesh.triangles, triangle).map(|index| uvs.positions[index as usize])
 }
 
 /// A number of a frame's report.
@@ -122,7 +122,7 @@ fn reported(folder: &Path, out: &str, frame: i32, key: &str) -> u64 {
 fn is_whole(mesh: &TriMesh, frame: i32) {
     let topology = Topology::of(mesh.positions.len(), &mesh.triangles);
     assert!(topology.is_watertight(), "frame {frame}: {topology:?}");
-    let is_finite = |place: &Vec3| place.iter().all(|x| x.is_finite());
+    let is_finite = |position: &Vec3| position.iter().all(|x| x.is_finite());
     assert!(mesh.positions.iter().all(is_finite), "frame {frame}");
 }
 
@@ -141,9 +141,9 @@ fn carries_all(now: &DetailedMesh, first: &DetailedMesh, frame: i32) {
     for (triangle, number) in part.iter().enumerate() {
         assert!((0.0..first.mesh.triangles.len() as f64).contains(number), "part {number} at frame {frame}");
         let chart = (*number as usize / CHART) as f32;
-        let places = coordinates(now, triangle);
+        let positions = coordinates(now, triangle);
         let is_there = |[u, v]: &[f32; 2]| (u - chart).abs() < 0.5 && v.is_finite();
-        assert!(places.iter().all(is_there), "{places:?} of chart {chart} at frame {frame}");
+        assert!(positions.iter().all(is_there), "{positions:?} of chart {chart} at frame {frame}");
     }
 }
 
@@ -152,10 +152,10 @@ fn carries_all(now: &DetailedMesh, first: &DetailedMesh, frame: i32) {
 fn far_is_as_it_was(now: &DetailedMesh, first: &DetailedMesh, frame: i32) {
     let is_far = |vertex: u32| f64::from(first.mesh.positions[vertex as usize].x.abs()) > FAR * SPACING;
     let mut names: Vec<Option<u32>> = vec![None; now.mesh.positions.len()];
-    for (vertex, place) in (0..).zip(&first.mesh.positions).filter(|(vertex, _)| is_far(*vertex)) {
-        let side = f64::from(place.x.signum());
-        let there = place.cast::<f64>() + middle(side, frame) - middle(side, 1);
-        let off = now.mesh.positions.iter().map(|place| (place.cast::<f64>() - there).norm() / SPACING);
+    for (vertex, position) in (0..).zip(&first.mesh.positions).filter(|(vertex, _)| is_far(*vertex)) {
+        let side = f64::from(position.x.signum());
+        let there = position.cast::<f64>() + middle(side, frame) - middle(side, 1);
+        let off = now.mesh.positions.iter().map(|position| (position.cast::<f64>() - there).norm() / SPACING);
         let (at, nearest) = off.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         assert!(nearest < 0.1, "vertex {vertex} is gone at frame {frame}: {nearest} spacings");
         for name in ["red", "green", "blue", "mask"] {
@@ -168,11 +168,11 @@ fn far_is_as_it_was(now: &DetailedMesh, first: &DetailedMesh, frame: i32) {
     for (triangle, corners) in now.mesh.triangles.iter().enumerate() {
         let [Some(a), Some(b), Some(c)] = corners.map(|corner| names[corner as usize]) else { continue };
         let number = array(now, "part")[triangle] as usize;
-        let (own, places) = (first.mesh.triangles[number], coordinates(first, number));
+        let (own, positions) = (first.mesh.triangles[number], coordinates(first, number));
         for (vertex, is) in [a, b, c].into_iter().zip(coordinates(now, triangle)) {
             let corner = own.iter().position(|other| *other == vertex);
             let corner = corner.unwrap_or_else(|| panic!("triangle {number} at frame {frame}: {own:?}"));
-            assert_eq!(places[corner], is, "triangle {number} at frame {frame}");
+            assert_eq!(positions[corner], is, "triangle {number} at frame {frame}");
         }
         stayed += 1;
     }
@@ -242,8 +242,9 @@ fn velocities_lead_to_the_next_frame_and_stay_small_where_it_is_another_mesh() {
         let next = frame(folder, "out", number + 1);
         if now.mesh.triangles == next.mesh.triangles {
             same += 1;
-            for (vertex, (place, then)) in now.mesh.positions.iter().zip(&next.mesh.positions).enumerate() {
-                let off = (place.cast::<f64>() + ways[vertex] - then.cast::<f64>()).norm() / SPACING;
+            for (vertex, (position, then)) in now.mesh.positions.iter().zip(&next.mesh.positions).enumerate()
+            {
+                let off = (position.cast::<f64>() + ways[vertex] - then.cast::<f64>()).norm() / SPACING;
                 assert!(off < 1e-5, "{off} spacings at frame {number}, vertex {vertex}");
             }
         } else {
@@ -359,10 +360,10 @@ fn usd_has_other_faces_from_frame_to_frame_and_primvars_that_fit_them() {
         assert!(counts.iter().all(|count| *count == 3.0) && indices.len() == 3 * counts.len());
         assert!(indices.iter().all(|index| (0.0..points as f32).contains(index)), "frame {number}");
         assert_eq!(numbers(&text, "velocities").len(), 3 * points, "frame {number}");
-        let (places, corners) =
+        let (positions, corners) =
             (numbers(&text, "primvars:st").len() / 2, numbers(&text, "primvars:st:indices"));
         assert_eq!(corners.len(), indices.len(), "frame {number}");
-        assert!(corners.iter().all(|corner| (0.0..places as f32).contains(corner)), "frame {number}");
+        assert!(corners.iter().all(|corner| (0.0..positions as f32).contains(corner)), "frame {number}");
         let mut wanted = serde_json::Map::new();
         for (name, class, interpolation, arrays) in PRIMVARS {
             let count = if interpolation == "vertex" { points } else { counts.len() };
@@ -404,24 +405,24 @@ fn a_liquid_that_is_gone_takes_its_mesh_along_and_one_that_appears_is_meshed() {
     for frame in 1..=frames {
         // All particles end, and others with other ids begin a metre away.
         let (by, first_id) = if frame <= last_of_one { (DVec3::zeros(), 0) } else { (far(frame), 10_000) };
-        let places: Vec<DVec3> = one.places.iter().map(|place| place + by).collect();
-        write_particles(&folder.join(format!("one.{frame:04}.bgeo")), &places, first_id);
+        let positions: Vec<DVec3> = one.positions.iter().map(|position| position + by).collect();
+        write_particles(&folder.join(format!("one.{frame:04}.bgeo")), &positions, first_id);
     }
     works(folder, "surface -p one.%04d.bgeo -m one.ply --spacing 0.01 -o out");
     for number in 1..=frames {
         is_whole(&frame(folder, "out", number).mesh, number);
     }
-    let count = one.places.len() as u64;
+    let count = one.positions.len() as u64;
     let change = ["died", "born"].map(|key| reported(folder, "out", last_of_one + 1, key));
     assert_eq!(change, [count, count]);
     // What is expected: the new liquid has a mesh from its first frame on, a part of its own. The old mesh is nowhere near any liquid: all
     // of it is lost, and goes within some frames, from outside inward, since matching reaches only so far from what does not fit. In the
     // end there is only the new liquid's mesh, which has no detail.
-    let near = |place: &Vec3, number: i32| (place.cast::<f64>() - far(number)).norm() < 7.0 * SPACING;
+    let near = |position: &Vec3, number: i32| (position.cast::<f64>() - far(number)).norm() < 7.0 * SPACING;
     let begun = frame(folder, "out", last_of_one + 1).mesh;
-    assert!(begun.positions.iter().any(|place| near(place, last_of_one + 1)));
+    assert!(begun.positions.iter().any(|position| near(position, last_of_one + 1)));
     let last = frame(folder, "out", frames).mesh;
-    assert!(last.positions.iter().all(|place| near(place, frames)));
+    assert!(last.positions.iter().all(|position| near(position, frames)));
     assert_eq!(bodies(&last.triangles).len(), 1);
     let volume = last.volume() / (count as f64 * SPACING.powi(3));
     assert!((0.7..1.2).contains(&volume), "{volume} of the particles' own");

@@ -32,7 +32,7 @@ fn what_is_meant_by_meshes_with_faults_is_closed() {
         assert!(mesh.triangles.len() <= 20_000, "{what}");
         faulty += usize::from(!Topology::of(mesh.positions.len(), &mesh.triangles).is_watertight());
         for part in &parts {
-            let same = coincident(part.positions.iter().map(|place| place.cast()));
+            let same = coincident(part.positions.iter().map(|position| position.cast()));
             let triangles =
                 part.triangles.iter().map(|triangle| triangle.map(|corner| same[corner as usize]));
             let triangles = triangles.filter(|[a, b, c]| a != b && b != c && c != a).collect();
@@ -44,12 +44,12 @@ fn what_is_meant_by_meshes_with_faults_is_closed() {
 }
 
 fn moved(mesh: &TriMesh, by: [f32; 3]) -> TriMesh {
-    let positions = mesh.positions.iter().map(|place| place + Vec3::from(by)).collect();
+    let positions = mesh.positions.iter().map(|position| position + Vec3::from(by)).collect();
     TriMesh { positions, triangles: mesh.triangles.clone() }
 }
 
 fn scaled(mesh: &TriMesh, by: f32) -> TriMesh {
-    let positions = mesh.positions.iter().map(|place| place * by).collect();
+    let positions = mesh.positions.iter().map(|position| position * by).collect();
     TriMesh { positions, triangles: mesh.triangles.clone() }
 }
 
@@ -171,7 +171,9 @@ fn what_is_moved_by_whole_cells_is_repaired_alike() {
     let (cell, ball) = (0.0625f32, icosphere(3));
     let mut mesh = both(&moved(&ball, [-0.4, 0.03, 0.0]), &moved(&ball, [0.41, 0.0, 0.06]));
     // Multiples of a power of two: moving them rounds nothing.
-    mesh.positions.iter_mut().for_each(|place| *place = place.map(|x| (x * 65_536.0).round() / 65_536.0));
+    mesh.positions
+        .iter_mut()
+        .for_each(|position| *position = position.map(|x| (x * 65_536.0).round() / 65_536.0));
     let by = Vec3::new(7.0, -3.0, 13.0) * cell;
     let [here, there] =
         [&mesh, &moved(&mesh, by.into())].map(|mesh| repair(&context(2), mesh, cell.into()).unwrap().mesh);
@@ -179,7 +181,7 @@ fn what_is_moved_by_whole_cells_is_repaired_alike() {
     // Slivers are taken out block by block of the grid, and these lie otherwise.
     assert!(counts[0].abs_diff(counts[1]) < 8, "{counts:?}");
     let is_there =
-        |place: &&Vec3| there.positions.iter().any(|other| (other - by - **place).amax() < 1e-4 * cell);
+        |position: &&Vec3| there.positions.iter().any(|other| (other - by - **position).amax() < 1e-4 * cell);
     let found = here.positions.iter().filter(is_there).count();
     assert!(found + 40 > here.positions.len(), "{found} of {}", here.positions.len());
     assert!((there.volume() / here.volume() - 1.0).abs() < 1e-5, "{} {}", here.volume(), there.volume());
@@ -223,7 +225,7 @@ fn what_is_wrong_with_a_repaired_mesh_is_seen() {
     let [a, b, _] = ball.triangles[0].map(|corner| corner as usize);
     sliver.positions[b] = ball.positions[a] + (ball.positions[b] - ball.positions[a]) * 1e-5;
     says(&one, made(sliver), "m high");
-    // Kept, but in another place, and not as it was.
+    // Kept, but in another position, and not as it was.
     let kept = |mesh: &TriMesh| Repaired {
         vertices: (0..mesh.positions.len() as u32).map(Some).collect(),
         sources: (0..mesh.triangles.len() as u32).map(Source::Whole).collect(),

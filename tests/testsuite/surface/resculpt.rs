@@ -48,7 +48,7 @@ fn write_shot(folder: &Path) {
     write_cache(folder, "ball", &ball, FRAMES);
     let (vertices, faces) = (ball.mesh.positions.len(), ball.mesh.triangles.len());
     let uvs = Uvs {
-        places: (0..3 * faces).map(|n| [n as f32 / 7.0, 1.0 / (1.0 + n as f32)]).collect(),
+        positions: (0..3 * faces).map(|n| [n as f32 / 7.0, 1.0 / (1.0 + n as f32)]).collect(),
         corners: Some((0..3 * faces as u32).collect()),
         missing: 0,
     };
@@ -64,10 +64,10 @@ fn write_shot(folder: &Path) {
 /// A mesh of the ball at a frame, of other triangles, with a bump of a height (spacings) along z.
 fn edited(frame: i32, height: f64) -> TriMesh {
     let mut mesh = ball(5.0, 8, 0.0).mesh;
-    for place in &mut mesh.positions {
-        let unit = place.cast::<f64>().normalize();
+    for position in &mut mesh.positions {
+        let unit = position.cast::<f64>().normalize();
         let share = ((unit.z - 0.7) / 0.3).clamp(0.0, 1.0);
-        *place = (unit * ((5.0 + height * share) * SPACING) + middle(frame)).cast();
+        *position = (unit * ((5.0 + height * share) * SPACING) + middle(frame)).cast();
     }
     mesh
 }
@@ -88,7 +88,7 @@ fn values<'a>(mesh: &'a DetailedMesh, name: &str) -> &'a [f64] {
 
 /// How far a mesh reaches from the middle of the ball along z (spacings).
 fn reach(mesh: &TriMesh, frame: i32) -> f64 {
-    let along = mesh.positions.iter().map(|place| (place.cast::<f64>() - middle(frame)).z / SPACING);
+    let along = mesh.positions.iter().map(|position| (position.cast::<f64>() - middle(frame)).z / SPACING);
     along.fold(0.0, f64::max)
 }
 
@@ -108,7 +108,7 @@ fn is_no_record(name: &str) -> bool {
 }
 
 #[test]
-fn a_mesh_that_was_sculpted_takes_the_place_of_the_tracked_one() {
+fn a_mesh_that_was_sculpted_takes_the_position_of_the_tracked_one() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     write_shot(folder);
@@ -150,14 +150,15 @@ fn a_mesh_that_was_sculpted_takes_the_place_of_the_tracked_one() {
         assert!(part.len() == faces && part.iter().all(|part| *part == 0.0), "frame {number}");
         assert!(now.arrays.iter().all(|array| array.name != "heat"), "frame {number}");
         let uvs = now.uvs.as_ref().expect("texture coordinates");
-        assert!(uvs.places.iter().all(|place| *place == [0.0; 2]), "frame {number}");
+        assert!(uvs.positions.iter().all(|position| *position == [0.0; 2]), "frame {number}");
         // Velocities lead to the next frame.
         if number < FRAMES {
             let next = frame(folder, "out", number + 1).mesh;
             let speed = ["vx", "vy", "vz"].map(|name| values(&now, name));
-            for (vertex, place) in now.mesh.positions.iter().enumerate() {
+            for (vertex, position) in now.mesh.positions.iter().enumerate() {
                 let by = DVec3::new(speed[0][vertex], speed[1][vertex], speed[2][vertex]) / 24.0;
-                let off = (place.cast::<f64>() + by - next.positions[vertex].cast::<f64>()).norm() / SPACING;
+                let off =
+                    (position.cast::<f64>() + by - next.positions[vertex].cast::<f64>()).norm() / SPACING;
                 assert!(off < 1e-4, "{off} spacings at frame {number}, vertex {vertex}");
             }
         }
@@ -165,14 +166,14 @@ fn a_mesh_that_was_sculpted_takes_the_place_of_the_tracked_one() {
 }
 
 /// Centimetres, Z up, as the files of `up` have them.
-fn theirs(place: DVec3) -> DVec3 {
-    DVec3::new(place.x, -place.z, place.y) * 100.0
+fn theirs(position: DVec3) -> DVec3 {
+    DVec3::new(position.x, -position.z, position.y) * 100.0
 }
 
 /// A mesh in that space.
 fn write_theirs(path: &Path, mesh: &TriMesh) {
-    let place = |place: &Vec3| -> Vec3 { theirs(place.cast()).cast() };
-    let positions = mesh.positions.iter().map(place).collect();
+    let position = |position: &Vec3| -> Vec3 { theirs(position.cast()).cast() };
+    let positions = mesh.positions.iter().map(position).collect();
     mesh::write(path, &TriMesh { positions, triangles: mesh.triangles.clone() }).unwrap();
 }
 
@@ -188,9 +189,10 @@ fn a_sculpt_of_another_format_or_in_another_space_is_the_same_mesh() {
     let ball = ball(5.0, 10, 0.25);
     write_theirs(&folder.join("up.ply"), &ball.mesh);
     for frame in 1..=FRAMES {
-        let places: Vec<DVec3> = ball.places.iter().map(|place| theirs(place + middle(frame))).collect();
-        let mut points = Points::at(1.0, &places).unwrap();
-        let ids = Values::Long(Column::Each((0..places.len() as i64).collect()));
+        let positions: Vec<DVec3> =
+            ball.positions.iter().map(|position| theirs(position + middle(frame))).collect();
+        let mut points = Points::at(1.0, &positions).unwrap();
+        let ids = Values::Long(Column::Each((0..positions.len() as i64).collect()));
         points.attributes.push(Attribute { name: "id".into(), values: ids });
         particles::write(&folder.join(format!("up.{frame:04}.bgeo")), &points, false).unwrap();
     }
@@ -209,9 +211,9 @@ fn a_sculpt_of_another_format_or_in_another_space_is_the_same_mesh() {
         assert!((wanted.triangles == sculpt.triangles) == (number >= 3), "frame {number}");
         assert!(obj == wanted, "frame {number}");
         assert!(up.triangles == wanted.triangles, "frame {number}");
-        for (vertex, (is, place)) in up.positions.iter().zip(&wanted.positions).enumerate() {
+        for (vertex, (is, position)) in up.positions.iter().zip(&wanted.positions).enumerate() {
             // What rounding to 32 bits leaves.
-            let off = (is.cast::<f64>() - place.cast::<f64>()).norm() / SPACING;
+            let off = (is.cast::<f64>() - position.cast::<f64>()).norm() / SPACING;
             assert!(off < 1e-3, "{off} spacings at frame {number}, vertex {vertex}");
         }
     }
@@ -324,7 +326,7 @@ fn what_is_no_sculpt_is_refused_with_the_key_or_the_file() {
         fails(folder, &shot(pattern, "no"), 2, words);
         assert!(!folder.join("no").exists(), "{pattern}");
     };
-    // No place for the frame's number.
+    // No position for the frame's number.
     for one in ["ball.ply", "sculpts/none.ply"] {
         refused(one, &[one, "surface.resculpt", "place for the frame's number"]);
     }
@@ -341,7 +343,7 @@ fn what_is_no_sculpt_is_refused_with_the_key_or_the_file() {
     refused("sculpts/cut.%04d.ply", &["cut.0003.ply"]);
     // It lies elsewhere, which is seen when its frame comes.
     let mut far = edited(3, BUMP);
-    far.positions.iter_mut().for_each(|place| place.x += 5.0);
+    far.positions.iter_mut().for_each(|position| position.x += 5.0);
     mesh::write(&folder.join("sculpts/far.0003.ply"), &far).unwrap();
     fails(folder, &shot("sculpts/far.%04d.ply", "far"), 1, &["far.0003.ply", "same space"]);
 }

@@ -12,23 +12,23 @@ use crate::common::character::output;
 use crate::common::liquids::{Ball, ball, turned};
 use crate::program::{command, fails, kill_at, works};
 
-/// Where a place of the first frame is in another: it turns and travels.
-fn motion(place: DVec3, frame: f64) -> DVec3 {
-    turned(place, 0.1 * frame, DVec3::new(0.004, -0.003, 0.002) * frame)
+/// Where a position of the first frame is in another: it turns and travels.
+fn motion(position: DVec3, frame: f64) -> DVec3 {
+    turned(position, 0.1 * frame, DVec3::new(0.004, -0.003, 0.002) * frame)
 }
 
 fn write_frame(path: &Path, ball: &Ball, frame: f64, attributes: &[&str]) {
-    let places: Vec<DVec3> = ball.places.iter().map(|place| motion(*place, frame)).collect();
-    let mut points = Points::at(1.0, &places).unwrap();
-    let ahead = |place: &DVec3| {
+    let positions: Vec<DVec3> = ball.positions.iter().map(|position| motion(*position, frame)).collect();
+    let mut points = Points::at(1.0, &positions).unwrap();
+    let ahead = |position: &DVec3| {
         let step = 1e-3;
-        let by = (motion(*place, frame + step) - motion(*place, frame - step)) * (24.0 / (2.0 * step));
+        let by = (motion(*position, frame + step) - motion(*position, frame - step)) * (24.0 / (2.0 * step));
         [by.x as f32, by.y as f32, by.z as f32]
     };
     for name in attributes {
         let values = match *name {
-            "v" => Values::Vector(Column::Each(ball.places.iter().map(ahead).collect())),
-            _ => Values::Long(Column::Each((0..places.len() as i64).collect())),
+            "v" => Values::Vector(Column::Each(ball.positions.iter().map(ahead).collect())),
+            _ => Values::Long(Column::Each((0..positions.len() as i64).collect())),
         };
         points.attributes.push(Attribute { name: name.to_string(), values });
     }
@@ -45,7 +45,7 @@ fn detailed(mesh: &TriMesh) -> DetailedMesh {
         values: (0..count).map(|n| (n % 251) as f64).collect(),
     };
     let uvs = Uvs {
-        places: (0..3 * faces).map(|n| [n as f32 / 7.0, 1.0 / (1.0 + n as f32)]).collect(),
+        positions: (0..3 * faces).map(|n| [n as f32 / 7.0, 1.0 / (1.0 + n as f32)]).collect(),
         corners: Some((0..3 * faces as u32).collect()),
         missing: 0,
     };
@@ -103,16 +103,16 @@ fn the_mesh_moves_with_its_velocities_and_keeps_what_it_carries() {
         assert!(array(&now, "flagged").iter().all(|flag| *flag == 0.0));
         let ahead = frame(folder, "out", (number + 1).min(6));
         let speed = ["vx", "vy", "vz"].map(|name| array(&now, name));
-        for (vertex, place) in now.mesh.positions.iter().enumerate() {
+        for (vertex, position) in now.mesh.positions.iter().enumerate() {
             let truth = motion(ball.mesh.positions[vertex].cast(), f64::from(number - 1));
             assert!(
-                (place.cast::<f64>() - truth).norm() < 0.02 * ball.spacing,
+                (position.cast::<f64>() - truth).norm() < 0.02 * ball.spacing,
                 "frame {number}, vertex {vertex}"
             );
             let by = DVec3::new(speed[0][vertex], speed[1][vertex], speed[2][vertex]) / 24.0;
             if number < 6 {
-                let off = (place.cast::<f64>() + by - ahead.mesh.positions[vertex].cast::<f64>()).norm();
-                // What 32 bits of a place and a velocity hold.
+                let off = (position.cast::<f64>() + by - ahead.mesh.positions[vertex].cast::<f64>()).norm();
+                // What 32 bits of a position and a velocity hold.
                 assert!(off < 2e-5 * ball.spacing, "{off} m at frame {number}, vertex {vertex}");
             } else {
                 assert!(by.norm() > 0.0, "the last frame moves as it came");
@@ -183,10 +183,9 @@ fn a_sequence_may_start_later_and_run_faster_or_slower() {
     let ball = write_shot(folder, 5);
     let at = |out: &str, number: i32, time: f64| {
         let mesh = frame(folder, out, number).mesh;
-        let off =
-            mesh.positions.iter().zip(&ball.mesh.positions).map(|(place, first)| {
-                (place.cast::<f64>() - motion(first.cast(), time)).norm() / ball.spacing
-            });
+        let off = mesh.positions.iter().zip(&ball.mesh.positions).map(|(position, first)| {
+            (position.cast::<f64>() - motion(first.cast(), time)).norm() / ball.spacing
+        });
         off.fold(0.0, f64::max)
     };
     works(folder, &format!("{SHOT} -o fast --set shot.frames=1-3 --set surface.speed=2"));
@@ -229,7 +228,7 @@ fn what_a_mesh_cannot_follow_is_refused_with_the_file() {
     refused("surface -p ball.0001.bgeo -m ball.ply --set shot.frames=1-2", &["never moves"]);
     // The mesh lies elsewhere.
     let mut far = ball.mesh.clone();
-    far.positions.iter_mut().for_each(|place| place.x += 5.0);
+    far.positions.iter_mut().for_each(|position| position.x += 5.0);
     mesh::write(&folder.join("far.ply"), &far).unwrap();
     let said = ["far.ply", "0 %", "same space"];
     fails(folder, "surface -p ball.%04d.bgeo -m far.ply --spacing 0.01 -o far", 2, &said);
@@ -278,8 +277,8 @@ fn velocities_alone_are_enough_and_ids_alone_too() {
             ),
         );
         let mesh = frame(folder, name, 4).mesh;
-        let far = |(place, first): (&frazil::geometry::Vec3, &frazil::geometry::Vec3)| {
-            (place.cast::<f64>() - motion(first.cast(), 3.0)).norm() / ball.spacing
+        let far = |(position, first): (&frazil::geometry::Vec3, &frazil::geometry::Vec3)| {
+            (position.cast::<f64>() - motion(first.cast(), 3.0)).norm() / ball.spacing
         };
         let most = mesh.positions.iter().zip(&ball.mesh.positions).map(far).fold(0.0, f64::max);
         assert!(most < 0.2, "{name}: {most}");
@@ -294,7 +293,7 @@ fn velocities_are_brought_into_the_shot_s_space_under_any_name() {
     // Centimetres, Z up, all at 1 m/s upward; a number of another name comes first.
     for frame in 1..=2 {
         let places: Vec<DVec3> = ball
-            .places
+            .positions
             .iter()
             .map(|p| p + DVec3::new(0.0, f64::from(frame - 1) / 24.0, 0.0))
             .map(|p| DVec3::new(p.x, -p.z, p.y) * 100.0)
@@ -333,7 +332,7 @@ fn what_lies_beyond_the_shot_does_not_keep_its_last_frame() {
     fs::write(folder.join("ball.0004.bgeo"), &bytes[..bytes.len() / 2]).unwrap();
     let said = works(folder, &format!("{SHOT} -o half --set shot.frames=1-3"));
     assert!(said.contains("ball.0004.bgeo") && said.contains("the velocities of the frame before"), "{said}");
-    // One frame of places alone is a shot too.
+    // One frame of positions alone is a shot too.
     works(folder, "convert ball.0001.bgeo still.xyz");
     works(folder, "surface -p still.xyz -m ball.ply --spacing 0.01 -o still");
     assert!(array(&frame(folder, "still", 1), "vx").iter().all(|speed| *speed == 0.0));

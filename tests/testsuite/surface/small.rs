@@ -18,17 +18,17 @@ const SPACING: f64 = 0.01;
 const FRAMES: i32 = 22;
 const AWAY: i32 = 20;
 
-/// Places of a lattice (spacings), so many along each axis.
+/// Positions of a lattice (spacings), so many along each axis.
 fn lattice(low: DVec3, counts: [u32; 3]) -> impl Iterator<Item = DVec3> {
     let on = move |axis: usize| (0..counts[axis]).map(f64::from);
     on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| low + DVec3::new(x, y, z))))
 }
 
-/// Writes particles at places (spacings), numbered from 0 on.
-fn write_particles(path: &Path, places: &[DVec3]) {
-    let places: Vec<DVec3> = places.iter().map(|place| place * SPACING).collect();
-    let mut points = Points::at(1.0, &places).unwrap();
-    let ids = Values::Long(Column::Each((0..places.len() as i64).collect()));
+/// Writes particles at positions (spacings), numbered from 0 on.
+fn write_particles(path: &Path, positions: &[DVec3]) {
+    let positions: Vec<DVec3> = positions.iter().map(|position| position * SPACING).collect();
+    let mut points = Points::at(1.0, &positions).unwrap();
+    let ids = Values::Long(Column::Each((0..positions.len() as i64).collect()));
     points.attributes.push(Attribute { name: "id".into(), values: ids });
     particles::write(path, &points, false).unwrap();
 }
@@ -54,9 +54,9 @@ fn drop_at(frame: i32) -> DVec3 {
 /// The cache of a ball, from which a drop of 4 particles flies off.
 fn write_drop(folder: &Path) {
     for frame in 1..=FRAMES {
-        let ball = lattice(DVec3::repeat(-4.0), [9; 3]).filter(|place| place.norm() <= 4.5);
-        let places: Vec<DVec3> = ball.chain(lattice(drop_at(frame), [2, 2, 1])).collect();
-        write_particles(&folder.join(format!("drop.{frame:04}.bgeo")), &places);
+        let ball = lattice(DVec3::repeat(-4.0), [9; 3]).filter(|position| position.norm() <= 4.5);
+        let positions: Vec<DVec3> = ball.chain(lattice(drop_at(frame), [2, 2, 1])).collect();
+        write_particles(&folder.join(format!("drop.{frame:04}.bgeo")), &positions);
     }
 }
 
@@ -75,7 +75,7 @@ fn a_drop_of_fewer_particles_than_min_drop_is_taken_away() {
         assert_eq!(specks(out), wanted, "{out}");
         for number in AWAY..=FRAMES {
             let middle = drop_at(number) + DVec3::new(0.5, 0.5, 0.0);
-            let is_near = |place: &&Vec3| (place.cast::<f64>() / SPACING - middle).norm() < 2.2;
+            let is_near = |position: &&Vec3| (position.cast::<f64>() / SPACING - middle).norm() < 2.2;
             let now = frame(folder, out, number);
             let count = now.positions.iter().filter(is_near).count();
             let is_right = if wanted == 0 { count > 20 } else { count == 0 };
@@ -85,7 +85,7 @@ fn a_drop_of_fewer_particles_than_min_drop_is_taken_away() {
     }
 }
 
-/// The outer part of the particles' own surface; places in spacings, the mesh in metres.
+/// The outer part of the particles' own surface; positions in spacings, the mesh in metres.
 fn outer_surface(places: &[DVec3]) -> TriMesh {
     let places: Vec<DVec3> = places.iter().map(|place| place * SPACING).collect();
     let phi = Implicit::new(&context(2), &places, SPACING, 0.5 * SPACING).unwrap();
@@ -104,12 +104,12 @@ fn a_bubble_that_the_mesh_lacks_is_meshed_where_all_of_it_is_matched() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let all = lattice(DVec3::repeat(-9.0), [19; 3]);
-    let places: Vec<DVec3> = all.filter(|place| (5.0..=8.5).contains(&place.norm())).collect();
-    let outer = outer_surface(&places);
+    let positions: Vec<DVec3> = all.filter(|position| (5.0..=8.5).contains(&position.norm())).collect();
+    let outer = outer_surface(&positions);
     mesh::write(&folder.join("outer.ply"), &outer).unwrap();
     let frames = 3;
     for frame in 1..=frames {
-        write_particles(&folder.join(format!("hollow.{frame:04}.bgeo")), &places);
+        write_particles(&folder.join(format!("hollow.{frame:04}.bgeo")), &positions);
     }
     let shot = "surface -p hollow.%04d.bgeo -m outer.ply --spacing 0.01";
     works(folder, &format!("{shot} -o usual"));

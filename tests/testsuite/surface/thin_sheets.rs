@@ -19,7 +19,7 @@ fn a_mesh_keeps_its_volume_while_its_sheet_thins() {
         let wide = libm::exp2(1.5 * frame as f64 / FRAMES as f64);
         numbered(first.iter().map(|at| DVec3::new(at.x * wide, at.y / (wide * wide), at.z * wide)).collect())
     };
-    let own = |frame: usize| own_surface(&ctx, &at(frame).places, 1.0);
+    let own = |frame: usize| own_surface(&ctx, &at(frame).positions, 1.0);
     let mut from = at(0);
     let params = Params { rebuild: true, min_drop: 8, ..Params::for_spacing(1.0) };
     let mut tracker = Tracker::new(&ctx, params, &own(0), &from).expect("a tracker");
@@ -56,9 +56,9 @@ fn sheets_and_threads_of_any_thickness_and_direction_have_the_volume_of_their_pa
             let across = if is_thread { thin } else { wide };
             turn * DVec3::new(at.x * wide, at.y * thin, at.z * across)
         };
-        let places: Vec<DVec3> = first.iter().enumerate().map(drawn).collect();
-        let mesh = own_surface(&ctx, &places, 1.0);
-        let volume = mesh.volume() / places.len() as f64;
+        let positions: Vec<DVec3> = first.iter().enumerate().map(drawn).collect();
+        let mesh = own_surface(&ctx, &positions, 1.0);
+        let volume = mesh.volume() / positions.len() as f64;
         let least = if is_thread { 0.6 } else { 0.85 };
         assert!((least..1.45).contains(&volume), "round {round}: {volume}");
         assert_eq!(mesh.euler_characteristic(), 2, "round {round}: a hole, or pieces");

@@ -20,9 +20,9 @@ fn write_shot(folder: &Path) {
     let ball = ball(5.0, 6, 0.25);
     for frame in 1..=2 {
         let by = DVec3::new(0.002, 0.0, 0.0) * f64::from(frame - 1);
-        let places: Vec<DVec3> = ball.places.iter().map(|place| place + by).collect();
-        let mut points = Points::at(1.0, &places).unwrap();
-        let ids = Values::Long(Column::Each((0..places.len() as i64).collect()));
+        let positions: Vec<DVec3> = ball.positions.iter().map(|position| position + by).collect();
+        let mut points = Points::at(1.0, &positions).unwrap();
+        let ids = Values::Long(Column::Each((0..positions.len() as i64).collect()));
         points.attributes.push(Attribute { name: "id".into(), values: ids });
         particles::write(&folder.join(format!("ball.{frame:04}.bgeo")), &points, false).unwrap();
     }

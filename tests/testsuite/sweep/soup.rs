@@ -27,7 +27,7 @@ fn pose_at(at: DVec3, turn: DVec3) -> Keys {
 }
 
 fn shared(solid: &Solid) -> TriMesh {
-    let positions = solid.places.iter().map(|place| place.cast()).collect();
+    let positions = solid.positions.iter().map(|position| position.cast()).collect();
     TriMesh { positions, triangles: solid.triangles.clone() }
 }
 
@@ -82,7 +82,7 @@ fn soup_that_shakes_by_rounding_as_it_moves_stays_whole() {
     near(volume(&swept), 1.5, "a cube that moves by half of its size");
     // Parts that come apart are no longer one corner.
     let mut parted = last.positions.clone();
-    parted[..3].iter_mut().for_each(|place| *place += Vec3::new(0.0, 0.4, 0.0));
+    parted[..3].iter_mut().for_each(|position| *position += Vec3::new(0.0, 0.4, 0.0));
     let body = Body::new(Box::new(Morph::new(first, parted).unwrap()), 0.0).unwrap();
     assert!(sweep::chain(&ctx, &[body], 0.0, 1.0, &Settings::new(0.05)).is_ok());
 }
@@ -98,7 +98,7 @@ fn a_shape_is_shared_only_where_its_corners_are_the_same() {
     assert!(Arc::ptr_eq(first.shape(), again.shape()));
     // One triangle comes off: all corners are at positions of their own still, but no longer one.
     let mut parted = soup.clone();
-    parted.positions[..3].iter_mut().for_each(|place| place.x += 2.0);
+    parted.positions[..3].iter_mut().for_each(|position| position.x += 2.0);
     let known = Body::shaped(rigid(&parted), 0.0, Some(first.shape().clone())).unwrap();
     let new = Body::new(rigid(&parted), 0.0).unwrap();
     assert_eq!((known.closed_loops(), known.corners()), (new.closed_loops(), new.corners()));

@@ -33,12 +33,12 @@ fn dice(seed: u64) -> impl FnMut() -> f64 {
 /// Grains in no order, some far from the origin, with an attribute of each type.
 fn cloud(count: usize) -> Points {
     let mut random = dice(7);
-    let place = |n: usize, random: &mut dyn FnMut() -> f64| {
+    let position = |n: usize, random: &mut dyn FnMut() -> f64| {
         let far = [0.0, 1.0e6, -1.0e6][n % 3];
         DVec3::from([0.0; 3].map(|_: f64| (far + 40.0 * random() - 20.0) * 0.01))
     };
-    let places: Vec<DVec3> = (0..count).map(|n| place(n, &mut random)).collect();
-    let mut points = Points::at(0.01, &places).unwrap();
+    let positions: Vec<DVec3> = (0..count).map(|n| position(n, &mut random)).collect();
+    let mut points = Points::at(0.01, &positions).unwrap();
     // Values of both ends of what an offset may be, and a negative zero.
     points.offsets[0] = [0.5, -0.5, -0.0];
     let mut vectors = || (0..count).map(|_| [0.0; 3].map(|_: f32| random() as f32 - 0.5)).collect();
@@ -99,7 +99,7 @@ fn the_bytes_do_not_depend_on_threads() {
 }
 
 #[test]
-fn points_of_a_voxel_keep_their_order_and_equal_places_their_values() {
+fn points_of_a_voxel_keep_their_order_and_equal_positions_their_values() {
     let ctx = context(2);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("heap.vdb");

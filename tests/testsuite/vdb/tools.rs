@@ -152,7 +152,7 @@ fn a_cancelled_tool_leaves_its_grid_as_it_was() {
 }
 
 #[test]
-fn a_file_cut_at_any_of_20_places_is_refused_in_a_sentence() {
+fn a_file_cut_at_any_of_20_positions_is_refused_in_a_sentence() {
     let ctx = context(1);
     let folder = tempfile::tempdir().unwrap();
     let mut grid = level_set::from_mesh(&ctx, &sphere(0.2, 24), 0.02, 3.0).unwrap();

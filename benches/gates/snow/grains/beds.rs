@@ -35,7 +35,7 @@ fn settled(seed: u64) -> Experiment {
     for frame in 0..72 {
         bed.step();
         if frame % 12 == 0 {
-            let top = bed.heap.places().map(|place| place.y).fold(0.0, f64::max) / D;
+            let top = bed.heap.positions().map(|position| position.y).fold(0.0, f64::max) / D;
             println!("# frame {frame}: {top:.1} diameters high, fastest {:.3} m/s", bed.heap.fastest());
         }
     }
@@ -45,7 +45,7 @@ fn settled(seed: u64) -> Experiment {
 /// How much lower (%) the bed between its ends stands than its grains would at the packing of its upper third. That height is
 /// the volume of the grains over packing and ground: the packing of the third over that of the whole says it all. Below 0 the lower part is the looser one.
 fn missing(bed: &Experiment) -> f64 {
-    let heights: Vec<f64> = bed.heap.places().map(|place| place.y / D).collect();
+    let heights: Vec<f64> = bed.heap.positions().map(|position| position.y / D).collect();
     let top = heights.iter().copied().fold(0.0, f64::max) + 0.5;
     let [low, high] = [ENDS[0], top - ENDS[1]];
     let packing = |low: f64, high: f64| {

@@ -31,7 +31,7 @@ impl Host {
         let sites = (0..SIDES[0]).flat_map(|x| (0..SIDES[1]).map(move |y| [x, y]));
         let sites = sites.flat_map(|[x, y]| (0..SIDES[2]).map(move |z| [x, y, z]));
         let mut off = |at: u32| ((f64::from(at) + 0.5 + 0.05 * random.next()) * apart) as f32;
-        let places: Vec<[f32; 3]> = sites.map(|site| site.map(&mut off)).collect();
+        let positions: Vec<[f32; 3]> = sites.map(|site| site.map(&mut off)).collect();
         let none = frz_view { data: null(), count: 0, stride: 0 };
         // SAFETY: the pointers are valid, and the parameters are filled before they are read.
         unsafe {
@@ -40,7 +40,7 @@ impl Host {
             (params.radius, params.sub_steps) = (0.0025, STEP.1);
             params.flags = FRZ_GRAINS_FLOOR | FRZ_GRAINS_RESTLESS;
             works(frz_grains_create(host.threads.ctx, &params, null(), 0, &mut host.grains));
-            works(frz_grains_emit(host.threads.ctx, host.grains, view(&places), none, 0, null_mut()));
+            works(frz_grains_emit(host.threads.ctx, host.grains, view(&positions), none, 0, null_mut()));
         }
         host
     }

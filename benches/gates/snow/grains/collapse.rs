@@ -21,19 +21,19 @@ const FRAMES: i32 = 30;
 pub fn run(h: &mut Harness) {
     column_collapse::compare(h, "snow.grains.collapse", &[0.5, 1.0, 3.0, 10.0], |aspect| {
         let (column, radius, height) = column_collapse::settled(aspect, GRAINS);
-        let places: Vec<DVec3> = column.heap.places().map(|at| at + DVec3::y() * DEPTH).collect();
+        let positions: Vec<DVec3> = column.heap.positions().map(|at| at + DVec3::y() * DEPTH).collect();
         let folder = tempfile::tempdir().expect("a folder");
-        (column_collapse::edge(&collapsed(folder.path(), &places)) / radius - 1.0, height / radius)
+        (column_collapse::edge(&collapsed(folder.path(), &positions)) / radius - 1.0, height / radius)
     });
 }
 
 /// Positions (m) of grains at the end of a scene that begins with them.
-fn collapsed(folder: &Path, places: &[DVec3]) -> Vec<DVec3> {
+fn collapsed(folder: &Path, positions: &[DVec3]) -> Vec<DVec3> {
     let mut cloud = format!(
         "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\nend_header\n",
-        places.len()
+        positions.len()
     );
-    places.iter().for_each(|at| writeln!(cloud, "{} {} {}", at.x, at.y, at.z).expect("text"));
+    positions.iter().for_each(|at| writeln!(cloud, "{} {} {}", at.x, at.y, at.z).expect("text"));
     let scene = format!(
         "[shot]\nframes = \"1-{FRAMES}\"\n[snow]\nground = 0.0\narea = [-0.6, -0.6, 0.6, 0.6]\ndepth = {DEPTH}\ncell = 0.01\n\
          [grains]\nradius = {}\ninitial = \"column.ply\"\n[output]\ngrains = [\"ply\"]\nusd = false\n",
@@ -45,7 +45,7 @@ fn collapsed(folder: &Path, places: &[DVec3]) -> Vec<DVec3> {
     let run = run.arg("snow").arg(folder.join("scene.toml")).arg("-o").arg(folder.join("out"));
     assert!(run.args(["-q", "--threads", "2"]).stderr(Stdio::null()).status().expect("frazil").success());
     let last = folder.join(format!("out/grains/grains.{FRAMES:04}.ply"));
-    let end = ply::read(&last).expect("grains").places;
-    assert_eq!(end.len(), places.len(), "none is lost");
+    let end = ply::read(&last).expect("grains").positions;
+    assert_eq!(end.len(), positions.len(), "none is lost");
     end
 }

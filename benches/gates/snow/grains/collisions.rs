@@ -28,23 +28,23 @@ pub fn run(h: &mut Harness) {
 }
 
 /// Indices of the grains in a mesh, trapped or not: nearer to its surface than 0.4 diameters, or inside it if it is closed.
-fn deep(places: &[DVec3], mesh: &TriMesh, closed: bool) -> Vec<usize> {
-    let pose: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast::<f64>()).collect();
+fn deep(positions: &[DVec3], mesh: &TriMesh, closed: bool) -> Vec<usize> {
+    let pose: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast::<f64>()).collect();
     let shell = Shell::at_rest(mesh.triangles.clone(), pose.clone());
     let near = (0.5 - DEEP) * D;
-    let is_deep = |place: &DVec3| {
-        shell.distance(*place, near).is_some_and(|distance| distance < near)
+    let is_deep = |position: &DVec3| {
+        shell.distance(*position, near).is_some_and(|distance| distance < near)
             || closed
-                && shell.distance(*place, 0.1).is_some()
-                && winding(*place, &mesh.triangles, &pose) > 0.5
+                && shell.distance(*position, 0.1).is_some()
+                && winding(*position, &mesh.triangles, &pose) > 0.5
     };
-    (0..places.len()).into_par_iter().filter(|index| is_deep(&places[*index])).collect()
+    (0..positions.len()).into_par_iter().filter(|index| is_deep(&positions[*index])).collect()
 }
 
 /// Winding number of a closed mesh around a position: its solid angle (van Oosterom and Strackee 1983) over 4 pi.
-fn winding(place: DVec3, triangles: &[[u32; 3]], pose: &[DVec3]) -> f64 {
+fn winding(position: DVec3, triangles: &[[u32; 3]], pose: &[DVec3]) -> f64 {
     let angle = |triangle: &[u32; 3]| {
-        let [a, b, c] = triangle.map(|index| pose[index as usize] - place);
+        let [a, b, c] = triangle.map(|index| pose[index as usize] - position);
         let (x, y, z) = (a.norm(), b.norm(), c.norm());
         let below = x * y * z + a.dot(&b) * z + b.dot(&c) * x + c.dot(&a) * y;
         2.0 * a.dot(&b.cross(&c)).atan2(below)
@@ -88,7 +88,7 @@ fn through(h: &mut Harness, name: &str, motion: Box<dyn Motion>, frames: i32) {
         body.motion().pose(times[1], &mut pose).expect("a pose");
         let positions = pose.iter().map(|place| place.cast::<f32>()).collect();
         let mesh = TriMesh { positions, triangles: body.motion().triangles().to_vec() };
-        let places: Vec<DVec3> = grains.places().collect();
+        let places: Vec<DVec3> = grains.positions().collect();
         let ids = grains.ids();
         let is_free = |index: &usize| grains.trapped().binary_search(&ids[*index]).is_err();
         let deep = deep(&places, &mesh, closed);
@@ -157,12 +157,12 @@ impl Motion for Sheet {
 
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> frazil::Result<()> {
         let at = |index: u32| f64::from(index) / f64::from(EDGE - 1) * 0.24 - 0.12;
-        let place = |index: u32| {
+        let position = |index: u32| {
             let (x, z) = (at(index % EDGE), at(index / EDGE));
             DVec3::new(x, 0.05 + 0.03 * (30.0 * x + 18.0 * time).sin() * (18.0 * time).cos(), z)
         };
         out.clear();
-        out.extend((0..EDGE * EDGE).map(place));
+        out.extend((0..EDGE * EDGE).map(position));
         Ok(())
     }
 }
@@ -211,7 +211,7 @@ fn walker_frame(out: &Path, frame: i32) -> [usize; 4] {
     use frazil::geometry::points::Values;
     let points =
         frazil::vdb::points::read(&out.join(format!("grains/grains.{frame:04}.vdb")), None).expect("points");
-    let places: Vec<DVec3> = (0..points.count()).map(|index| points.position(index)).collect();
+    let positions: Vec<DVec3> = (0..points.count()).map(|index| points.position(index)).collect();
     let Some(Values::Bool(trapped)) = points.attribute("trapped") else { panic!("no attribute trapped") };
     let mesh = frazil::io::mesh::read(&out.join(format!("objects/objects.{frame:04}.ply"))).expect("a mesh");
     let base = out.join(format!("base/base.{frame:04}.vdb"));
@@ -221,18 +221,18 @@ fn walker_frame(out: &Path, frame: i32) -> [usize; 4] {
         radius = f64::from(scale.get(0));
     }
     let near = (1.0 - 2.0 * DEEP) * radius;
-    let pose: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast::<f64>()).collect();
+    let pose: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast::<f64>()).collect();
     let shell = Shell::at_rest(mesh.triangles.clone(), pose.clone());
-    let free: Vec<usize> = (0..places.len()).filter(|index| !trapped.get(*index)).collect();
+    let free: Vec<usize> = (0..positions.len()).filter(|index| !trapped.get(*index)).collect();
     let in_object = free.par_iter().filter(|index| {
-        let place = places[**index];
-        shell.distance(place, near).is_some_and(|distance| distance < near)
-            || shell.distance(place, 0.15).is_some() && winding(place, &mesh.triangles, &pose) > 0.5
+        let position = positions[**index];
+        shell.distance(position, near).is_some_and(|distance| distance < near)
+            || shell.distance(position, 0.15).is_some() && winding(position, &mesh.triangles, &pose) > 0.5
     });
     let in_object = in_object.count();
-    let at: Vec<DVec3> = free.iter().map(|index| places[*index]).collect();
+    let at: Vec<DVec3> = free.iter().map(|index| positions[*index]).collect();
     let mut values = Vec::new();
     base.sample_linear(&context(2), &at, &mut values).expect("values");
     let in_base = values.iter().filter(|value| f64::from(**value) < near).count();
-    [in_object, in_base, places.len() - free.len(), places.len()]
+    [in_object, in_base, positions.len() - free.len(), positions.len()]
 }

@@ -61,11 +61,11 @@ pub fn settled(aspect: f64, grains: f64) -> (Experiment, f64, f64) {
     let corners: Vec<[f64; 2]> = (0..64).map(corner).collect();
     column.colliders.shells = vec![walls(&corners, 20.0 * aspect * radius)];
     let across = (2.0 * radius / (1.16 * D)).ceil() as u32 + 1;
-    let inside = |place: DVec3| place.xz().norm() < radius - 0.7 * D;
+    let inside = |position: DVec3| position.xz().norm() < radius - 0.7 * D;
     let each = across * across * 4 / 5;
-    column.scatter([across, 2 * grains as u32 / each, across], |place| {
-        inside(place)
-            && place.y < 1.16 * D * grains / (std::f64::consts::PI * (radius / (1.16 * D) - 0.6).powi(2))
+    column.scatter([across, 2 * grains as u32 / each, across], |position| {
+        inside(position)
+            && position.y < 1.16 * D * grains / (std::f64::consts::PI * (radius / (1.16 * D) - 0.6).powi(2))
     });
     let mut frames = 0;
     while frames < 24 || column.heap.fastest() > 0.02 && frames < 96 {
@@ -74,10 +74,10 @@ pub fn settled(aspect: f64, grains: f64) -> (Experiment, f64, f64) {
     }
     // Mean height of the top.
     let mut tops = std::collections::HashMap::new();
-    for place in column.heap.places() {
-        let at = [place.x, place.z].map(|x| (x / (1.5 * D)).floor() as i32);
+    for position in column.heap.positions() {
+        let at = [position.x, position.z].map(|x| (x / (1.5 * D)).floor() as i32);
         let top = tops.entry(at).or_insert(0.0f64);
-        *top = top.max(place.y + 0.5 * D);
+        *top = top.max(position.y + 0.5 * D);
     }
     let height = tops.values().sum::<f64>() / tops.len() as f64;
     println!("# {} grains, {:.1} radii high after {frames} frames", column.heap.count(), height / radius);
@@ -94,8 +94,8 @@ fn collapse(aspect: f64) -> (f64, f64) {
         column.step();
         frames += 1;
     }
-    let places: Vec<DVec3> = column.heap.places().collect();
-    let edge = edge(&places);
+    let positions: Vec<DVec3> = column.heap.positions().collect();
+    let edge = edge(&positions);
     println!(
         "# {frames} frames later the edge lies at {:.2} radii, the slope is {:.1}",
         edge / radius,
@@ -105,22 +105,23 @@ fn collapse(aspect: f64) -> (f64, f64) {
 }
 
 /// Radius (m) of the deposit of grains at some places.
-pub fn edge(places: &[DVec3]) -> f64 {
-    let cell = |place: &DVec3| [0, 1, 2].map(|axis: usize| (place[axis] / (TOUCHING * D)).floor() as i32);
+pub fn edge(positions: &[DVec3]) -> f64 {
+    let cell =
+        |position: &DVec3| [0, 1, 2].map(|axis: usize| (position[axis] / (TOUCHING * D)).floor() as i32);
     let mut cells = std::collections::HashMap::<[i32; 3], Vec<usize>>::new();
-    for (index, place) in places.iter().enumerate() {
-        cells.entry(cell(place)).or_default().push(index);
+    for (index, position) in positions.iter().enumerate() {
+        cells.entry(cell(position)).or_default().push(index);
     }
-    let mut is_part = vec![false; places.len()];
+    let mut is_part = vec![false; positions.len()];
     let mut open: Vec<usize> =
-        (0..places.len()).filter(|index| places[*index].xz().norm() < 3.0 * D).collect();
+        (0..positions.len()).filter(|index| positions[*index].xz().norm() < 3.0 * D).collect();
     open.iter().for_each(|index| is_part[*index] = true);
     while let Some(index) = open.pop() {
-        let at = cell(&places[index]);
+        let at = cell(&positions[index]);
         for code in 0..27 {
             let near = [at[0] + code / 9 - 1, at[1] + code / 3 % 3 - 1, at[2] + code % 3 - 1];
             for &other in cells.get(&near).into_iter().flatten() {
-                if !is_part[other] && (places[other] - places[index]).norm() < TOUCHING * D {
+                if !is_part[other] && (positions[other] - positions[index]).norm() < TOUCHING * D {
                     is_part[other] = true;
                     open.push(other);
                 }
@@ -128,23 +129,23 @@ pub fn edge(places: &[DVec3]) -> f64 {
         }
     }
     let mut sectors = [0.0f64; SECTORS];
-    for (place, _) in places.iter().zip(&is_part).filter(|(_, is_part)| **is_part) {
-        let angle = place.z.atan2(place.x) / std::f64::consts::TAU + 0.5;
+    for (position, _) in positions.iter().zip(&is_part).filter(|(_, is_part)| **is_part) {
+        let angle = position.z.atan2(position.x) / std::f64::consts::TAU + 0.5;
         let sector = &mut sectors[(angle * SECTORS as f64) as usize % SECTORS];
-        *sector = sector.max(place.xz().norm() + 0.5 * D);
+        *sector = sector.max(position.xz().norm() + 0.5 * D);
     }
     let strays = is_part.iter().filter(|is_part| !**is_part).count();
-    let most = far(places, 0.99) / D;
+    let most = far(positions, 0.99) / D;
     println!(
         "# {strays} strays; 99 % of the grains lie within {most:.1} diameters, all within {:.1}",
-        far(places, 1.0) / D
+        far(positions, 1.0) / D
     );
     sectors.iter().sum::<f64>() / SECTORS as f64
 }
 
 /// Distance (m) from the axis within which a share of the grains lies.
-fn far(places: &[DVec3], share: f64) -> f64 {
-    let mut distances: Vec<f64> = places.iter().map(|place| place.xz().norm()).collect();
+fn far(positions: &[DVec3], share: f64) -> f64 {
+    let mut distances: Vec<f64> = positions.iter().map(|position| position.xz().norm()).collect();
     distances.sort_by(f64::total_cmp);
     distances[((distances.len() - 1) as f64 * share) as usize]
 }

@@ -88,10 +88,10 @@ fn resting(report: &Path) -> f64 {
 fn tops(file: &Path, edge: f64) -> Tops {
     let grains = points::read(file, None).expect("grains");
     let mut tops = Tops::new();
-    for place in (0..grains.count()).map(|index| grains.position(index)) {
-        let at = [place.x, place.z].map(|x| (x / edge).floor() as i32);
+    for position in (0..grains.count()).map(|index| grains.position(index)) {
+        let at = [position.x, position.z].map(|x| (x / edge).floor() as i32);
         let top = tops.entry(at).or_insert(f64::MIN);
-        *top = top.max(place.y + 0.25 * edge);
+        *top = top.max(position.y + 0.25 * edge);
     }
     tops
 }
@@ -100,13 +100,13 @@ fn tops(file: &Path, edge: f64) -> Tops {
 fn ground(base: &frazil::vdb::FloatGrid, squares: &[[i32; 2]], edge: f64) -> Vec<f64> {
     let step = 0.5 * base.voxel_size();
     let levels = (TOP / step).ceil() as usize;
-    let place = |[x, z]: &[i32; 2], level: usize| {
+    let position = |[x, z]: &[i32; 2], level: usize| {
         DVec3::new((f64::from(*x) + 0.5) * edge, TOP - level as f64 * step, (f64::from(*z) + 0.5) * edge)
     };
-    let places: Vec<DVec3> =
-        squares.iter().flat_map(|square| (0..levels).map(move |level| place(square, level))).collect();
+    let positions: Vec<DVec3> =
+        squares.iter().flat_map(|square| (0..levels).map(move |level| position(square, level))).collect();
     let mut distances = Vec::new();
-    base.sample_linear(&context(2), &places, &mut distances).expect("distances");
+    base.sample_linear(&context(2), &positions, &mut distances).expect("distances");
     let first = |column: &[f32]| column.iter().position(|distance| *distance <= 0.0);
     let height = |column| first(column).map_or(0.0, |level| TOP - level as f64 * step);
     distances.chunks(levels).map(height).collect()

@@ -22,13 +22,13 @@ fn alone(h: &mut Harness) {
         (one.params.air, one.params.gravity, one.division.sub_steps) = (air, gravity, sub_steps);
         one.heap.add(0, DVec3::new(12.3, 45.6, -7.8), [speed, 0.0, 0.0]).expect("add");
         (0..24).for_each(|_| one.step());
-        (one.heap.places().next().expect("one"), one.heap.velocities().next().expect("one"))
+        (one.heap.positions().next().expect("one"), one.heap.velocities().next().expect("one"))
     };
     let sub_steps = Experiment::new(2, 0.005, 0.2, 1).division.sub_steps;
-    let (place, velocity) = one_grain(1.0, -9.81, 0.0, sub_steps);
+    let (position, velocity) = one_grain(1.0, -9.81, 0.0, sub_steps);
     let dt = FRAME / sub_steps as f64;
     h.gate("snow.grains.fall_speed", (f64::from(velocity[1]) / -9.81 - 1.0).abs(), "");
-    h.gate("snow.grains.fall_way", ((45.6 - place.y) / (0.5 * 9.81 * (1.0 + dt)) - 1.0).abs(), "");
+    h.gate("snow.grains.fall_way", ((45.6 - position.y) / (0.5 * 9.81 * (1.0 + dt)) - 1.0).abs(), "");
     let kept = |sub_steps: usize| f64::from(one_grain(0.5, 0.0, 1.0, sub_steps).1[0]);
     h.gate(
         "snow.grains.air",

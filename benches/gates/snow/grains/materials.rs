@@ -60,9 +60,9 @@ fn stands(layers: f64, attraction: f64, friction: f64, seed: u64) -> bool {
     wall.colliders.shells = vec![sides(0.0)];
     let apart = 1.16 * D;
     let sites = [2.0 * length, 1.5 * height, width].map(|size| (size / apart) as u32);
-    wall.scatter(sites, |place| place.x < -0.5 * D);
+    wall.scatter(sites, |position| position.x < -0.5 * D);
     wall.steps((36.0 * (layers / 20.0).sqrt().max(0.5)) as usize);
-    wall.heap.retain(|_, place| place.y < height - 0.5 * D);
+    wall.heap.retain(|_, position| position.y < height - 0.5 * D);
     wall.params.attraction = attraction;
     wall.heap.wake(|_| true);
     wall.steps(12);
@@ -71,7 +71,7 @@ fn stands(layers: f64, attraction: f64, friction: f64, seed: u64) -> bool {
     wall.colliders.shells = vec![sides(length)];
     (0..30).all(|_| {
         wall.step();
-        let fallen = wall.heap.places().filter(|place| place.x > D).count();
+        let fallen = wall.heap.positions().filter(|position| position.x > D).count();
         fallen * 100 < wall.heap.count() && edge(&wall) > 0.9 * before
     })
 }
@@ -79,10 +79,10 @@ fn stands(layers: f64, attraction: f64, friction: f64, seed: u64) -> bool {
 /// Mean height (m) of the topmost grains of the strip behind the edge.
 fn edge(wall: &Experiment) -> f64 {
     let mut tops = std::collections::BTreeMap::new();
-    for place in wall.heap.places().filter(|place| place.x > -4.0 * D && place.x < 0.0) {
-        let column = [place.x, place.z].map(|x| (x / (1.5 * D)).floor() as i32);
+    for position in wall.heap.positions().filter(|position| position.x > -4.0 * D && position.x < 0.0) {
+        let column = [position.x, position.z].map(|x| (x / (1.5 * D)).floor() as i32);
         let top = tops.entry(column).or_insert(0.0f64);
-        *top = top.max(place.y);
+        *top = top.max(position.y);
     }
     tops.values().sum::<f64>() / tops.len().max(1) as f64
 }
@@ -112,8 +112,8 @@ fn restitution(h: &mut Harness) {
 }
 
 fn plane() -> (Shell, Pose<'static>) {
-    let places = [[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]].map(|[x, z]| DVec3::new(x, 0.0, z));
-    crate::snow::grains::still(0.3, vec![[0, 1, 2], [0, 2, 3]], places.to_vec())
+    let positions = [[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]].map(|[x, z]| DVec3::new(x, 0.0, z));
+    crate::snow::grains::still(0.3, vec![[0, 1, 2], [0, 2, 3]], positions.to_vec())
 }
 
 /// Square root of the height to which a grain rebounds over that from which it fell.
@@ -133,7 +133,7 @@ fn bounce(restitution: f64, colliders: Colliders<'static>) -> f64 {
         if has_met && !rises {
             break;
         }
-        let height = one.heap.places().next().expect("one").y - 0.5 * D;
+        let height = one.heap.positions().next().expect("one").y - 0.5 * D;
         top = if has_met { top.max(height) } else { 0.0 };
     }
     (top / drop).sqrt()
@@ -164,7 +164,7 @@ impl Motion for Plate {
         let shaken = (time - SHAKES).max(0.0) * std::f64::consts::TAU * 15.0;
         let at = DVec3::new(1.0 - moved, 0.055 * shaken.sin(), 0.0);
         out.clear();
-        out.extend(self.1.iter().map(|place| place + at));
+        out.extend(self.1.iter().map(|position| position + at));
         Ok(())
     }
 }
@@ -176,8 +176,8 @@ fn stick(h: &mut Harness) {
     }
     let ctx: Context = context(2);
     let mesh = cuboid([0.2, 0.02, 0.2]);
-    let places = mesh.positions.iter().map(|place| place.cast::<f64>()).collect();
-    let body = Body::new(Box::new(Plate(mesh.triangles.clone(), places)), 0.0).expect("a body");
+    let positions = mesh.positions.iter().map(|position| position.cast::<f64>()).collect();
+    let body = Body::new(Box::new(Plate(mesh.triangles.clone(), positions)), 0.0).expect("a body");
     let mut grains = Grains::new(Params { radius: 0.5 * D, ..Params::for_cell(1.5 * D) }).expect("grains");
     let bottom = body_bottom(&body);
     let sites: Vec<DVec3> = (0..20)
@@ -203,8 +203,9 @@ fn stick(h: &mut Harness) {
         }
         let mut pose = Vec::new();
         body.motion().pose(last, &mut pose).expect("a pose");
-        let under = pose.iter().map(|place| place.y).fold(f64::MAX, f64::min);
-        let near = grains.places().filter(|place| (place.y - under + 0.5 * D).abs() < 0.2 * D).count();
+        let under = pose.iter().map(|position| position.y).fold(f64::MAX, f64::min);
+        let near =
+            grains.positions().filter(|position| (position.y - under + 0.5 * D).abs() < 0.2 * D).count();
         near as f64 * 100.0 / sites.len() as f64
     };
     let (stopped, shaken) = (hanging(0..36), hanging(36..60));
@@ -215,5 +216,5 @@ fn stick(h: &mut Harness) {
 fn body_bottom(body: &Body) -> f64 {
     let mut pose = Vec::new();
     body.motion().pose(0.0, &mut pose).expect("a pose");
-    pose.iter().map(|place| place.y).fold(f64::MAX, f64::min)
+    pose.iter().map(|position| position.y).fold(f64::MAX, f64::min)
 }

@@ -46,15 +46,15 @@ pub fn print_memory() {
     let params = Params { rests: false, ..Params::for_cell(0.0075) };
     let mut grains = Grains::new(params).expect("grains");
     let count = SIDES.iter().product::<u32>() as usize;
-    let mut places = Vec::with_capacity(count);
+    let mut positions = Vec::with_capacity(count);
     for index in 0..count as u32 {
         let site = [index % SIDES[0], index / SIDES[0] % SIDES[1], index / SIDES[0] / SIDES[1]];
         let off = site.map(|at| (f64::from(at) + 0.5 + 0.06 * random.next()) * 1.1 * 2.0 * params.radius);
-        places.push(DVec3::from(off));
+        positions.push(DVec3::from(off));
     }
     let before = kilobytes("VmRSS:");
     let each = |kilobytes: f64| kilobytes * 1024.0 / count as f64;
-    grains.emit(&places, &[], 0).expect("grains");
+    grains.emit(&positions, &[], 0).expect("grains");
     println!("# grains that were added: {:.0} bytes each", each(kilobytes("VmRSS:") - before));
     let around = Surroundings {
         base: Base::Missing,

@@ -138,9 +138,9 @@ impl Experiment {
                 let mut off = |at: u32| (f64::from(at) + 0.5) * apart + (self.random.next() - 0.5) * most;
                 let [x, y, z] = [off(x), off(layer), off(z)];
                 let [width, length] = [sites[0], sites[2]].map(|count| 0.5 * f64::from(count) * apart);
-                let place = DVec3::new(x - width, y, z - length);
-                if takes(place) {
-                    self.heap.add(self.heap.count() as u32, place, [0.0; 3]).expect("add");
+                let position = DVec3::new(x - width, y, z - length);
+                if takes(position) {
+                    self.heap.add(self.heap.count() as u32, position, [0.0; 3]).expect("add");
                 }
             }
         }
@@ -153,28 +153,27 @@ impl Experiment {
             for (x, z) in (-radius..=radius).flat_map(|x| (-radius..=radius).map(move |z| (x, z))) {
                 if f64::from(x * x + z * z) < reach * reach {
                     let site = [f64::from(x), f64::from(layer) + 0.5, f64::from(z)];
-                    let place = DVec3::from(site) * 1.08 * self.diameter();
-                    self.heap.add(self.heap.count() as u32, place, [0.0; 3]).expect("add");
+                    let position = DVec3::from(site) * 1.08 * self.diameter();
+                    self.heap.add(self.heap.count() as u32, position, [0.0; 3]).expect("add");
                 }
             }
         }
     }
 
-    /// Places and velocities, bit for bit.
+    /// Positions and velocities, bit for bit.
     pub fn state(&self) -> Vec<u32> {
-        let places = self
-            .heap
-            .located()
-            .flat_map(|(at, place)| at.map(|block| block as u32).into_iter().chain(place.map(f32::to_bits)));
-        places.chain(self.heap.velocities().flat_map(|velocity| velocity.map(f32::to_bits))).collect()
+        let positions = self.heap.located().flat_map(|(at, position)| {
+            at.map(|block| block as u32).into_iter().chain(position.map(f32::to_bits))
+        });
+        positions.chain(self.heap.velocities().flat_map(|velocity| velocity.map(f32::to_bits))).collect()
     }
 }
 
 /// An open mesh that stands still.
-pub fn still(friction: f32, triangles: Vec<[u32; 3]>, places: Vec<DVec3>) -> (Shell, Pose<'static>) {
-    let shell = Shell::new(friction, triangles, false, places.clone());
+pub fn still(friction: f32, triangles: Vec<[u32; 3]>, positions: Vec<DVec3>) -> (Shell, Pose<'static>) {
+    let shell = Shell::new(friction, triangles, false, positions.clone());
     let pose = move |_: f64, out: &mut Vec<DVec3>| {
-        out.clone_from(&places);
+        out.clone_from(&positions);
         Ok(())
     };
     (shell, Box::new(pose))

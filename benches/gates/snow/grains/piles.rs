@@ -21,9 +21,10 @@ impl Experiment {
         let span = each as f64 / 6.0 * d * (d / unit).powi(2);
         while self.heap.count() < count {
             let rests = |velocity: [f32; 3]| velocity.iter().map(|x| x * x).sum::<f32>() < 0.04;
-            let places = self.heap.places().zip(self.heap.velocities());
-            let near = places.filter(|(place, velocity)| place.xz().norm() < 6.0 * unit && rests(*velocity));
-            let top = near.map(|(place, _)| place.y).fold(0.0, f64::max);
+            let positions = self.heap.positions().zip(self.heap.velocities());
+            let near = positions
+                .filter(|(position, velocity)| position.xz().norm() < 6.0 * unit && rests(*velocity));
+            let top = near.map(|(position, _)| position.y).fold(0.0, f64::max);
             let mut born: Vec<DVec3> = Vec::new();
             for _ in 0..30 * each {
                 if born.len() == each || self.heap.count() == count {
@@ -32,10 +33,10 @@ impl Experiment {
                 let (angle, radius) =
                     (self.random.next() * std::f64::consts::TAU, self.random.next().sqrt() * hole);
                 let height = top + 2.0 * unit + self.random.next() * span;
-                let place = DVec3::new(angle.cos() * radius, height, angle.sin() * radius);
-                if born.iter().all(|other| (other - place).norm() > d) {
-                    self.heap.add(self.heap.count() as u32, place, [0.0, speed as f32, 0.0]).expect("add");
-                    born.push(place);
+                let position = DVec3::new(angle.cos() * radius, height, angle.sin() * radius);
+                if born.iter().all(|other| (other - position).norm() > d) {
+                    self.heap.add(self.heap.count() as u32, position, [0.0, speed as f32, 0.0]).expect("add");
+                    born.push(position);
                 }
             }
             self.step();
@@ -47,10 +48,10 @@ impl Experiment {
     pub fn slope(&self) -> f64 {
         let (d, width) = (self.diameter(), 1.5 * self.diameter());
         let mut tops = std::collections::BTreeMap::new();
-        for place in self.heap.places() {
-            let column = [place.x, place.z].map(|x| (x / width).floor() as i32);
+        for position in self.heap.positions() {
+            let column = [position.x, position.z].map(|x| (x / width).floor() as i32);
             let top = tops.entry(column).or_insert(0.0f64);
-            *top = top.max(place.y + 0.5 * d);
+            *top = top.max(position.y + 0.5 * d);
         }
         let ring = |column: &[i32; 2]| {
             (column.iter().map(|x| (f64::from(*x) + 0.5).powi(2)).sum::<f64>().sqrt()) as usize

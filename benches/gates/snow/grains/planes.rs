@@ -41,9 +41,9 @@ fn slide(friction: f64, degrees: f64) -> (f64, bool) {
     let (sine, cosine) = degrees.to_radians().sin_cos();
     let (down, normal) = (DVec3::new(cosine, -sine, 0.0), DVec3::new(sine, cosine, 0.0));
     let corner = |along: f64, across: f64| down * along + DVec3::z() * across;
-    let places = vec![corner(-1.0, -1.0), corner(-1.0, 1.0), corner(9.0, 1.0), corner(9.0, -1.0)];
-    one.colliders.shells = vec![still(friction as f32, vec![[0, 1, 2], [0, 2, 3]], places)];
+    let positions = vec![corner(-1.0, -1.0), corner(-1.0, 1.0), corner(9.0, 1.0), corner(9.0, -1.0)];
+    one.colliders.shells = vec![still(friction as f32, vec![[0, 1, 2], [0, 2, 3]], positions)];
     one.heap.add(0, normal * (0.5 * D), [0.0; 3]).expect("add");
     one.steps(FRAMES);
-    (one.heap.places().next().expect("one").dot(&down), one.heap.resting() == 1)
+    (one.heap.positions().next().expect("one").dot(&down), one.heap.resting() == 1)
 }

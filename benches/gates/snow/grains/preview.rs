@@ -45,18 +45,18 @@ pub fn run(h: &mut Harness) {
 fn under(pile: &Experiment) -> f64 {
     let (step, radius) = (0.25 * D, pile.params.radius);
     let mut heights = HashMap::<[i32; 2], f64>::new();
-    for place in pile.heap.places() {
+    for position in pile.heap.positions() {
         let range = |x: f64| ((x - radius) / step).ceil() as i32..=((x + radius) / step).floor() as i32;
-        for (x, z) in range(place.x).flat_map(|x| range(place.z).map(move |z| (x, z))) {
-            let off = DVec3::new(f64::from(x) * step - place.x, 0.0, f64::from(z) * step - place.z);
+        for (x, z) in range(position.x).flat_map(|x| range(position.z).map(move |z| (x, z))) {
+            let off = DVec3::new(f64::from(x) * step - position.x, 0.0, f64::from(z) * step - position.z);
             let square = radius * radius - off.norm_squared();
             if square > 0.0 {
                 let height = heights.entry([x, z]).or_insert(0.0);
-                *height = height.max(place.y + square.sqrt());
+                *height = height.max(position.y + square.sqrt());
             }
         }
     }
-    // In the order of the places, so that sums do not change from run to run.
+    // In the order of the positions, so that sums do not change from run to run.
     let mut heights: Vec<([i32; 2], f64)> = heights.into_iter().collect();
     heights.sort_unstable_by_key(|(at, _)| *at);
     heights.iter().map(|(_, height)| height).sum::<f64>() * step * step

@@ -15,8 +15,8 @@ use crate::snow::grains::births::ploughed;
 
 /// Frame of the files.
 const FRAME: i32 = 36;
-/// Bytes of a place in a record, after those of the identity.
-const PLACE: std::ops::Range<usize> = 8..32;
+/// Bytes of a position in a record, after those of the identity.
+const POSITION: std::ops::Range<usize> = 8..32;
 /// Bytes of a record.
 const RECORD: usize = 68;
 
@@ -61,14 +61,14 @@ pub fn run(h: &mut Harness) {
 
 /// All values of the grains by identity, as tests/ctest/grain_reader.cpp writes them.
 fn records(grains: &Grains) -> Vec<u8> {
-    let values = grains.ids().iter().zip(grains.places()).zip(grains.velocities()).zip(grains.rests());
+    let values = grains.ids().iter().zip(grains.positions()).zip(grains.velocities()).zip(grains.rests());
     let values = values.zip(grains.source_frames()).zip(grains.awake());
     let mut records: Vec<(u32, Vec<u8>)> = values
-        .map(|(((((id, place), velocity), rest), frame), is_awake)| {
+        .map(|(((((id, position), velocity), rest), frame), is_awake)| {
             let radius = [grains.params().radius as f32];
             let single = velocity.into_iter().chain(rest).chain(radius).flat_map(f32::to_le_bytes);
             let mut bytes = i64::from(*id).to_le_bytes().to_vec();
-            bytes.extend(place.iter().flat_map(|x| x.to_le_bytes()).chain(single));
+            bytes.extend(position.iter().flat_map(|x| x.to_le_bytes()).chain(single));
             bytes.extend([frame, i32::from(is_awake)].into_iter().flat_map(i32::to_le_bytes));
             (*id, bytes)
         })
@@ -77,15 +77,16 @@ fn records(grains: &Grains) -> Vec<u8> {
     records.into_iter().flat_map(|(_, bytes)| bytes).collect()
 }
 
-/// Whether two lists of records hold the same: places but for the rounding of sums, all else bit for bit.
+/// Whether two lists of records hold the same: positions but for the rounding of sums, all else bit for bit.
 fn is_same(ours: &[u8], theirs: &[u8], grains: &Grains) -> bool {
-    let place = |record: &[u8], axis: usize| {
-        let bytes = &record[PLACE][8 * axis..8 * axis + 8];
+    let position = |record: &[u8], axis: usize| {
+        let bytes = &record[POSITION][8 * axis..8 * axis + 8];
         f64::from_le_bytes(bytes.try_into().expect("8 bytes"))
     };
     let is_near = |(ours, theirs): (&[u8], &[u8])| {
-        let off = (0..3).map(|axis| (place(ours, axis) - place(theirs, axis)).abs()).fold(0.0, f64::max);
-        let [same, other] = [ours, theirs].map(|record| (&record[..PLACE.start], &record[PLACE.end..]));
+        let off =
+            (0..3).map(|axis| (position(ours, axis) - position(theirs, axis)).abs()).fold(0.0, f64::max);
+        let [same, other] = [ours, theirs].map(|record| (&record[..POSITION.start], &record[POSITION.end..]));
         off < 1.0e-6 * grains.params().radius && same == other
     };
     ours.len() == RECORD * grains.count()

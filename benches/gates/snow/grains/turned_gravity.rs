@@ -44,18 +44,18 @@ pub fn run(h: &mut Harness) {
 fn rough(length: f64, width: f64, random: &mut Random) -> (Shell, Pose<'static>) {
     let [columns, rows] = [length, width].map(|size| (size / D).ceil() as u32 + 2);
     let vertices = (0..=columns).flat_map(|x| (0..=rows).map(move |z| (x, z)));
-    let places = vertices.map(|(x, z)| {
+    let positions = vertices.map(|(x, z)| {
         let [x, z] =
             [(x, columns), (z, rows)].map(|(at, count)| (f64::from(at) - 0.5 * f64::from(count)) * D);
         DVec3::new(x, -0.5 * D * random.next(), z)
     });
-    let places: Vec<DVec3> = places.collect();
+    let positions: Vec<DVec3> = positions.collect();
     let squares = (0..columns).flat_map(|x| (0..rows).map(move |z| x * (rows + 1) + z));
     let halves = squares.flat_map(|at| {
         let [a, b, c, d] = [at, at + 1, at + rows + 2, at + rows + 1];
         [[a, b, c], [a, c, d]]
     });
-    still(1.0, halves.collect(), places)
+    still(1.0, halves.collect(), positions)
 }
 
 /// Angle (degrees) at which the top has moved by a diameter on average.
@@ -68,26 +68,26 @@ fn slides(asked: f64, sites: [u32; 3]) -> f64 {
         vec![walls(&rectangle(length, width), 100.0 * D), rough(length, width, &mut bed.random)];
     bed.scatter_apart(LOOSE, sites, |_| true);
     bed.steps(48);
-    let places = |bed: &Experiment| -> HashMap<u32, DVec3> {
-        bed.heap.ids().iter().copied().zip(bed.heap.places()).collect()
+    let positions = |bed: &Experiment| -> HashMap<u32, DVec3> {
+        bed.heap.ids().iter().copied().zip(bed.heap.positions()).collect()
     };
-    let start = places(&bed);
+    let start = positions(&bed);
     let middle: Vec<(u32, DVec3)> =
-        start.into_iter().filter(|(_, place)| place.x.abs() < length / 6.0).collect();
-    let mut heights: Vec<f64> = middle.iter().map(|(_, place)| place.y).collect();
+        start.into_iter().filter(|(_, position)| position.x.abs() < length / 6.0).collect();
+    let mut heights: Vec<f64> = middle.iter().map(|(_, position)| position.y).collect();
     heights.sort_by(f64::total_cmp);
     // Not the highest: a single grain may lie on top.
     let surface = heights[heights.len() * 99 / 100] + 0.5 * D;
     let top: Vec<(u32, DVec3)> =
-        middle.into_iter().filter(|(_, place)| place.y > surface - TOP * D).collect();
+        middle.into_iter().filter(|(_, position)| position.y > surface - TOP * D).collect();
     println!("# {} grains, {:.1} diameters deep, {} in the top", bed.heap.count(), surface / D, top.len());
     let (mut last, mut frame) = (0.0, 0);
     loop {
         frame += 1;
         bed.turn = RATE * FRAME * f64::from(frame);
         bed.step();
-        let now = places(&bed);
-        let way = top.iter().map(|(id, place)| now[id].x - place.x).sum::<f64>() / top.len() as f64 / D;
+        let now = positions(&bed);
+        let way = top.iter().map(|(id, position)| now[id].x - position.x).sum::<f64>() / top.len() as f64 / D;
         if frame % 24 == 0 {
             println!("# {:.0} degrees: {way:.3} diameters", bed.turn);
         }

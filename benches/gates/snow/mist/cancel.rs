@@ -23,7 +23,7 @@ const CUBE: f64 = 0.9;
 struct Host {
     threads: Threads,
     mist: *mut frz_mist,
-    places: Vec<[f64; 3]>,
+    positions: Vec<[f64; 3]>,
     speeds: Vec<[f32; 3]>,
     ball: [Vec<[f32; 3]>; 2],
     corners: Vec<[u32; 3]>,
@@ -35,12 +35,15 @@ impl Host {
         let mut params = std::mem::MaybeUninit::<frz_mist_params>::uninit();
         let mesh = sphere(0.15, 24);
         let at = |x: f32| {
-            mesh.positions.iter().map(|place| [place.x + x, place.y + 0.45, place.z + 0.45]).collect()
+            mesh.positions
+                .iter()
+                .map(|position| [position.x + x, position.y + 0.45, position.z + 0.45])
+                .collect()
         };
         let mut host = Self {
             threads: Threads::new(2),
             mist: null_mut(),
-            places: (0..4000).map(|_| [0, 1, 2].map(|_| CUBE * random.next())).collect(),
+            positions: (0..4000).map(|_| [0, 1, 2].map(|_| CUBE * random.next())).collect(),
             speeds: (0..4000).map(|_| [0, 1, 2].map(|_| 2.0 * random.next() as f32 - 0.5)).collect(),
             ball: [at(0.4), at(0.45)],
             corners: mesh.triangles.clone(),
@@ -78,7 +81,7 @@ impl Steps for Host {
 
     fn step(&self) -> frz_status {
         let body = self.body();
-        let [places, speeds]: [frz_view; 2] = [view(&self.places), view(&self.speeds)];
+        let [positions, speeds]: [frz_view; 2] = [view(&self.positions), view(&self.speeds)];
         let mut report = std::mem::MaybeUninit::<frz_mist_report>::zeroed();
         // SAFETY: the pointers are valid; all zeroes are a report.
         unsafe {
@@ -86,7 +89,7 @@ impl Steps for Host {
             let status = frz_mist_step_points(
                 self.threads.ctx,
                 self.mist,
-                places,
+                positions,
                 speeds,
                 0.005,
                 null(),

@@ -36,17 +36,17 @@ impl Flight {
     fn at(&self, time: f64) -> Start {
         let time = time - self.thrown;
         if time < 0.0 {
-            return Start { place: self.from, velocity: [0.0; 3] };
+            return Start { position: self.from, velocity: [0.0; 3] };
         }
         let fall = DVec3::new(0.0, GRAVITY, 0.0);
         let velocity = self.velocity + fall * time;
-        let place = self.from + self.velocity * time + fall * (0.5 * time * time);
-        Start { place, velocity: [velocity.x as f32, velocity.y as f32, velocity.z as f32] }
+        let position = self.from + self.velocity * time + fall * (0.5 * time * time);
+        Start { position, velocity: [velocity.x as f32, velocity.y as f32, velocity.z as f32] }
     }
 
     fn source(&self, [from, to]: [f64; 2]) -> Source {
-        let Start { place, velocity } = self.at(to);
-        Source { place, velocity, radius: 0.003, start: Some(self.at(from)) }
+        let Start { position, velocity } = self.at(to);
+        Source { position, velocity, radius: 0.003, start: Some(self.at(from)) }
     }
 }
 

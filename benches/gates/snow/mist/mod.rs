@@ -104,14 +104,14 @@ fn projection(h: &mut Harness) {
     h.gate(names[1], f64::from(-least), "");
 }
 
-/// Faces of a ball around a place (fine cells), of a radius (fine cells), that moves along x at a speed (m/s), for cells of an
+/// Faces of a ball around a position (fine cells), of a radius (fine cells), that moves along x at a speed (m/s), for cells of an
 /// edge (m).
-fn ball(tiles: &Tiles, cell: f32, place: [f32; 3], radius: f32, speed: f32) -> Solids {
+fn ball(tiles: &Tiles, cell: f32, position: [f32; 3], radius: f32, speed: f32) -> Solids {
     let wider = cell / CELL as f32;
-    let (place, radius) = (place.map(|x| x / wider), radius / wider);
+    let (position, radius) = (position.map(|x| x / wider), radius / wider);
     let mut faces = Vec::new();
     for (slot, coord) in (0..).zip(tiles.coords()) {
-        let middle = [0, 1, 2].map(|axis| coord[axis] as f32 * 8.0 + 4.0 - place[axis]);
+        let middle = [0, 1, 2].map(|axis| coord[axis] as f32 * 8.0 + 4.0 - position[axis]);
         if middle.iter().map(|x| x * x).sum::<f32>().sqrt() > radius + 8.0 {
             continue;
         }
@@ -122,7 +122,7 @@ fn ball(tiles: &Tiles, cell: f32, place: [f32; 3], radius: f32, speed: f32) -> S
                 let square: f32 = (0..3)
                     .map(|other| {
                         let half = if other == axis { 0.0 } else { 0.5 };
-                        ((coord[other] * 8 + at[other] as i32) as f32 + half - place[other]).powi(2)
+                        ((coord[other] * 8 + at[other] as i32) as f32 + half - position[other]).powi(2)
                     })
                     .sum();
                 tile.open[axis][cell] = (0.5 + square.sqrt() - radius).clamp(0.0, 1.0);
@@ -224,7 +224,7 @@ fn vortex_error(ctx: &Context, tiles: i32) -> f64 {
         1 => -x.cos() * y.sin(),
         _ => 0.0,
     };
-    let place = |coord: &Coord, at: usize, axis: usize| {
+    let position = |coord: &Coord, at: usize, axis: usize| {
         let [x, y] = [coord[0] * 8 + (at >> 6) as i32, coord[1] * 8 + (at >> 3 & 7) as i32].map(f64::from);
         let half = |other: usize| if other == axis { 0.0 } else { 0.5 };
         [(x + half(0)) * cell, (y + half(1)) * cell]
@@ -234,7 +234,7 @@ fn vortex_error(ctx: &Context, tiles: i32) -> f64 {
         for (axis, field) in velocity.iter_mut().enumerate() {
             for (coord, tile) in tiles.coords().iter().zip(field) {
                 for (at, speed) in tile.iter_mut().enumerate() {
-                    let [x, y] = place(coord, at, axis);
+                    let [x, y] = position(coord, at, axis);
                     *speed = exact(axis, x, y) as f32;
                 }
             }
@@ -255,7 +255,7 @@ fn vortex_error(ctx: &Context, tiles: i32) -> f64 {
         for (coord, tile) in flow.tiles().coords().iter().zip(&flow.velocity()[axis]) {
             if (0..3).all(|axis| (0..high[axis]).contains(&coord[axis])) {
                 for (at, speed) in tile.iter().enumerate() {
-                    let [x, y] = place(coord, at, axis);
+                    let [x, y] = position(coord, at, axis);
                     sum += (f64::from(*speed) - exact(axis, x, y)).powi(2);
                     count += 1.0;
                 }
@@ -327,11 +327,11 @@ fn dashes(h: &mut Harness) {
     let start = DVec3::new(0.013, 0.007, 0.004);
     let at = |time: f64| start + DVec3::from(velocity.map(f64::from)) * time;
     for frame in 1..=6 {
-        let source = Source { place: at(f64::from(frame) * FRAME), velocity, radius: 0.0025, start: None };
+        let source = Source { position: at(f64::from(frame) * FRAME), velocity, radius: 0.0025, start: None };
         step(&mut mist, &ctx, &[source], &open, frame);
     }
-    let density = |place: DVec3| {
-        let cell = [0, 1, 2].map(|axis| (place[axis] / CELL).floor() as i32);
+    let density = |position: DVec3| {
+        let cell = [0, 1, 2].map(|axis| (position[axis] / CELL).floor() as i32);
         let slot = mist.flow().tiles().find(cell.map(|x| x >> 3));
         let tile = slot.and_then(|slot| mist.flow().density().get(slot as usize));
         tile.map_or(0.0, |tile| {

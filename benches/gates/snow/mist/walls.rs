@@ -77,8 +77,8 @@ fn inside(mist: &Mist, way: f64) -> f64 {
     for (coord, tile) in mist.flow().tiles().coords().iter().zip(mist.flow().density()) {
         for (cell, density) in tile.iter().enumerate() {
             let at = [cell >> 6, cell >> 3 & 7, cell & 7];
-            let place = [0, 1, 2].map(|axis| (f64::from(coord[axis] * 8 + at[axis] as i32) + 0.5) * CELL);
-            if (place[0] - way).abs() < half && place[1..].iter().all(|x| x.abs() < half) {
+            let position = [0, 1, 2].map(|axis| (f64::from(coord[axis] * 8 + at[axis] as i32) + 0.5) * CELL);
+            if (position[0] - way).abs() < half && position[1..].iter().all(|x| x.abs() < half) {
                 sum += f64::from(*density);
             }
         }

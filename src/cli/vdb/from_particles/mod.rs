@@ -160,9 +160,9 @@ fn of_frame(path: &Path, frame: i32) -> PathBuf {
 const ODD: f64 = 2.0;
 
 /// Says so when a given spacing (m) is not that of the particles: a wrong unit makes single drops, or one lump.
-fn warn_of_spacing(path: &Path, places: &[DVec3], spacing: f64) {
+fn warn_of_spacing(path: &Path, positions: &[DVec3], spacing: f64) {
     let odd = |estimate: &f64| !(1.0 / ODD..=ODD).contains(&(spacing / estimate));
-    if let Some(estimate) = rough_spacing(places).filter(odd) {
+    if let Some(estimate) = rough_spacing(positions).filter(odd) {
         log::warn!(
             "{}: a spacing of {spacing} m is given, but particles lie {estimate:.6} m apart",
             path.display()
@@ -199,7 +199,7 @@ impl Args {
             let path = of_frame(&self.particles, frame);
             match self.read(&path) {
                 Ok(cloud) => {
-                    if let Some(spacing) = estimate_spacing(&cloud.places) {
+                    if let Some(spacing) = estimate_spacing(&cloud.positions) {
                         log::warn!(
                             "{}: the spacing of the particles is estimated as {spacing:.6} m; --spacing sets it",
                             path.display()
@@ -228,18 +228,18 @@ impl Args {
     ) -> Result<Made> {
         let path = of_frame(&self.particles, frame);
         let mut cloud = self.read(&path)?;
-        if !cloud.places.is_empty() && !std::mem::replace(is_compared, true) {
-            warn_of_spacing(&path, &cloud.places, spacing);
+        if !cloud.positions.is_empty() && !std::mem::replace(is_compared, true) {
+            warn_of_spacing(&path, &cloud.positions, spacing);
         }
         let specks = self.leave_out(&mut cloud, spacing, &path)?;
         // A file without particles need not say what they would carry.
-        let columns = if cloud.places.is_empty() { Vec::new() } else { self.columns(&cloud, &path)? };
-        let made = self.make(session, (&cloud.places, &columns), spacing, (frame, colliders));
+        let columns = if cloud.positions.is_empty() { Vec::new() } else { self.columns(&cloud, &path)? };
+        let made = self.make(session, (&cloud.positions, &columns), spacing, (frame, colliders));
         let mesh = made.map_err(|error| match error {
             Error::Argument(what) if what.starts_with(TOO_FAR) => Error::file(&path, what),
             other => other,
         })?;
-        Ok(Made { frames: 1, particles: cloud.places.len(), specks, triangles: mesh.triangles.len() })
+        Ok(Made { frames: 1, particles: cloud.positions.len(), specks, triangles: mesh.triangles.len() })
     }
 
     /// What options leave nothing of: one file is refused, and a frame of a sequence, which may well have no liquid there, is warned of.
@@ -255,16 +255,16 @@ impl Args {
     fn read(&self, path: &Path) -> Result<Cloud> {
         let mut cloud: Cloud =
             if extension(path) == "vdb" { points_of_vdb(path)?.into() } else { particles::read(path)? };
-        if cloud.places.is_empty() {
+        if cloud.positions.is_empty() {
             log::warn!("{}: holds no particles: its surface is empty", path.display());
             return Ok(cloud);
         }
         self.space.space().bring(&mut cloud);
         if let (Some(low), Some(high)) = (self.box_min, self.box_max) {
             let is_inside = |p: &DVec3| (0..3).all(|axis| (low[axis]..=high[axis]).contains(&p[axis]));
-            let kept: Vec<bool> = cloud.places.iter().map(is_inside).collect();
+            let kept: Vec<bool> = cloud.positions.iter().map(is_inside).collect();
             cloud.retain(&kept);
-            if cloud.places.is_empty() {
+            if cloud.positions.is_empty() {
                 self.refuse_nothing(path, "has no particles in the box")?;
             }
         }
@@ -274,9 +274,9 @@ impl Args {
     /// Leaves small groups of particles out; the count of these particles.
     fn leave_out(&self, cloud: &mut Cloud, spacing: f64, path: &Path) -> Result<usize> {
         let Some(least) = self.min_drop else { return Ok(0) };
-        let specks = specks(&cloud.places, spacing, least as usize)?;
+        let specks = specks(&cloud.positions, spacing, least as usize)?;
         let count = specks.iter().filter(|is| **is).count();
-        if count > 0 && count == cloud.places.len() {
+        if count > 0 && count == cloud.positions.len() {
             self.refuse_nothing(path, &format!("has no group of {least} particles"))?;
         }
         if count > 0 {
@@ -288,7 +288,7 @@ impl Args {
 
     /// The attributes that the mesh is to have, with the names of its arrays.
     fn columns(&self, cloud: &Cloud, path: &Path) -> Result<Vec<(String, Vec<f32>)>> {
-        let count = cloud.places.len();
+        let count = cloud.positions.len();
         let wanted = |attribute: &&Attribute| {
             matches!(attribute.values, Values::Float(_) | Values::Vector(_))
                 && self.attributes.iter().any(|name| name == "all" || *name == attribute.name)
@@ -348,21 +348,21 @@ impl Args {
     fn make(
         &self,
         session: &Session,
-        (places, columns): (&[DVec3], &[(String, Vec<f32>)]),
+        (positions, columns): (&[DVec3], &[(String, Vec<f32>)]),
         spacing: f64,
         (frame, colliders): (i32, &mut Colliders),
     ) -> Result<TriMesh> {
         let ctx = &session.ctx;
         let recipe = self.recipe(spacing);
         let wants_grid = self.output.is_some() || !colliders.is_empty();
-        let (mut mesh, mut grid) = recipe.surface(session, places, wants_grid)?;
+        let (mut mesh, mut grid) = recipe.surface(session, positions, wants_grid)?;
         if !colliders.is_empty()
             && let Some(liquid) = &mut grid
         {
             colliders.cut(session, liquid, frame)?;
             let cut = &*liquid;
             mesh = ctx.phase("mesh", || to_mesh(ctx, cut, 0.0, 0.0))?;
-            if mesh.triangles.is_empty() && !places.is_empty() {
+            if mesh.triangles.is_empty() && !positions.is_empty() {
                 let particles = of_frame(&self.particles, frame);
                 log::warn!("{}: nothing is left of the liquid", particles.display());
             }
@@ -372,7 +372,7 @@ impl Args {
             file::write(&of_frame(path, frame), &[&*grid], &self.packing.options())?;
         }
         if let Some(path) = &self.mesh {
-            let means = ctx.phase("attributes", || means(ctx, places, spacing, &mesh, columns))?;
+            let means = ctx.phase("attributes", || means(ctx, positions, spacing, &mesh, columns))?;
             let arrays: Vec<&MeshArray> = means.iter().collect();
             let carried = io::mesh::Carried { arrays: &arrays, ..Default::default() };
             io::mesh::write_carried(&of_frame(path, frame), &mesh, &carried)?;
@@ -384,7 +384,7 @@ impl Args {
 /// What the particles around carry, as arrays of a mesh's vertices.
 fn means(
     ctx: &Context,
-    places: &[DVec3],
+    positions: &[DVec3],
     spacing: f64,
     mesh: &TriMesh,
     columns: &[(String, Vec<f32>)],
@@ -392,9 +392,9 @@ fn means(
     if columns.is_empty() {
         return Ok(Vec::new());
     }
-    let vertices: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
+    let vertices: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
     let numbers: Vec<Vec<f32>> = columns.iter().map(|(_, numbers)| numbers.clone()).collect();
-    let means = transfer(ctx, places, spacing, &vertices, &numbers)?;
+    let means = transfer(ctx, positions, spacing, &vertices, &numbers)?;
     let array = |((name, _), values): (&(String, Vec<f32>), Vec<f32>)| MeshArray {
         name: name.clone(),
         on: On::Vertices,

@@ -37,21 +37,21 @@ pub struct Recipe {
 }
 
 impl Recipe {
-    /// The surface of particles at places (m), with its level set where that is wanted; both are empty without particles.
+    /// The surface of particles at positions (m), with its level set where that is wanted; both are empty without particles.
     pub fn surface(
         &self,
         session: &Session,
-        places: &[DVec3],
+        positions: &[DVec3],
         wants_grid: bool,
     ) -> Result<(TriMesh, Option<FloatGrid>)> {
-        if places.is_empty() {
+        if positions.is_empty() {
             let grid = if wants_grid { Some(FloatGrid::level_set(self.cell, HALF_WIDTH)?) } else { None };
             return Ok((TriMesh::default(), grid));
         }
         let (mut mesh, grid) = match self.method {
-            Method::Solenthaler => self.solenthaler(session, places, wants_grid && self.passes == 0)?,
+            Method::Solenthaler => self.solenthaler(session, positions, wants_grid && self.passes == 0)?,
             // Inside of a union the spheres' own values are no distances.
-            Method::Spheres => (self.union(session, places)?, None),
+            Method::Spheres => (self.union(session, positions)?, None),
         };
         if self.passes > 0 {
             session.ctx.phase("smooth", || smooth(&session.ctx, &mut mesh, self.passes))?;
@@ -63,7 +63,7 @@ impl Recipe {
         Ok((mesh, grid))
     }
 
-    fn union(&self, session: &Session, places: &[DVec3]) -> Result<TriMesh> {
+    fn union(&self, session: &Session, positions: &[DVec3]) -> Result<TriMesh> {
         let (ctx, radius, cell) = (&session.ctx, self.radius, self.cell);
         if !is_sphere_radius(radius, cell) {
             let cells = radius / cell;
@@ -71,7 +71,7 @@ impl Recipe {
                 "--radius {radius} m is {cells:.3} cells of {cell} m, and must be 1.5 to 100 cells; --cell sets them"
             )));
         }
-        let grid = ctx.phase("spheres", || spheres(ctx, places, radius, cell))?;
+        let grid = ctx.phase("spheres", || spheres(ctx, positions, radius, cell))?;
         ctx.phase("mesh", || to_mesh(ctx, &grid, 0.0, 0.0))
     }
 
@@ -79,11 +79,11 @@ impl Recipe {
     fn solenthaler(
         &self,
         session: &Session,
-        places: &[DVec3],
+        positions: &[DVec3],
         wants_grid: bool,
     ) -> Result<(TriMesh, Option<FloatGrid>)> {
         let ctx = &session.ctx;
-        let phi = ctx.phase("phi", || Implicit::new(ctx, places, self.spacing, self.cell))?;
+        let phi = ctx.phase("phi", || Implicit::new(ctx, positions, self.spacing, self.cell))?;
         let surface = ctx.phase("mesh", || Ok(Isosurface::new(&phi)))?;
         let mesh = surface.mesh(&phi);
         if !wants_grid {

@@ -12,7 +12,7 @@ const SCALAR: u64 = 8;
 const DROP: u64 = 220;
 /// Bytes of a voxel of a leaf, of which there are some two for each column.
 const VOXEL: u64 = 2 * 4;
-/// Bytes of a triangle of a terrain that is stained: its corners, and of its half a vertex the place, the stain, and that in the exact state.
+/// Bytes of a triangle of a terrain that is stained: its corners, and of its half a vertex the position, the stain, and that in the exact state.
 const STAINED: u64 = 13 + (12 + 4 + 12) / 2;
 /// Bytes of a frame's report and record.
 const RECORDS: u64 = 3000;

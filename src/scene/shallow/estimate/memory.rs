@@ -20,7 +20,7 @@ const WALLS: u64 = 108;
 const THICK: u64 = 12;
 /// Bytes of a drop: what it is 500, its ball and strand while they are made, and in up to three steps that wait for the writer, 5,600 each.
 const DROP: u64 = 22_900;
-/// Bytes of a triangle of the terrain: corners and a place, twice while it is read, or while minimum heights are found, and what these need.
+/// Bytes of a triangle of the terrain: corners and a position, twice while it is read, or while minimum heights are found, and what these need.
 const TRIANGLE: u64 = 110;
 
 /// Bytes of a triangle more where the liquid stains it: stains, and the mesh in up to three steps that wait for the writer.

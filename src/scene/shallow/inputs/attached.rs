@@ -1,4 +1,4 @@
-//! Places of a terrain that sources, drains and absorbers move with.
+//! Positions of a terrain that sources, drains and absorbers move with.
 
 use crate::context::Context;
 use crate::geometry::check::deviation::{Nearest, NearestTree};
@@ -8,7 +8,7 @@ use crate::scene::shallow::Shallow;
 /// A triangle whose height is so small a share of its longest edge has no inside.
 const NEEDLE: f64 = 1e-10;
 
-/// A place on a triangle.
+/// A position on a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::scene::shallow) struct Attached {
     triangle: usize,
@@ -18,19 +18,19 @@ pub(in crate::scene::shallow) struct Attached {
 
 impl Attached {
     fn of(nearest: &Nearest, mesh: &TriMesh) -> Self {
-        let shares = shares(corners(mesh, nearest.triangle), nearest.place);
+        let shares = shares(corners(mesh, nearest.triangle), nearest.position);
         Self { triangle: nearest.triangle, shares }
     }
 
     /// Where it is on a mesh with these triangles (m).
-    pub fn place(&self, mesh: &TriMesh) -> [f64; 3] {
+    pub fn position(&self, mesh: &TriMesh) -> [f64; 3] {
         let [a, b, c] = corners(mesh, self.triangle);
         let [of_a, of_b, of_c] = self.shares;
         (a * of_a + b * of_b + c * of_c).into()
     }
 }
 
-/// Attaches the points of a scene that follow the terrain to the nearest place of its mesh at the first frame; one entry for each point.
+/// Attaches the points of a scene that follow the terrain to the nearest position of its mesh at the first frame; one entry for each point.
 pub(in crate::scene::shallow) fn attach(
     ctx: &Context,
     of: &Shallow,
@@ -48,8 +48,8 @@ fn corners(mesh: &TriMesh, triangle: usize) -> [DVec3; 3] {
     mesh.triangles[triangle].map(|vertex| mesh.positions[vertex as usize].cast())
 }
 
-/// Shares of a triangle's corners in a place on it.
-fn shares(corners: [DVec3; 3], place: DVec3) -> [f64; 3] {
+/// Shares of a triangle's corners in a position on it.
+fn shares(corners: [DVec3; 3], position: DVec3) -> [f64; 3] {
     let [a, b, c] = corners;
     let normal = (b - a).cross(&(c - a));
     let square = normal.norm_squared();
@@ -59,7 +59,7 @@ fn shares(corners: [DVec3; 3], place: DVec3) -> [f64; 3] {
     if square <= NEEDLE * NEEDLE * longest * longest {
         // A needle is as good as its longest edge, and a point is its own corner.
         let from = lengths.iter().position(|length| *length == longest).unwrap_or(0);
-        let way = (place - corners[from]).dot(&edges[from]);
+        let way = (position - corners[from]).dot(&edges[from]);
         let share = if longest > 0.0 { (way / longest).clamp(0.0, 1.0) } else { 0.0 };
         let mut shares = [0.0; 3];
         (shares[from], shares[(from + 1) % 3]) = (1.0 - share, share);
@@ -67,7 +67,7 @@ fn shares(corners: [DVec3; 3], place: DVec3) -> [f64; 3] {
     }
     let share = |corner: usize| {
         let (from, edge) = (corners[(corner + 1) % 3], edges[(corner + 1) % 3]);
-        (edge.cross(&(place - from)).dot(&normal) / square).clamp(0.0, 1.0)
+        (edge.cross(&(position - from)).dot(&normal) / square).clamp(0.0, 1.0)
     };
     let of_b = share(1);
     let of_c = share(2).min(1.0 - of_b);
@@ -80,18 +80,18 @@ mod tests {
     use crate::geometry::Vec3;
 
     #[test]
-    fn a_place_moves_as_its_triangle_does() {
+    fn a_position_moves_as_its_triangle_does() {
         let triangles = vec![[0, 1, 2], [0, 2, 3]];
         let corner = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
         let flat =
             vec![corner(0.0, 0.0, 0.0), corner(0.0, 0.0, 2.0), corner(2.0, 0.0, 2.0), corner(2.0, 0.0, 0.0)];
         let mesh = TriMesh { positions: flat, triangles };
-        // Linear in the corners, so that places of it go where the corners do.
-        let bend = |place: DVec3| {
-            let [x, _, z]: [f64; 3] = place.into();
+        // Linear in the corners, so that positions of it go where the corners do.
+        let bend = |position: DVec3| {
+            let [x, _, z]: [f64; 3] = position.into();
             DVec3::new(3.0 + 0.5 * x, 0.25 * x - z, z + 0.5 * x)
         };
-        let bent = mesh.positions.iter().map(|place| bend(place.cast()).cast()).collect();
+        let bent = mesh.positions.iter().map(|position| bend(position.cast()).cast()).collect();
         let bent = TriMesh { positions: bent, triangles: mesh.triangles.clone() };
         let tree = NearestTree::new(&mesh);
         for (at, on) in [
@@ -103,14 +103,14 @@ mod tests {
             ([5.0, 5.0, 5.0], [2.0, 0.0, 2.0]),
         ] {
             let attached = Attached::of(&tree.nearest(DVec3::from(at)).unwrap(), &mesh);
-            let off = |mesh: &TriMesh, wanted: DVec3| (DVec3::from(attached.place(mesh)) - wanted).norm();
+            let off = |mesh: &TriMesh, wanted: DVec3| (DVec3::from(attached.position(mesh)) - wanted).norm();
             let on = DVec3::from(on);
             assert!(off(&mesh, on) < 1e-15 && off(&bent, bend(on)) < 1e-15, "{at:?}: {attached:?}");
         }
     }
 
     #[test]
-    fn needles_have_places_too() {
+    fn needles_have_positions_too() {
         let [a, b] = [DVec3::zeros(), DVec3::new(1.0, 0.0, 0.0)];
         let middle = DVec3::new(0.25, 0.0, 0.0);
         assert_eq!(shares([a, b, middle], DVec3::new(0.5, 0.0, 0.0)), [0.5, 0.5, 0.0]);

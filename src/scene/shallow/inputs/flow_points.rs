@@ -23,7 +23,7 @@ pub(in crate::scene::shallow) fn at(
 ) -> Vec<FlowPoint> {
     let at = |(index, point): (usize, &Point)| {
         let on = inputs.attached.get(index).and_then(Option::as_ref).zip(mesh);
-        let at = on.map_or(point.point.at, |(on, mesh)| on.place(mesh));
+        let at = on.map_or(point.point.at, |(on, mesh)| on.position(mesh));
         FlowPoint { at, rate: point.rate(frame), ..point.point.clone() }
     };
     of.points.iter().enumerate().map(at).collect()
@@ -33,7 +33,7 @@ pub(in crate::scene::shallow) fn at(
 ///
 /// # Errors
 /// One that lies inside solid or beyond the area, with its name.
-pub(in crate::scene::shallow) fn place(
+pub(in crate::scene::shallow) fn position(
     scene: &Scene,
     of: &Shallow,
     liquid: &mut shallow::Shallow,

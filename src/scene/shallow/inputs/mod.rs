@@ -260,10 +260,10 @@ fn heights(shallow: &Shallow, bounds: &[DVec3; 2]) -> Result<Heights> {
     Heights::between(bottom, top)
 }
 
-/// What to say of points that follow the terrain from a place beside their own, as it is on a slope and where they were given high above it.
+/// What to say of points that follow the terrain from a position beside their own, as it is on a slope and where they were given high above it.
 fn beside(scene: &Scene, shallow: &Shallow, mesh: &TriMesh, attached: &[Option<Attached>]) -> Vec<String> {
     let told = |(point, attached): (&Point, &Option<Attached>)| {
-        let [x, y, z] = attached.as_ref()?.place(mesh);
+        let [x, y, z] = attached.as_ref()?.position(mesh);
         let [own_x, _, own_z] = point.point.at;
         let off = ((x - own_x).powi(2) + (z - own_z).powi(2)).sqrt();
         (off > point.point.radius.max(2.0 * shallow.cell)).then(|| {

@@ -13,7 +13,7 @@ use crate::shallow::terrain::shapes::Shape;
 use super::terrain::read_mesh;
 
 impl Obstacle {
-    /// Turn and place (m) at a frame.
+    /// Turn and position (m) at a frame.
     fn pose(&self, frame: i32) -> Result<(Rotation3<f64>, DVec3)> {
         let key = |pose: &KeyPose| Key {
             time: pose.frame,
@@ -49,7 +49,9 @@ impl Obstacle {
         let Form::Mesh(path, space) = &self.form else { return Ok(None) };
         let mut mesh = read_mesh(path, *space, seen)?;
         let (turn, at) = self.pose(first)?;
-        mesh.positions.iter_mut().for_each(|place| *place = (turn * place.cast::<f64>() + at).cast());
+        mesh.positions
+            .iter_mut()
+            .for_each(|position| *position = (turn * position.cast::<f64>() + at).cast());
         Ok(Some(mesh))
     }
 }
@@ -83,10 +85,10 @@ pub(in crate::scene::shallow) fn drawn(shape: &Shape) -> TriMesh {
         Shape::Capsule { ends, radius } => pill(*ends, *radius),
         Shape::Cuboid { centre, axes, half } => {
             let mut mesh = TriMesh::cuboid([-1.0; 3], [1.0; 3]);
-            for place in &mut mesh.positions {
-                let own = place.cast::<f64>();
+            for position in &mut mesh.positions {
+                let own = position.cast::<f64>();
                 let by = |axis: usize| axes[axis] * (own[axis] * half[axis]);
-                *place = (centre + by(0) + by(1) + by(2)).cast();
+                *position = (centre + by(0) + by(1) + by(2)).cast();
             }
             mesh
         }

@@ -46,7 +46,7 @@ impl Terrain {
         let path = shallow.terrain_at(frame);
         match (&*extension(&path), shallow.image) {
             ("vdb", _) => of_vdb(&path, seen),
-            ("png", Some(place)) => of_image(&path, place, seen),
+            ("png", Some(position)) => of_image(&path, position, seen),
             _ => Ok(Self::Mesh(read_mesh(&path, shallow.space, seen)?)),
         }
     }
@@ -72,12 +72,12 @@ impl Terrain {
                 [low.cast(), high.cast()]
             }
             #[cfg(feature = "cli")]
-            Self::Image(image, place) => {
-                let [x, z] = place.size.map(|length| 0.5 * length);
+            Self::Image(image, position) => {
+                let [x, z] = position.size.map(|length| 0.5 * length);
                 let ends =
                     image.values.iter().fold([1.0f32, 0.0], |[low, high], v| [low.min(*v), high.max(*v)]);
                 let height = |grey: f32| {
-                    let [black, white] = place.heights;
+                    let [black, white] = position.heights;
                     black + f64::from(grey) * (white - black)
                 };
                 [DVec3::new(-x, height(ends[0]), -z), DVec3::new(x, height(ends[1]), z)]
@@ -106,23 +106,23 @@ impl Terrain {
         match self {
             Self::Mesh(mesh) => triangles::solids(&mesh.positions, &mesh.triangles, grid, heights),
             #[cfg(feature = "cli")]
-            Self::Image(image, place) => {
-                let [x, z] = place.size;
+            Self::Image(image, position) => {
+                let [x, z] = position.size;
                 let image = height::Image {
                     greys: &image.values,
                     size: image.size,
                     corner: [-0.5 * x, -0.5 * z],
-                    extent: place.size,
-                    levels: place.heights,
+                    extent: position.size,
+                    levels: position.heights,
                 };
                 height::of_image(&image, grid, heights)
             }
             #[cfg(feature = "vdb")]
             Self::Grid(level_set) => {
                 let (voxel, between) = (level_set.voxel_size(), level_set.heights());
-                sampler::solids(grid, heights, voxel, between, |places, out| {
+                sampler::solids(grid, heights, voxel, between, |positions, out| {
                     ctx.check()?;
-                    level_set.sample_linear(ctx, places, out)
+                    level_set.sample_linear(ctx, positions, out)
                 })
             }
         }
@@ -137,7 +137,7 @@ impl Terrain {
         match self {
             Self::Mesh(mesh) => Ok(mesh),
             #[cfg(feature = "cli")]
-            Self::Image(image, place) => Ok(relief(&image, place)),
+            Self::Image(image, position) => Ok(relief(&image, position)),
             #[cfg(feature = "vdb")]
             Self::Grid(grid) => crate::vdb::level_set::to_mesh(ctx, &grid, 0.0, 0.0),
         }
@@ -164,22 +164,23 @@ pub(in crate::scene::shallow) fn read_mesh(path: &Path, space: Space, seen: &See
 }
 
 #[cfg(feature = "cli")]
-fn of_image(path: &Path, place: ImagePlace, seen: &Seen) -> Result<Terrain> {
-    Ok(Terrain::Image(image::parse(path, &seen.read(path)?)?, place))
+fn of_image(path: &Path, position: ImagePlace, seen: &Seen) -> Result<Terrain> {
+    Ok(Terrain::Image(image::parse(path, &seen.read(path)?)?, position))
 }
 
 #[cfg(not(feature = "cli"))]
-fn of_image(path: &Path, _place: ImagePlace, _seen: &Seen) -> Result<Terrain> {
+fn of_image(path: &Path, _position: ImagePlace, _seen: &Seen) -> Result<Terrain> {
     Err(Error::file(path, "needs the feature cli, which this frazil was built without"))
 }
 
 /// A point of each pixel, at its middle.
 #[cfg(feature = "cli")]
-fn relief(image: &image::Grey, place: ImagePlace) -> TriMesh {
+fn relief(image: &image::Grey, position: ImagePlace) -> TriMesh {
     let [across, down] = image.size;
-    let [black, white] = place.heights;
-    let at =
-        |axis: usize, index: usize| place.size[axis] * ((index as f64 + 0.5) / image.size[axis] as f64 - 0.5);
+    let [black, white] = position.heights;
+    let at = |axis: usize, index: usize| {
+        position.size[axis] * ((index as f64 + 0.5) / image.size[axis] as f64 - 0.5)
+    };
     let height = |index: usize| black + f64::from(image.values[index]) * (white - black);
     let point = |index: usize| {
         crate::geometry::Vec3::new(

@@ -45,7 +45,7 @@ impl<'a> Course<'a> {
         let first = scene.shot.frames.first;
         let shapes = obstacles::shapes_at(of, first)?;
         let mut course = Self::dry(ctx, (scene, of, inputs), first, shapes)?;
-        flow_points::place(scene, of, &mut course.liquid, &course.points)?;
+        flow_points::position(scene, of, &mut course.liquid, &course.points)?;
         of.source_scalars(&mut course.liquid)?;
         course.liquid.set_poured(&of.start())?;
         if let Some(height) = of.fill {

@@ -90,26 +90,26 @@ pub(in crate::scene::shallow) fn read(bytes: &[u8]) -> Result<Kept> {
 }
 
 fn numbers_of(shape: &Shape) -> (u32, Vec<f64>) {
-    let place = |place: &DVec3| <[f64; 3]>::from(*place);
+    let position = |position: &DVec3| <[f64; 3]>::from(*position);
     match shape {
-        Shape::Sphere { centre, radius } => (0, [&place(centre)[..], &[*radius]].concat()),
-        Shape::Capsule { ends: [a, b], radius } => (1, [&place(a)[..], &place(b), &[*radius]].concat()),
+        Shape::Sphere { centre, radius } => (0, [&position(centre)[..], &[*radius]].concat()),
+        Shape::Capsule { ends: [a, b], radius } => (1, [&position(a)[..], &position(b), &[*radius]].concat()),
         Shape::Cuboid { centre, axes: [a, b, c], half } => {
-            (2, [&place(centre)[..], &place(a), &place(b), &place(c), half].concat())
+            (2, [&position(centre)[..], &position(a), &position(b), &position(c), half].concat())
         }
     }
 }
 
 fn shape(from: &mut Reader<'_>) -> Result<Shape> {
     let code = from.u32()?;
-    let place = |from: &mut Reader<'_>| Ok::<_, Error>(DVec3::new(from.f64()?, from.f64()?, from.f64()?));
+    let position = |from: &mut Reader<'_>| Ok::<_, Error>(DVec3::new(from.f64()?, from.f64()?, from.f64()?));
     Ok(match code {
-        0 => Shape::Sphere { centre: place(from)?, radius: from.f64()? },
-        1 => Shape::Capsule { ends: [place(from)?, place(from)?], radius: from.f64()? },
+        0 => Shape::Sphere { centre: position(from)?, radius: from.f64()? },
+        1 => Shape::Capsule { ends: [position(from)?, position(from)?], radius: from.f64()? },
         2 => Shape::Cuboid {
-            centre: place(from)?,
-            axes: [place(from)?, place(from)?, place(from)?],
-            half: place(from)?.into(),
+            centre: position(from)?,
+            axes: [position(from)?, position(from)?, position(from)?],
+            half: position(from)?.into(),
         },
         _ => return Err(Error::Bytes("has an obstacle of no known shape".into())),
     })

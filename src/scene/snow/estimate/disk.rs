@@ -15,9 +15,9 @@ const BYTES_PER_LEAF: f64 = BYTES_PER_COLUMN * 64.0 / 3.2;
 const USDA_PER_VERTEX: f64 = 110.0;
 const PLY_PER_VERTEX: f64 = 50.0;
 /// Bytes for texture coordinates, and for a corner's index into them.
-const USDA_PER_PLACE: f64 = 20.0;
+const USDA_PER_POSITION: f64 = 20.0;
 const USDA_PER_INDEX: f64 = 7.0;
-const PLY_PER_PLACE: f64 = 8.0;
+const PLY_PER_POSITION: f64 = 8.0;
 /// Bytes of a grain in each kind of file (of changes: while a character walks), and in a packed state.
 const GRAIN_VDB: f64 = 49.0;
 const GRAIN_CHANGES: f64 = 28.0;
@@ -66,11 +66,11 @@ pub fn estimate(scene: &Scene, inputs: &Inputs) -> u64 {
     let objects = inputs.bodies.iter().map(|body| {
         let drawn = body.motion().drawn();
         let vertices = drawn.vertices as f64;
-        let (places, corners) = drawn.uvs.map_or((0.0, 0.0), |uvs| {
-            (uvs.places.len() as f64, uvs.corners.as_ref().map_or(0.0, |corners| corners.len() as f64))
+        let (positions, corners) = drawn.uvs.map_or((0.0, 0.0), |uvs| {
+            (uvs.positions.len() as f64, uvs.corners.as_ref().map_or(0.0, |corners| corners.len() as f64))
         });
-        let usda = vertices * USDA_PER_VERTEX + places * USDA_PER_PLACE + corners * USDA_PER_INDEX;
-        let ply = vertices * PLY_PER_VERTEX + places.max(corners) * PLY_PER_PLACE;
+        let usda = vertices * USDA_PER_VERTEX + positions * USDA_PER_POSITION + corners * USDA_PER_INDEX;
+        let ply = vertices * PLY_PER_VERTEX + positions.max(corners) * PLY_PER_POSITION;
         f64::from(output.objects_usd) * usda + f64::from(output.objects_ply) * ply
     });
     let objects = objects.sum::<f64>() * frames;

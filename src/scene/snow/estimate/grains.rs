@@ -61,7 +61,7 @@ impl Forecast {
         let grain = std::f64::consts::PI / 6.0 * (2.0 * params.radius).powi(3);
         let of_snow = |volume: f64| volume * (1.0 - compression) * PACKING / grain;
         let mut born: Vec<f64> = removed.iter().map(|volume| of_snow(*volume)).collect();
-        born[0] += inputs.drift.as_ref().map_or(0.0, |drift| drift.places.len() as f64);
+        born[0] += inputs.drift.as_ref().map_or(0.0, |drift| drift.positions.len() as f64);
         let frames = params.lifetime.map(|lifetime| (lifetime * scene.shot.fps).ceil() as usize);
         let there = alive(&born, frames.unwrap_or(usize::MAX));
         let grains = there.iter().copied().fold(0.0, f64::max).round() as u64;

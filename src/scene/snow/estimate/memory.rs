@@ -34,7 +34,7 @@ pub fn estimate(scene: &Scene, inputs: &Inputs) -> Result<u64> {
     let output = scene.output;
     let copies = if output.base_restarts() && output.base_mode == BaseMode::Delta { 1.0 } else { 2.0 };
     let base = layer(inputs)? * copies + around(inputs);
-    let drift = inputs.drift.as_ref().map_or(0, |drift| drift.places.len() as u64);
+    let drift = inputs.drift.as_ref().map_or(0, |drift| drift.positions.len() as u64);
     let grains = if has_grains(&scene.values) { of_grains(inputs, drift)? } else { 0 };
     Ok(grains.max(base as u64).max(of_volumes(scene, inputs, drift)?))
 }

@@ -402,8 +402,8 @@ mod tests {
 
     /// Points with these identities, heights and trapped flags.
     fn points(all: &[(i64, f32, bool)]) -> Points {
-        let places: Vec<DVec3> = all.iter().map(|(_, y, _)| DVec3::new(0.0, f64::from(*y), 0.0)).collect();
-        let mut out = Points::at(0.5, &places).unwrap();
+        let positions: Vec<DVec3> = all.iter().map(|(_, y, _)| DVec3::new(0.0, f64::from(*y), 0.0)).collect();
+        let mut out = Points::at(0.5, &positions).unwrap();
         // A file may contain -0.0, which is a different value of a position.
         for (offset, (_, y, _)) in out.offsets.iter_mut().zip(all).filter(|(_, (_, y, _))| *y == 0.0) {
             offset[1] = *y;

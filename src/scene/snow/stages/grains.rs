@@ -103,9 +103,10 @@ impl<'a> Grains<'a> {
         let Some(drift) = &self.inputs.drift else { return Ok(Report::default()) };
         let path = initial_grains::file(self.scene).unwrap_or(&self.scene.path);
         let frame = self.scene.shot.frames.first;
-        let all = drift.places.len();
-        let (places, velocities) = drift.outside(ctx, self.inputs, &layer.surface, grains.params().radius)?;
-        let left_out = all - places.len();
+        let all = drift.positions.len();
+        let (positions, velocities) =
+            drift.outside(ctx, self.inputs, &layer.surface, grains.params().radius)?;
+        let left_out = all - positions.len();
         if left_out > 0 {
             log::warn!(
                 "{}: {left_out} of {all} points lie in the snow or below the ground at frame {frame} and are left out",
@@ -113,7 +114,7 @@ impl<'a> Grains<'a> {
             );
         }
         grains
-            .emit(&places, &velocities, frame)
+            .emit(&positions, &velocities, frame)
             .map_err(|error| Error::file(path, format!("as grains: {error}")))?;
         let results = [("grains", grains.count()), ("left_out", left_out)];
         let results = results.map(|(name, count)| (name.to_string(), json!(count))).into_iter().collect();

@@ -159,9 +159,9 @@ impl<'a> Mist<'a> {
         let walls = around.during(times, mist.params().cell)?;
         let boundary =
             |tiles: &Tiles, cell: f32, share: f64| -> Result<Solids> { walls.faces(ctx, tiles, cell, share) };
-        let sample = |ctx: &Context, places: &[DVec3]| match &self.inputs.wind {
-            Some(wind) => wind.sample(ctx, places, true),
-            None => Ok(vec![[0.0; 3]; places.len()]),
+        let sample = |ctx: &Context, positions: &[DVec3]| match &self.inputs.wind {
+            Some(wind) => wind.sample(ctx, positions, true),
+            None => Ok(vec![[0.0; 3]; positions.len()]),
         };
         let wind = self.inputs.wind.as_ref().map(|_| Wind(&sample));
         let fastest = walls.fastest_near(mist, &sources);
@@ -193,7 +193,7 @@ fn starts_of(points: &Points) -> Result<Vec<(i64, Start)>> {
     else {
         return Err(Error::argument("have attributes v and id of other types"));
     };
-    let start = |point| Start { place: points.position(point), velocity: velocities.get(point) };
+    let start = |point| Start { position: points.position(point), velocity: velocities.get(point) };
     Ok((0..points.count()).map(|point| (ids.get(point), start(point))).collect())
 }
 
@@ -224,12 +224,12 @@ fn sources_of(points: &Points, starts: &[(i64, Start)], frame: i32, params: &Par
             Ok(index) => Some(starts[index].1),
             // It was born in this frame, at rest.
             Err(_) if births.get(point) == frame => {
-                Some(Start { place: DVec3::from(rests.get(point).map(f64::from)), velocity: [0.0; 3] })
+                Some(Start { position: DVec3::from(rests.get(point).map(f64::from)), velocity: [0.0; 3] })
             }
             Err(_) => None,
         };
         Source {
-            place: points.position(point),
+            position: points.position(point),
             velocity: velocities.get(point),
             radius: f64::from(radii.get(point)),
             start,

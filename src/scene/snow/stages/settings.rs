@@ -34,11 +34,11 @@ pub(in crate::scene::snow) fn of_layer(all: &Settings) -> Settings {
     let statics = all.iter().filter(|(_, role)| *role == "\"static\"");
     let mut statics: Vec<usize> = statics.filter_map(|(key, _)| index(key)).collect();
     statics.sort_unstable();
-    for (place, index) in statics.into_iter().enumerate() {
+    for (position, index) in statics.into_iter().enumerate() {
         let before = format!("object[{index}].");
         for (key, value) in all.iter().filter_map(|(key, value)| Some((key.strip_prefix(&before)?, value))) {
             if key != "role" {
-                out.insert(format!("static object {}: {key}", place + 1), value.clone());
+                out.insert(format!("static object {}: {key}", position + 1), value.clone());
             }
             // When a clip starts depends on it.
             if key == "clip" || key == "loop" {

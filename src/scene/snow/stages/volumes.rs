@@ -110,7 +110,7 @@ impl<'a> Volumes<'a> {
         }
         if let Some(points) = source.grains.filter(|_| self.asked.fog_grains) {
             let radius = self.radius();
-            add(fog::grains(ctx, &places(points, |_| true), radius, fog::VOXEL * radius)?, names[1])?;
+            add(fog::grains(ctx, &positions(points, |_| true), radius, fog::VOXEL * radius)?, names[1])?;
         }
         if let Some(mist) = source.mist.take() {
             add(mist, names[2])?;
@@ -122,7 +122,7 @@ impl<'a> Volumes<'a> {
     fn snow(&self, ctx: &Context, surface: &FloatGrid, grains: Option<&Points>) -> Result<FloatGrid> {
         let Some(points) = grains else { return surface.deep_copy() };
         let resting = match points.attribute("active") {
-            Some(Values::Bool(active)) => places(points, |point| !active.get(point)),
+            Some(Values::Bool(active)) => positions(points, |point| !active.get(point)),
             // A file of no points has no attributes.
             _ => Vec::new(),
         };
@@ -191,8 +191,8 @@ impl<'a> Volumes<'a> {
     }
 }
 
-/// Places (m) of some points.
-fn places(points: &Points, is_wanted: impl Fn(usize) -> bool) -> Vec<DVec3> {
+/// Positions (m) of some points.
+fn positions(points: &Points, is_wanted: impl Fn(usize) -> bool) -> Vec<DVec3> {
     (0..points.count()).filter(|point| is_wanted(*point)).map(|point| points.position(point)).collect()
 }
 

@@ -8,7 +8,7 @@ use crate::scene::surface::Files;
 const TEXT: u64 = 12;
 /// Bytes around an index in a text.
 const AROUND_INDEX: u64 = 2;
-/// Bytes of a vertex in the exact state: its place in 64 bits, the distance that it keeps, its flag. Places hardly pack.
+/// Bytes of a vertex in the exact state: its position in 64 bits, the distance that it keeps, its flag. Positions hardly pack.
 const STATE_PER_VERTEX: u64 = 3 * 8 + 4 + 1;
 /// More of a mesh that is rebuilt: its displacement since a reference.
 const DRIFT_PER_VERTEX: u64 = 3 * 4;
@@ -29,19 +29,19 @@ impl FrameSize {
     /// Estimates it for a mesh, which is rebuilt or not.
     pub fn of(output: Files, is_rebuilt: bool, detail: &DetailedMesh) -> Self {
         let [vertices, triangles] = counts(detail);
-        let (places, corners) = detail.uvs.as_ref().map_or((0, 0), |uvs| {
-            (uvs.places.len() as u64, uvs.corners.as_ref().map_or(0, |corners| corners.len() as u64))
+        let (positions, corners) = detail.uvs.as_ref().map_or((0, 0), |uvs| {
+            (uvs.positions.len() as u64, uvs.corners.as_ref().map_or(0, |corners| corners.len() as u64))
         });
-        let index = u64::from(vertices.max(places).max(1).ilog10()) + 1 + AROUND_INDEX;
+        let index = u64::from(vertices.max(positions).max(1).ilog10()) + 1 + AROUND_INDEX;
         // In .obj files every corner names its texture coordinates, where there are some.
-        let named = if places > 0 { 6 * triangles } else { 3 * triangles };
-        let obj = TEXT * (3 * vertices + 2 * places) + index * named;
-        // Places, velocities and arrays; each face has its count of corners too.
+        let named = if positions > 0 { 6 * triangles } else { 3 * triangles };
+        let obj = TEXT * (3 * vertices + 2 * positions) + index * named;
+        // Positions, velocities and arrays; each face has its count of corners too.
         let own: usize = detail.arrays.iter().map(|array| array.values.len()).sum();
         let delta = if output.delta { vertices } else { 0 };
         let flagged = if output.flagged { vertices } else { 0 };
         let rebuilt = if output.rebuilt { triangles } else { 0 };
-        let usd = TEXT * (6 * vertices + 2 * places + own as u64 + delta)
+        let usd = TEXT * (6 * vertices + 2 * positions + own as u64 + delta)
             + index * (3 * triangles + corners)
             + (1 + AROUND_INDEX) * (triangles + flagged + rebuilt);
         let if_asked = |is_asked: bool, bytes: u64| if is_asked { bytes } else { 0 };
@@ -100,7 +100,7 @@ mod tests {
             positions: (0..4).map(|n| Vec3::repeat(n as f32)).collect(),
             triangles: vec![[0, 1, 2], [0, 2, 3]],
         };
-        let uvs = Uvs { places: vec![[0.5; 2]; 6], corners: Some((0..6).collect()), missing: 0 };
+        let uvs = Uvs { positions: vec![[0.5; 2]; 6], corners: Some((0..6).collect()), missing: 0 };
         let array = |name: &str, on, count: usize| MeshArray {
             name: name.into(),
             on,

@@ -4,12 +4,12 @@
 //!
 //! | item | of what | bytes |
 //! |---|---|---|
-//! | particle of a frame in memory | place 24, velocity 12, id 8 | 24 to 44 |
+//! | particle of a frame in memory | position 24, velocity 12, id 8 | 24 to 44 |
 //! | particle of a step | both ends of its way 48, rank 8, velocities at both ends 48 | 56 to 104 |
-//! | particle, while vertices are carried | places before and after 48, in its cell 20 and while sorted 24, its way 12 | 104 |
+//! | particle, while vertices are carried | positions before and after 48, in its cell 20 and while sorted 24, its way 12 | 104 |
 //! | node of the grid of maps | coordinate 12, map 112 twice | 236 |
-//! | patch of phi | values twice 512, places in lists and tables 100, crossings 220 | 832 |
-//! | vertex of the particles' surface | place 12 twice, patch 4, connection 8, 2 triangles: twice 12, corners 36 | 156 |
+//! | patch of phi | values twice 512, positions in lists and tables 100, crossings 220 | 832 |
+//! | vertex of the particles' surface | position 12 twice, patch 4, connection 8, 2 triangles: twice 12, corners 36 | 156 |
 //! | block of distances | values twice 4096, neighbours and slot 200 | 4296 |
 //! | vertex of the mesh | in three frames 102, projection 130, what is written 87 and 16, in 32 bits twice 24 | 359 |
 //! | triangle of the mesh | in six copies | 72 |
@@ -19,15 +19,15 @@
 //! | item | of what | bytes |
 //! |---|---|---|
 //! | patch of phi, vertex of the particles' surface | once more: those of the next frame | 832, 156 |
-//! | particle of the next frame | place 24, in its cell 20 and while sorted 24 | 68 |
+//! | particle of the next frame | position 24, in its cell 20 and while sorted 24 | 68 |
 //! | face of a cell, by area, that the mesh passes through | up to 1.7 edges of the grid, while they are sorted 100 each | 170 |
 //! | block of Gamma | 512 nodes: value 4, in lists with room to grow 64, equation 125 | 98816 |
 //! | triangle near such blocks | in five of them, in 32 bits 132 and a number 4 | 680 |
 //! | vertex of the mesh | in cells 24 and units 12, as cut 25, as it was and is 48, names 12, sizes and drifts in four copies 80, state 36 | 237 |
 //! | triangle of the mesh | on the grid 12, as cut 20, while its edges are looked at 82, state 36 | 150 |
-//! | vertex of the mesh in a coming frame, but for the next | place 24, distance 4, flags 2, size and drift 20, velocities 24, name 8 | 82 |
+//! | vertex of the mesh in a coming frame, but for the next | position 24, distance 4, flags 2, size and drift 20, velocities 24, name 8 | 82 |
 //! | triangle of such a mesh | corners twice 24, the mask 8 | 32 |
-//! | particle, where a mesh with ids carries something | its id and its first place | 32 |
+//! | particle, where a mesh with ids carries something | its id and its first position | 32 |
 //! | triangle of the first mesh, or of the last edited one, then | in a tree | 84 |
 //! | number that the mesh carries | in two frames 16, state 16; 8 in each coming frame | 32 |
 //! | vertex of a mesh that carries something | where it has its numbers from | 40 |
@@ -46,7 +46,7 @@ use crate::surface::Particles;
 
 /// Bytes that every run takes.
 const FIXED: f64 = 64e6;
-/// Bytes of a particle in each frame in memory: place, velocity, id.
+/// Bytes of a particle in each frame in memory: position, velocity, id.
 const PARTICLE: [f64; 3] = [24.0, 12.0, 8.0];
 /// Bytes of a particle's way in a step, and of the velocities at both ends of it.
 const WAY: [f64; 2] = [56.0, 48.0];
@@ -61,7 +61,7 @@ const CARRIED: f64 = 8.0;
 
 /// Where the mesh is rebuilt: bytes of a vertex and of a triangle of the mesh in each coming frame but the next.
 const COMING: [f64; 2] = [82.0, 32.0];
-/// Bytes of a particle's first place with its id, and of a triangle in a tree.
+/// Bytes of a particle's first position with its id, and of a triangle in a tree.
 const REST: f64 = 32.0;
 const TREE: f64 = 84.0;
 /// Bytes of a particle of the next frame, whose surface is made at the same time.
@@ -93,7 +93,7 @@ pub(in crate::scene::surface) struct Most {
     ways: f64,
     /// Bytes of the work on them.
     work: f64,
-    /// Bytes of ids and places that stay, for textures.
+    /// Bytes of ids and positions that stay, for textures.
     rest: f64,
     /// Bytes of their surface, made early.
     ahead: f64,
@@ -106,12 +106,12 @@ pub(in crate::scene::surface) struct Most {
 impl Most {
     /// Counts the particles of a file, whose spacing is `spacing` (m), with cells of `cell` (r).
     pub fn add(&mut self, particles: &Particles, spacing: f64, cell: f64) {
-        let count = particles.places.len() as f64;
+        let count = particles.positions.len() as f64;
         let (has_ids, has_velocities) = (!particles.ids.is_empty(), !particles.velocities.is_empty());
-        let [place, velocity, id] = PARTICLE;
-        let each = place + if has_velocities { velocity } else { 0.0 } + if has_ids { id } else { 0.0 };
+        let [position, velocity, id] = PARTICLE;
+        let each = position + if has_velocities { velocity } else { 0.0 } + if has_ids { id } else { 0.0 };
         let way = WAY[0] + if has_ids && has_velocities { WAY[1] } else { 0.0 };
-        let shell = shell(&particles.places, spacing) as f64;
+        let shell = shell(&particles.positions, spacing) as f64;
         let [patches, vertices, _] = surface(shell, cell);
         self.frame = self.frame.max(count * each);
         self.ways = self.ways.max(count * way);
@@ -166,7 +166,7 @@ fn counts(detail: &DetailedMesh) -> [f64; 2] {
 fn numbers(detail: &DetailedMesh) -> f64 {
     let arrays: usize = detail.arrays.iter().map(|array| array.values.len()).sum();
     let uvs = detail.uvs.as_ref().map_or(0, |uvs| {
-        uvs.places.len() + uvs.corners.as_ref().map_or(0, |corners| corners.len().div_ceil(2))
+        uvs.positions.len() + uvs.corners.as_ref().map_or(0, |corners| corners.len().div_ceil(2))
     });
     (arrays + uvs) as f64
 }
@@ -195,15 +195,15 @@ fn surface(shell: f64, cell: f64) -> [f64; 3] {
     [patches, vertices, blocks]
 }
 
-/// Count of the cubes of two spacings (m) around the surface of particles at places (m): those with particles and those beside
+/// Count of the cubes of two spacings (m) around the surface of particles at positions (m): those with particles and those beside
 /// them, but for those that are full among full ones.
-fn shell(places: &[DVec3], spacing: f64) -> usize {
+fn shell(positions: &[DVec3], spacing: f64) -> usize {
     // Farther cubes are refused later.
     const FARTHEST: f64 = 1e9;
-    let cube_of = |place: &DVec3| {
-        [0, 1, 2].map(|axis| (place[axis] / (2.0 * spacing)).floor().clamp(-FARTHEST, FARTHEST) as i32)
+    let cube_of = |position: &DVec3| {
+        [0, 1, 2].map(|axis| (position[axis] / (2.0 * spacing)).floor().clamp(-FARTHEST, FARTHEST) as i32)
     };
-    let mut all: Vec<[i32; 3]> = places.par_iter().with_min_len(4096).map(cube_of).collect();
+    let mut all: Vec<[i32; 3]> = positions.par_iter().with_min_len(4096).map(cube_of).collect();
     all.par_sort_unstable();
     let cubes = all.chunk_by(|a, b| a == b);
     let full: Vec<[i32; 3]> = cubes.filter(|cube| cube.len() >= FULL).map(|cube| cube[0]).collect();
@@ -251,7 +251,7 @@ mod tests {
         // A drop of one particle, and a cube of 5 x 5 x 5 cubes, of which the 3 x 3 x 3 in the middle are full among full ones.
         assert_eq!(shell(&[DVec3::repeat(0.5)], 1.0), 27);
         assert_eq!(shell(&block(10), 1.0), 7 * 7 * 7 - 3 * 3 * 3);
-        // Drops far from each other, and a place too far for any grid.
+        // Drops far from each other, and a position too far for any grid.
         let drops: Vec<DVec3> = (0..10).map(|n| DVec3::repeat(10.0 * f64::from(n))).collect();
         assert_eq!(shell(&drops, 1.0), 270);
         assert_eq!(shell(&[DVec3::repeat(1e300)], 1.0), 27);
@@ -264,10 +264,10 @@ mod tests {
         assert!(work(8000.0, 8000.0 * 27.0, 0.5) > 10.0 * work(8000.0, cube, 0.5));
     }
 
-    /// What rebuilding a cube's mesh takes, with particles at these places, on cells of `cell` (spacings).
-    fn rebuilding(places: Vec<DVec3>, cell: f64, detail: &DetailedMesh) -> f64 {
+    /// What rebuilding a cube's mesh takes, with particles at these positions, on cells of `cell` (spacings).
+    fn rebuilding(positions: Vec<DVec3>, cell: f64, detail: &DetailedMesh) -> f64 {
         let mut most = Most::default();
-        most.add(&Particles { places, ..Particles::default() }, 1.0, cell);
+        most.add(&Particles { positions, ..Particles::default() }, 1.0, cell);
         most.rebuilding(detail, 0)
     }
 

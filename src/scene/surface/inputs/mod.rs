@@ -82,8 +82,8 @@ impl Inputs {
             warnings.push(r#"surface.match = "every" does nothing where surface.rebuild is false"#.into());
         }
         let estimate = match surface.spacing {
-            Some(_) => rough_spacing(&particles.places),
-            None => estimate_spacing(&particles.places),
+            Some(_) => rough_spacing(&particles.positions),
+            None => estimate_spacing(&particles.positions),
         };
         let spacing = match (surface.spacing, estimate) {
             (Some(spacing), _) => spacing,
@@ -107,7 +107,7 @@ impl Inputs {
             ));
         }
         // The mesh is made, or written, with 32-bit numbers where the particles are.
-        let far = base_mesh::farthest(particles.places.iter());
+        let far = base_mesh::farthest(particles.positions.iter());
         let name = first.display().to_string();
         warnings.extend(base_mesh::too_far(&name, far, 1.0, surface.cell * spacing, base_mesh::BY_KEY));
         let mut mesh = match &surface.mesh {
@@ -123,7 +123,7 @@ impl Inputs {
             }
         };
         if surface.mesh.is_some() {
-            warnings.extend(odd_size(&mesh.mesh, particles.places.len(), spacing));
+            warnings.extend(odd_size(&mesh.mesh, particles.positions.len(), spacing));
         }
         let fades = surface.half_life.is_some() || surface.fade != 0.0;
         let lasting = match &surface.mesh {
@@ -210,7 +210,7 @@ fn first_particles(ctx: &Context, scene: &Scene, surface: &Surface, seen: &Seen)
     for frame in frames.first..=frames.last {
         ctx.check()?;
         let particles = liquid.at(surface.time(frames, frame))?;
-        if !particles.places.is_empty() {
+        if !particles.positions.is_empty() {
             return Ok((frame, Particles::clone(&particles)));
         }
     }
@@ -235,7 +235,7 @@ fn missing(scene: &Scene, surface: &Surface) -> Option<String> {
 
 /// The particles' own surface.
 fn reconstructed(ctx: &Context, particles: &Particles, spacing: f64, cell: f64) -> Result<TriMesh> {
-    let phi = Implicit::new(ctx, &particles.places, spacing, cell * spacing)?;
+    let phi = Implicit::new(ctx, &particles.positions, spacing, cell * spacing)?;
     Ok(Isosurface::new(&phi).mesh(&phi))
 }
 

@@ -52,7 +52,7 @@ pub(in crate::scene::surface) fn read(path: &Path, surface: &Surface, seen: &See
             .filter(move |attribute| is_it(&attribute.name))
             .map(|attribute| &attribute.values)
     };
-    let (count, space) = (cloud.places.len(), surface.space);
+    let (count, space) = (cloud.positions.len(), surface.space);
     let brought = |speed: [f32; 3]| space.vector(DVec3::from(speed.map(f64::from))).cast::<f32>().into();
     let velocities = named(&VELOCITIES).find_map(|values| match values {
         Values::Vector(column) => Some((0..count).map(|point| brought(column.get(point))).collect()),
@@ -63,9 +63,9 @@ pub(in crate::scene::surface) fn read(path: &Path, surface: &Surface, seen: &See
         Values::Int(column) => Some((0..count).map(|point| column.get(point).into()).collect()),
         _ => None,
     });
-    let places = cloud.places.iter().map(|place| space.place(*place)).collect();
+    let positions = cloud.positions.iter().map(|position| space.position(*position)).collect();
     let (velocities, ids) = (velocities.unwrap_or_default(), ids.unwrap_or_default());
-    let particles = Particles { places, velocities, ids };
+    let particles = Particles { positions, velocities, ids };
     particles.validate().map_err(|error| Error::file(path, error.to_string()))?;
     Ok(particles)
 }

@@ -27,7 +27,7 @@ pub struct Sculpt {
 /// The frames of a shot after its first that have an edited mesh, ascending.
 ///
 /// # Errors
-/// A name without a place for the frame's number; a mesh for the first frame; none for any other.
+/// A name without a position for the frame's number; a mesh for the first frame; none for any other.
 pub fn frames(surface: &Surface, shot: Frames) -> Result<Vec<i32>> {
     let Some(path) = &surface.resculpt else { return Ok(Vec::new()) };
     let Some(pattern) = Pattern::parse(path) else {
@@ -150,8 +150,8 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
                      one side"
                         .into(),
                 );
-                let places = of_vertices(&uvs.places, corners, &mesh.triangles, vertices);
-                Some(Uvs { places, corners: None, missing: uvs.missing })
+                let positions = of_vertices(&uvs.positions, corners, &mesh.triangles, vertices);
+                Some(Uvs { positions, corners: None, missing: uvs.missing })
             }
             _ => Some(uvs),
         },
@@ -195,14 +195,14 @@ fn fitted(value: f64, to: Number) -> f64 {
 
 /// The texture coordinates of each vertex: those of its first corner.
 fn of_vertices(
-    places: &[[f32; 2]],
+    positions: &[[f32; 2]],
     corners: &[u32],
     triangles: &[[u32; 3]],
     vertices: usize,
 ) -> Vec<[f32; 2]> {
     let mut own: Vec<Option<[f32; 2]>> = vec![None; vertices];
     for (vertex, index) in triangles.as_flattened().iter().zip(corners) {
-        own[*vertex as usize].get_or_insert(places[*index as usize]);
+        own[*vertex as usize].get_or_insert(positions[*index as usize]);
     }
     own.into_iter().map(Option::unwrap_or_default).collect()
 }
@@ -218,10 +218,10 @@ mod tests {
 
     /// A tetrahedron, or the two triangles of one of its edges.
     fn mesh(faces: usize) -> TriMesh {
-        let place = |n: u8| Vec3::new(f32::from(n & 1), f32::from(n >> 1 & 1), f32::from(n / 3));
+        let position = |n: u8| Vec3::new(f32::from(n & 1), f32::from(n >> 1 & 1), f32::from(n / 3));
         let mut triangles = vec![[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]];
         triangles.truncate(faces);
-        TriMesh { positions: (0..4).map(place).collect(), triangles }
+        TriMesh { positions: (0..4).map(position).collect(), triangles }
     }
 
     #[test]
@@ -244,7 +244,7 @@ mod tests {
             array("part", On::Vertices, Number::I32, &[5.0; 4]),
             array("red", On::Vertices, Number::F32, &[0.0, 1.0, 0.5, 7.0]),
         ];
-        let uvs = Some(Uvs { places: vec![[0.5; 2]; 4], corners: None, missing: 0 });
+        let uvs = Some(Uvs { positions: vec![[0.5; 2]; 4], corners: None, missing: 0 });
         let (taken, faults) = conformed(DetailedMesh { mesh: mesh(2), uvs, arrays }, &first);
         assert!(taken.mesh == mesh(2) && taken.uvs.is_none());
         let wanted = [
@@ -272,9 +272,9 @@ mod tests {
 
     #[test]
     fn texture_coordinates_have_the_form_that_those_of_the_first_mesh_have() {
-        let places = vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
-        let seamless = Uvs { places: places.clone(), corners: None, missing: 0 };
-        let seams = Uvs { places: places.clone(), corners: Some(vec![3, 1, 2, 0, 3, 1]), missing: 1 };
+        let positions = vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+        let seamless = Uvs { positions: positions.clone(), corners: None, missing: 0 };
+        let seams = Uvs { positions: positions.clone(), corners: Some(vec![3, 1, 2, 0, 3, 1]), missing: 1 };
         let with = |uvs: Option<&Uvs>| DetailedMesh { mesh: mesh(2), uvs: uvs.cloned(), arrays: Vec::new() };
         let taken = |uvs, first| {
             let (mesh, faults) = conformed(with(uvs), &with(first));
@@ -282,14 +282,14 @@ mod tests {
         };
         let (uvs, faults) = taken(Some(&seamless), Some(&seams));
         let corners = Some(vec![0, 1, 2, 0, 3, 1]);
-        assert_eq!((uvs, faults), (Uvs { places, corners, missing: 0 }, String::new()));
+        assert_eq!((uvs, faults), (Uvs { positions, corners, missing: 0 }, String::new()));
         let (uvs, faults) = taken(Some(&seams), Some(&seamless));
-        assert_eq!(uvs.places, [[1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]);
+        assert_eq!(uvs.positions, [[1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]);
         assert!(uvs.corners.is_none() && uvs.missing == 1 && faults.contains("seams"), "{faults}");
         let (uvs, faults) = taken(None, Some(&seams));
         assert_eq!((uvs.corners, uvs.missing), (Some(vec![0; 6]), 6));
         assert!(faults.contains("carries: texture coordinates; they are 0"), "{faults}");
         let (uvs, _) = taken(None, Some(&seamless));
-        assert_eq!((uvs.places, uvs.corners, uvs.missing), (vec![[0.0; 2]; 4], None, 4));
+        assert_eq!((uvs.positions, uvs.corners, uvs.missing), (vec![[0.0; 2]; 4], None, 4));
     }
 }

@@ -8,7 +8,7 @@ use crate::surface::{Apart, Change, StepReport, Tracker};
 /// Parts apart from the mesh that a report lists.
 const LISTED: usize = 100;
 
-/// The report of a frame, of so many particles; whether an edited mesh was put in the mesh's place.
+/// The report of a frame, of so many particles; whether an edited mesh was put in the mesh's position.
 pub(in crate::scene::surface) fn told(
     report: &StepReport,
     particles: usize,
@@ -21,7 +21,7 @@ pub(in crate::scene::surface) fn told(
         .apart
         .iter()
         .take(LISTED)
-        .map(|apart| json!({ "at_m": <[f64; 3]>::from(apart.place), "volume_m3": apart.volume }))
+        .map(|apart| json!({ "at_m": <[f64; 3]>::from(apart.position), "volume_m3": apart.volume }))
         .collect();
     let changed = |number: fn(&Change) -> usize| report.change.as_ref().map_or(0, number);
     let serde_json::Value::Object(mut results) = json!({

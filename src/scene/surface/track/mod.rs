@@ -44,7 +44,7 @@ pub struct Track<'a> {
 pub struct Step(Option<Written>);
 
 struct Written {
-    places: Vec<Vec3>,
+    positions: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
     /// What the mesh carries; none: what it began with.
     detail: Option<Arc<DetailedMesh>>,
@@ -58,7 +58,7 @@ impl Written {
     /// Of a frame without particles.
     fn nothing(carried: &DetailedMesh, state: Vec<u8>) -> Self {
         Self {
-            places: Vec::new(),
+            positions: Vec::new(),
             triangles: Vec::new(),
             detail: Some(Arc::new(carried.emptied())),
             velocities: Vec::new(),
@@ -192,9 +192,9 @@ impl<'a> Stepping for Track<'a> {
             if *is_dry {
                 return Ok(Written::nothing(carried, state));
             }
-            let (places, velocities) = walk.shown(ctx)?;
+            let (positions, velocities) = walk.shown(ctx)?;
             Ok(Written {
-                places: usd::to_floats(&places),
+                positions: usd::to_floats(&positions),
                 triangles: tracker.triangles().to_vec(),
                 detail: detail.clone(),
                 velocities,
@@ -223,7 +223,7 @@ impl<'a> Stepping for Track<'a> {
         let of_frame = self.arrays(&step.delta, &step.flags, unmade);
         let arrays: Vec<&MeshArray> = self.carried(detail).chain(&of_frame).collect();
         let velocities = if output.velocities { &step.velocities[..] } else { &[] };
-        let mesh = TriMesh { positions: step.places, triangles: step.triangles };
+        let mesh = TriMesh { positions: step.positions, triangles: step.triangles };
         let carried = mesh::Carried { velocities, uvs: detail.uvs.as_ref(), arrays: &arrays };
         if output.ply {
             files.save(NAME, "ply", &mesh::ply_bytes(&mesh, &carried))?;

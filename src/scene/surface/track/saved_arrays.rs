@@ -15,7 +15,7 @@ const NOUN: &str = "surface";
 
 const NUMBERS: [Number; 8] =
     [Number::I8, Number::U8, Number::I16, Number::U16, Number::I32, Number::U32, Number::F32, Number::F64];
-const PLACES: [On; 3] = [On::Vertices, On::Corners, On::Faces];
+const POSITIONS: [On; 3] = [On::Vertices, On::Corners, On::Faces];
 
 /// A mesh that was kept.
 pub struct Kept {
@@ -42,7 +42,7 @@ pub fn save(tracker: &Tracker, detail: &DetailedMesh, sculpted: Option<i32>) -> 
     for array in &detail.arrays {
         let code = |found: Option<usize>| found.unwrap_or_default() as u32;
         to.u32(code(NUMBERS.iter().position(|number| *number == array.number)));
-        to.u32(code(PLACES.iter().position(|on| *on == array.on)));
+        to.u32(code(POSITIONS.iter().position(|on| *on == array.on)));
         to.count(array.name.len());
         to.0.extend(array.name.as_bytes());
         to.count(array.values.len());
@@ -51,8 +51,8 @@ pub fn save(tracker: &Tracker, detail: &DetailedMesh, sculpted: Option<i32>) -> 
     to.u32(u32::from(detail.uvs.is_some()));
     if let Some(uvs) = &detail.uvs {
         to.count(uvs.missing);
-        to.count(uvs.places.len());
-        to.f32s(uvs.places.as_flattened());
+        to.count(uvs.positions.len());
+        to.f32s(uvs.positions.as_flattened());
         let corners = uvs.corners.as_deref();
         to.u32(u32::from(corners.is_some()));
         corners.unwrap_or_default().iter().for_each(|corner| to.u32(*corner));
@@ -80,7 +80,7 @@ pub fn resume(params: Params, first: &DetailedMesh, bytes: &[u8]) -> Result<Kept
     let mut arrays = Vec::new();
     for _ in 0..from.count(8)? {
         let number = *NUMBERS.get(from.u32()? as usize).ok_or_else(wrong)?;
-        let on = *PLACES.get(from.u32()? as usize).ok_or_else(wrong)?;
+        let on = *POSITIONS.get(from.u32()? as usize).ok_or_else(wrong)?;
         let length = from.count(1)?;
         let name = std::str::from_utf8(from.bytes(length)?).map_err(|_| wrong())?.to_string();
         let count = from.count(8)?;
@@ -100,17 +100,17 @@ pub fn resume(params: Params, first: &DetailedMesh, bytes: &[u8]) -> Result<Kept
 fn uvs(from: &mut Reader<'_>, vertices: usize, faces: usize) -> Result<Uvs> {
     let missing = u64::from_le_bytes(from.take()?) as usize;
     let count = from.count(8)?;
-    let place =
+    let position =
         |from: &mut Reader<'_>| Ok([f32::from_le_bytes(from.take()?), f32::from_le_bytes(from.take()?)]);
-    let places = (0..count).map(|_| place(from)).collect::<Result<Vec<[f32; 2]>>>()?;
+    let positions = (0..count).map(|_| position(from)).collect::<Result<Vec<[f32; 2]>>>()?;
     if from.u32()? == 0 {
-        return if count == vertices { Ok(Uvs { places, corners: None, missing }) } else { Err(wrong()) };
+        return if count == vertices { Ok(Uvs { positions, corners: None, missing }) } else { Err(wrong()) };
     }
     let corners = (0..3 * faces).map(|_| from.u32()).collect::<Result<Vec<u32>>>()?;
     if corners.iter().any(|corner| *corner as usize >= count) {
         return Err(wrong());
     }
-    Ok(Uvs { places, corners: Some(corners), missing })
+    Ok(Uvs { positions, corners: Some(corners), missing })
 }
 
 fn wrong() -> Error {
@@ -129,7 +129,7 @@ mod tests {
         let ctx = Context::new(Pool::new(1).unwrap());
         let balls = |away: f64| two_balls(3.2, DVec3::new(away, 0.1, 0.0));
         let mut from = balls(5.0);
-        let mesh = own_surface(&ctx, &from.places);
+        let mesh = own_surface(&ctx, &from.positions);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
         for step in 1..=6 {
@@ -146,7 +146,7 @@ mod tests {
             values: (0..count).map(|n| if n == 3 { f64::NAN } else { n as f64 }).collect(),
         };
         let arrays = vec![array("wet", On::Vertices, vertices), array("part", On::Faces, faces)];
-        let uvs = Uvs { places: vec![[0.5, 0.25]; 7], corners: Some(vec![6; 3 * faces]), missing: 2 };
+        let uvs = Uvs { positions: vec![[0.5, 0.25]; 7], corners: Some(vec![6; 3 * faces]), missing: 2 };
         let first = DetailedMesh { mesh, ..DetailedMesh::default() };
         (tracker, first, DetailedMesh { mesh: TriMesh::default(), uvs: Some(uvs), arrays })
     }

@@ -167,22 +167,22 @@ impl<'a> Walk<'a> {
         &self.known[0]
     }
 
-    /// Places (m) of its vertices as they are shown: those that a change will take away already go towards what it makes; with the
+    /// Positions (m) of its vertices as they are shown: those that a change will take away already go towards what it makes; with the
     /// velocities that lead to the next frame's (m/s), or where that is not known from the one before.
     ///
     /// # Errors
     /// Cancel.
     pub fn shown(&self, ctx: &Context) -> Result<(Vec<DVec3>, Vec<Vec3>)> {
         let now = self.now();
-        let mut places = now.tracker.vertices().to_vec();
+        let mut positions = now.tracker.vertices().to_vec();
         let mut velocities = match self.known.get(1) {
             Some(next) => next.way.of_before.clone(),
-            None if now.way.of_after.is_empty() => vec![Vec3::zeros(); places.len()],
+            None if now.way.of_after.is_empty() => vec![Vec3::zeros(); positions.len()],
             None => now.way.of_after.clone(),
         };
         let moved = self.displaced(ctx, 0)?;
-        moved.iter().for_each(|(vertex, by)| places[*vertex as usize] += by);
-        let Some(next) = self.known.get(1) else { return Ok((places, velocities)) };
+        moved.iter().for_each(|(vertex, by)| positions[*vertex as usize] += by);
+        let Some(next) = self.known.get(1) else { return Ok((positions, velocities)) };
         let mut then: Vec<Displaced> = self.displaced(ctx, 1)?;
         then = then.into_iter().filter_map(|(at, by)| Some((next.leads.before(at)?, by))).collect();
         then.sort_unstable_by_key(|(vertex, _)| *vertex);
@@ -200,7 +200,7 @@ impl<'a> Walk<'a> {
             };
             velocities[vertex as usize] += ((to - now) * self.scene.shot.fps).cast::<f32>();
         }
-        Ok((places, velocities))
+        Ok((positions, velocities))
     }
 
     /// The vertices of a frame that is known which are moved for changes to come.
@@ -259,7 +259,7 @@ impl<'a> Walk<'a> {
             let particles = Arc::new(self.inputs.particles.clone());
             let sculpted = self.resculpt(ctx, &mut at, frame, &particles)?;
             if let Some(report) = sculpted {
-                at.report = told(&report, particles.places.len(), &at.tracker, true);
+                at.report = told(&report, particles.positions.len(), &at.tracker, true);
             }
             return Ok(at);
         }
@@ -308,14 +308,14 @@ impl<'a> Walk<'a> {
             from = to;
         }
         let way = trail.way(tracker.vertices(), tracker.triangles(), self.scene.shot.fps);
-        let is_dry = from.places.is_empty();
+        let is_dry = from.positions.is_empty();
         let mut at = At { tracker, detail, report: nothing_told(), way, leads, source, is_dry };
         let sculpted = self.resculpt(ctx, &mut at, frame, &from)?;
         let is_resculpted = sculpted.is_some();
         let report = sculpted.into_iter().fold(report, StepReport::followed_by);
         let report = StepReport { phases: phases.times(), ..report };
         report.new_warnings(&mut self.has_warned).for_each(|warning| log::warn!("frame {frame}: {warning}"));
-        at.report = told(&report, from.places.len(), &at.tracker, is_resculpted);
+        at.report = told(&report, from.positions.len(), &at.tracker, is_resculpted);
         Ok(at)
     }
 
@@ -328,7 +328,7 @@ impl<'a> Walk<'a> {
         particles: &Particles,
     ) -> Result<Option<StepReport>> {
         let Some(sculpt) = read_sculpt(ctx, self.surface, self.inputs, frame)? else { return Ok(None) };
-        if particles.places.is_empty() {
+        if particles.positions.is_empty() {
             log::warn!("{}: is left out, as frame {frame} has no particles", sculpt.path.display());
             return Ok(None);
         }
@@ -341,8 +341,8 @@ impl<'a> Walk<'a> {
         let report =
             at.tracker.resculpt(ctx, &sculpt.mesh.mesh, sculpt.lasting, particles).map_err(refused)?;
         // Vertices of the edited mesh go as the mesh before went beside them.
-        let velocity = |place: &DVec3| {
-            let corner = old.nearest(*place).map(|near| triangles[near.triangle][0] as usize);
+        let velocity = |position: &DVec3| {
+            let corner = old.nearest(*position).map(|near| triangles[near.triangle][0] as usize);
             corner.and_then(|corner| at.way.of_after.get(corner).copied()).unwrap_or_default()
         };
         at.way.of_after = at.tracker.vertices().iter().map(velocity).collect();
@@ -366,7 +366,7 @@ fn first_mesh(ctx: &Context, surface: &Surface, inputs: &Inputs) -> Result<At> {
     let ((mut tracker, report), phases) = begun.map_err(|error| of_first(surface, error))?;
     tracker.set_lasting(inputs.lasting.clone()).map_err(|error| of_first(surface, error))?;
     let report = StepReport { phases, ..report };
-    let report = told(&report, inputs.particles.places.len(), &tracker, false);
+    let report = told(&report, inputs.particles.positions.len(), &tracker, false);
     let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
     let (way, leads) = (Way::default(), Leads::default());
     Ok(At { tracker, detail: None, report, way, leads, source, is_dry: false })
@@ -412,7 +412,7 @@ impl Source {
     }
 }
 
-/// What a mesh carries after a change; its places are those of the change.
+/// What a mesh carries after a change; its positions are those of the change.
 fn carried(
     ctx: &Context,
     own: &DetailedMesh,
@@ -428,7 +428,7 @@ fn carried(
         Some((rest, tree)) => (rest.of_change(ctx, particles, spacing, change)?, Some(tree)),
         None => (Vec::new(), None),
     };
-    let traced = Traced { first: &source.mesh, tree, places: &places, spacing };
+    let traced = Traced { first: &source.mesh, tree, positions: &places, spacing };
     let (origins, sources) = (&change.origins, &change.sources);
     ctx.phase("carry", || {
         let mut out = carry_attributes(&old, tracker.mesh(), origins, sources, Some(&traced));

@@ -19,18 +19,18 @@ pub struct Trail {
 }
 
 impl Trail {
-    /// Vertices that set out from these places (m).
+    /// Vertices that set out from these positions (m).
     pub fn of(from: &[DVec3]) -> Self {
         let names = (0..from.len() as u32).map(Some).collect();
         Self { from: from.to_vec(), gone: vec![(DVec3::zeros(), 0.0); from.len()], names }
     }
 
-    /// They have come to these places (m) when a share of the frame has passed.
-    pub fn follow(&mut self, places: &[DVec3], share: f64) {
-        for (place, name) in places.iter().zip(&self.names) {
+    /// They have come to these positions (m) when a share of the frame has passed.
+    pub fn follow(&mut self, positions: &[DVec3], share: f64) {
+        for (position, name) in positions.iter().zip(&self.names) {
             if let Some(name) = name {
                 let at = *name as usize;
-                self.gone[at] = (place - self.from[at], share);
+                self.gone[at] = (position - self.from[at], share);
             }
         }
     }

@@ -22,9 +22,9 @@ pub struct Around<'a> {
     pub columns: &'a Columns,
     /// H (units), padded by a strip: SIMD loads may read past the last index.
     pub depth: &'a [i32],
-    /// Whether a strip has ceilings, or places without a column.
+    /// Whether a strip has ceilings, or positions without a column.
     pub roofed: &'a [bool],
-    /// Places of each strip from which links lead to the east, south, west and north.
+    /// Positions of each strip from which links lead to the east, south, west and north.
     pub linked: &'a [[u16; 4]],
 }
 
@@ -137,12 +137,13 @@ fn find_strips(step: &Step, around: &Around, strips: &[u32], first: usize, out: 
     let Around { columns, roofed, linked, .. } = around;
     let [all_z, before_z, behind_z, all_x, before_x, behind_x] = out;
     for &strip in strips {
-        let (strip, place) = (strip as usize, strip as usize - first);
+        let (strip, position) = (strip as usize, strip as usize - first);
         let (own, links) = (around.strip(strip), linked[strip]);
         let [north, south] = [columns.north(strip), columns.south(strip)];
         let is_roofed =
             (north == NONE || roofed[north as usize]) || (south == NONE || roofed[south as usize]);
-        let numbers = (strip_mut(all_z, place), strip_mut(before_z, place), strip_mut(behind_z, place));
+        let numbers =
+            (strip_mut(all_z, position), strip_mut(before_z, position), strip_mut(behind_z, position));
         both(
             step,
             &own,
@@ -164,7 +165,8 @@ fn find_strips(step: &Step, around: &Around, strips: &[u32], first: usize, out: 
             || !has_east
             || roofed[strip - usize::from(has_west)]
             || roofed[strip + usize::from(has_east)];
-        let numbers = (strip_mut(all_x, place), strip_mut(before_x, place), strip_mut(behind_x, place));
+        let numbers =
+            (strip_mut(all_x, position), strip_mut(before_x, position), strip_mut(behind_x, position));
         both(step, &own, [&west.see(), &east.see()], [links[2], links[0]], is_roofed, numbers);
     }
 }
@@ -216,10 +218,10 @@ struct Shifted {
 }
 
 impl Shifted {
-    /// There is no column at a place.
+    /// There is no column at a position.
     #[inline(always)]
-    fn shut(&mut self, place: usize) {
-        (self.base[place], self.ceiling[place], self.depth[place]) = (0, 0, 0);
+    fn shut(&mut self, position: usize) {
+        (self.base[position], self.ceiling[position], self.depth[position]) = (0, 0, 0);
     }
 
     #[inline(always)]

@@ -114,13 +114,13 @@ fn over<const FULL: bool>(step: &Step, own: Room, beyond: [(Room, bool); 2]) -> 
 
 /// The column beside another one over a side, as links count them; it may be one that is not there.
 fn across(columns: &Columns, i: usize, bit: usize) -> Option<usize> {
-    let (strip, place) = (i / STRIP, i % STRIP);
-    let beyond = |strip: u32| (strip != NONE).then(|| strip as usize * STRIP + place);
+    let (strip, position) = (i / STRIP, i % STRIP);
+    let beyond = |strip: u32| (strip != NONE).then(|| strip as usize * STRIP + position);
     match bit {
-        0 if place + 1 < STRIP => Some(i + 1),
+        0 if position + 1 < STRIP => Some(i + 1),
         0 => columns.east(strip).map(|_| i + 1),
         1 => beyond(columns.south(strip)),
-        2 if place > 0 => Some(i - 1),
+        2 if position > 0 => Some(i - 1),
         2 => columns.west(strip).map(|_| i - 1),
         _ => beyond(columns.north(strip)),
     }

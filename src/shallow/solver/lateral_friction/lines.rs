@@ -49,8 +49,8 @@ impl Lines {
     pub fn fit(&mut self, columns: &Columns) {
         let (len, strips) = (columns.len(), columns.strips().len());
         let lists = self.now.iter_mut().chain(&mut self.next).flatten().chain(&mut self.solved);
-        for (place, numbers) in lists.enumerate() {
-            numbers.fit(6 + place, len);
+        for (position, numbers) in lists.enumerate() {
+            numbers.fit(6 + position, len);
         }
         for far in self.far.iter_mut().flatten() {
             far.clear();
@@ -132,8 +132,8 @@ impl Lines {
             );
             std::mem::swap(now, next);
             for (far, farther) in far.iter().zip(&mut *farther) {
-                for (place, &other) in farther.iter_mut().zip(far) {
-                    *place = if other == NONE { NONE } else { far[other as usize] };
+                for (position, &other) in farther.iter_mut().zip(far) {
+                    *position = if other == NONE { NONE } else { far[other as usize] };
                 }
             }
             std::mem::swap(far, farther);
@@ -220,11 +220,11 @@ type System = [[f32; STRIP]; 3];
 fn solve_strips<const THINS: bool>(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 2]) {
     let ([east, south], again) = (out, pass.step.again);
     for &strip in strips {
-        let (strip, place) = (strip as usize, strip as usize - start);
+        let (strip, position) = (strip as usize, strip as usize - start);
         let ([rest, a, b], [before, behind]) = pass.begin::<THINS, 0>(strip);
-        end_strip(&rest, &a, &b, &before, &behind, again, strip_mut(east, place));
+        end_strip(&rest, &a, &b, &before, &behind, again, strip_mut(east, position));
         let ([rest, a, b], [before, behind]) = pass.begin::<THINS, 1>(strip);
-        end_strip(&rest, &a, &b, &before, &behind, again, strip_mut(south, place));
+        end_strip(&rest, &a, &b, &before, &behind, again, strip_mut(south, position));
     }
 }
 
@@ -247,10 +247,10 @@ fn begin_strips<const THINS: bool>(pass: &Pass, strips: &[u32], start: usize, ou
 fn reduce_strips(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 6]) {
     let [east, east_a, east_b, south, south_a, south_b] = out;
     for &strip in strips {
-        let (strip, place) = (strip as usize, strip as usize - start);
-        let out = (strip_mut(east, place), strip_mut(east_a, place), strip_mut(east_b, place));
+        let (strip, position) = (strip as usize, strip as usize - start);
+        let out = (strip_mut(east, position), strip_mut(east_a, position), strip_mut(east_b, position));
         reduce_strip(pass.own(0, strip), pass.far::<0>(strip, 0), pass.far::<0>(strip, 1), out);
-        let out = (strip_mut(south, place), strip_mut(south_a, place), strip_mut(south_b, place));
+        let out = (strip_mut(south, position), strip_mut(south_a, position), strip_mut(south_b, position));
         reduce_strip(pass.own(1, strip), pass.far::<1>(strip, 0), pass.far::<1>(strip, 1), out);
     }
 }
@@ -416,8 +416,8 @@ impl Pass<'_> {
                 other => self.own(0, other as usize),
             }
         } else if side == 0 {
-            let places = self.distance;
-            [rest.before(strip, places), a.before(strip, places), b.before(strip, places)]
+            let positions = self.distance;
+            [rest.before(strip, positions), a.before(strip, positions), b.before(strip, positions)]
         } else {
             let at = strip * STRIP + self.distance;
             [strip_from(rest.all(), at), strip_from(a.all(), at), strip_from(b.all(), at)]
@@ -439,10 +439,10 @@ impl Pass<'_> {
     }
 }
 
-/// The numbers so many places behind those of a strip; 0 where there is none.
+/// The numbers so many positions behind those of a strip; 0 where there is none.
 #[inline(always)]
-fn shifted<T: Copy + Default>(numbers: &[T], strip: usize, places: isize) -> [T; STRIP] {
-    let at = (strip * STRIP) as isize + places;
+fn shifted<T: Copy + Default>(numbers: &[T], strip: usize, positions: isize) -> [T; STRIP] {
+    let at = (strip * STRIP) as isize + positions;
     if at >= 0 && at as usize + STRIP <= numbers.len() {
         *strip_from(numbers, at as usize)
     } else {

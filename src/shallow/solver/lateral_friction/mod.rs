@@ -46,9 +46,9 @@ pub struct Walls {
     /// Their active strips, and whether each is known since what is beside columns was found.
     strips: Vec<u32>,
     known: Vec<bool>,
-    /// Whether a strip has ceilings, or places without a column.
+    /// Whether a strip has ceilings, or positions without a column.
     roofed: Vec<bool>,
-    /// Places of each strip from which links lead to the east, south, west and north.
+    /// Positions of each strip from which links lead to the east, south, west and north.
     linked: Vec<[u16; 4]>,
     has_links: bool,
     /// Across x, then across z: what is beside each column in all ([`beside::Around`]), before it, and behind it.
@@ -74,7 +74,7 @@ pub struct Liquid<'a> {
     pub is_divided: bool,
 }
 
-/// Numbers by column index, with some before the first and behind the last. Each list begins at another place of a page (`columns/per_column.rs`).
+/// Numbers by column index, with some before the first and behind the last. Each list begins at another position of a page (`columns/per_column.rs`).
 #[derive(Debug, Clone, Default)]
 struct Numbers {
     before: usize,
@@ -82,8 +82,8 @@ struct Numbers {
 }
 
 impl Numbers {
-    fn fit(&mut self, place: usize, len: usize) {
-        self.before = STRIP + 48 * place;
+    fn fit(&mut self, position: usize, len: usize) {
+        self.before = STRIP + 48 * position;
         self.list.clear();
         self.list.resize(self.before + len + 2 * STRIP, 0.0);
     }
@@ -99,8 +99,8 @@ impl Numbers {
 
     /// From some places before a strip on.
     #[inline(always)]
-    fn before(&self, strip: usize, places: usize) -> &[f32; STRIP] {
-        let at = self.before + strip * STRIP - places;
+    fn before(&self, strip: usize, positions: usize) -> &[f32; STRIP] {
+        let at = self.before + strip * STRIP - positions;
         self.list[at..].first_chunk().expect("a strip")
     }
 }
@@ -132,8 +132,8 @@ impl Walls {
         self.roofed.extend((0..strips).map(has_roof));
         if self.len != len {
             self.len = len;
-            for (place, numbers) in self.beside.iter_mut().flatten().enumerate() {
-                numbers.fit(place, len);
+            for (position, numbers) in self.beside.iter_mut().flatten().enumerate() {
+                numbers.fit(position, len);
             }
             self.lines.fit(columns);
         }
@@ -215,7 +215,7 @@ impl Walls {
         lines.solve(step, liquid, strips, known, beside);
     }
 
-    /// Marks the places of strips from which links lead over a side: there is no wall.
+    /// Marks the positions of strips from which links lead over a side: there is no wall.
     fn mark_links(&mut self, links: &Links, columns: &Columns) {
         if self.has_links {
             self.linked.fill([0; 4]);
@@ -262,10 +262,10 @@ fn spread<const N: usize>(
     let half = strips.len() / 2;
     let middle = strips.start + half;
     let mut behind = [(); N].map(|()| &mut [][..]);
-    let mut places = behind.iter_mut();
+    let mut positions = behind.iter_mut();
     let before = out.map(|numbers| {
         let (before, rest) = numbers.split_at_mut(half * STRIP);
-        *places.next().expect("as many") = rest;
+        *positions.next().expect("as many") = rest;
         before
     });
     rayon::join(

@@ -28,7 +28,7 @@ pub const SLACK: i32 = 128;
 /// Columns of a network that there is room for from the beginning.
 const ROOM: usize = 1024;
 
-/// A pipe of the network: its place in its array.
+/// A pipe of the network: its position in its array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::shallow::solver) enum At {
     /// To the east of a column.
@@ -256,9 +256,9 @@ impl Network {
     fn connect(&mut self, step: &Step, columns: &Columns, pipes: &Pipes, rows: &[bool], state: &State) {
         for node in 0..self.nodes.len() {
             let i = self.parties[node].column as usize;
-            let (strip, place) = (i / STRIP, i % STRIP);
-            let beyond = |strip: u32| (strip != NONE).then(|| strip as usize * STRIP + place);
-            let west = if place > 0 { Some(i - 1) } else { columns.west(strip).map(|_| i - 1) };
+            let (strip, position) = (i / STRIP, i % STRIP);
+            let beyond = |strip: u32| (strip != NONE).then(|| strip as usize * STRIP + position);
+            let west = if position > 0 { Some(i - 1) } else { columns.west(strip).map(|_| i - 1) };
             if pipes.east[i] > 0.0 {
                 let edge = self.join(step, columns, state, At::East(i as u32), [i, i + 1], pipes.east[i]);
                 self.meet(edge, node, 0, i + 1, 1);

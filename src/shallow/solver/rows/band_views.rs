@@ -189,20 +189,20 @@ impl<'a> Parts<'a> {
     /// The part that a row is in.
     #[inline(always)]
     pub fn of(&mut self, row: usize) -> &mut Part<'a> {
-        let part = self.place(row);
+        let part = self.position(row);
         &mut self.parts[part]
     }
 
     /// The part that a row is in, to read.
     #[inline(always)]
     pub fn see(&self, row: usize) -> &Part<'a> {
-        &self.parts[self.place(row)]
+        &self.parts[self.position(row)]
     }
 
     /// The parts of a row and of the next one, where these are two.
     #[inline(always)]
     pub fn both(&mut self, row: usize) -> (&mut Part<'a>, Option<&mut Part<'a>>) {
-        let (own, next) = (self.place(row), self.place(row + 1));
+        let (own, next) = (self.position(row), self.position(row + 1));
         if own == next {
             (&mut self.parts[own], None)
         } else {
@@ -212,7 +212,7 @@ impl<'a> Parts<'a> {
     }
 
     #[inline(always)]
-    fn place(&self, row: usize) -> usize {
+    fn position(&self, row: usize) -> usize {
         if row < self.rows.start {
             0
         } else if row < self.rows.end {

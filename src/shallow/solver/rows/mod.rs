@@ -197,17 +197,17 @@ impl Rows {
                 last[..STRIP].copy_from_slice(&depth[cut..len]);
                 last[STRIP] = beyond.as_ref().map_or(0, |next| next.depth[0]);
             }
-            for (place, len) in [(0, cut), (cut, len - cut)].into_iter().filter(|(_, len)| *len > 0) {
-                let (first, at) = (span.first as usize + place, at + place);
+            for (position, len) in [(0, cut), (cut, len - cut)].into_iter().filter(|(_, len)| *len > 0) {
+                let (first, at) = (span.first as usize + position, at + position);
                 let mine = first - own.start;
-                let south = if span.south == NONE { first } else { span.south as usize + place };
+                let south = if span.south == NONE { first } else { span.south as usize + position };
                 let south_depth = match &beyond {
                     Some(next) if span.south != NONE => &next.depth[south - next.start..],
                     _ => &own.depth[south - own.start..],
                 };
                 let row = Row {
                     base: &columns.bases()[first..],
-                    depth: if place < cut { depth } else { &last },
+                    depth: if position < cut { depth } else { &last },
                     south_base: &columns.bases()[south..],
                     south_depth,
                     open: [&pipes.east[first..], &pipes.south[first..]],
@@ -251,7 +251,7 @@ impl Rows {
 
     /// What the network moves, behind the fluxes of all pipes of a row.
     fn shut(&mut self, ground: &Ground, parts: &mut Parts, row: usize) {
-        let (place, buffer) = (Place::new(ground.columns, row), &mut self.ring[row % RING]);
+        let (position, buffer) = (Place::new(ground.columns, row), &mut self.ring[row % RING]);
         let part = parts.of(row);
         let (start, first_link) = (part.start, part.first_link);
         let (depth, transfer) = (&mut *part.depth, &mut *part.links.transfer);
@@ -259,8 +259,8 @@ impl Rows {
             &indices_of(ground.columns, row),
             &ground.pipes.links.row(row),
             |column, units| depth[column as usize - start] += units,
-            |column| buffer.east[place.of(column)] = 0.0,
-            |column| buffer.south[place.of(column)] = 0.0,
+            |column| buffer.east[position.of(column)] = 0.0,
+            |column| buffer.south[position.of(column)] = 0.0,
             |link| transfer[link as usize - first_link] = 0.0,
         );
     }
@@ -272,11 +272,11 @@ impl Rows {
         let part = parts.see(row);
         let [own, north] =
             self.ring.get_disjoint_mut([row % RING, (row + RING - 1) % RING]).expect("two rows");
-        let place = Place::new(columns, row);
+        let position = Place::new(columns, row);
         let (mut over, may_fill, mut into) = (false, ground.may_fill[row], [0.0; STRIP]);
         for span in active.row(row) {
-            let (at, len) = (place.of(span.first), span.len as usize);
-            let around = place.around(&own.east, &own.south, &north.south, &self.zeros, span);
+            let (at, len) = (position.of(span.first), span.len as usize);
+            let around = position.around(&own.east, &own.south, &north.south, &self.zeros, span);
             let depth = &part.depth[span.first as usize - part.start..];
             let out = &mut own.least[at..at + len];
             over |= if may_fill {
@@ -287,9 +287,9 @@ impl Rows {
         }
         if !pipes.links.columns_of(row).is_empty() {
             let sums = &mut self.linked;
-            each_link(ground, parts, row, true, |column, units| sums[place.of(column)] += units);
+            each_link(ground, parts, row, true, |column, units| sums[position.of(column)] += units);
             for &column in pipes.links.columns_of(row) {
-                own.least[place.of(column)] += std::mem::take(&mut sums[place.of(column)]) as f32;
+                own.least[position.of(column)] += std::mem::take(&mut sums[position.of(column)]) as f32;
             }
             // Few columns have links, but any may be over now.
             over = true;
@@ -302,7 +302,7 @@ impl Rows {
         let mut is_less = false;
         if over {
             for span in active.row(row) {
-                let (at, len) = (place.of(span.first), span.len as usize);
+                let (at, len) = (position.of(span.first), span.len as usize);
                 let depth = &part.depth[span.first as usize - part.start..];
                 is_less |= scale::least(depth, &mut own.least[at..at + len]) < 1.0;
             }
@@ -321,13 +321,13 @@ impl Rows {
         }
         let least = if own.is_less { &own.least } else { &self.ones };
         let beyond = if south_is_less { &south.least } else { &self.ones };
-        let place = Place::new(ground.columns, row);
+        let position = Place::new(ground.columns, row);
         let part = parts.of(row);
         let [flux_east, flux_south] = &mut part.flux;
         for span in ground.active.row(row) {
-            let (at, len) = (place.of(span.first), span.len as usize);
+            let (at, len) = (position.of(span.first), span.len as usize);
             let mine = span.first as usize - part.start;
-            let factor = place.beside(least, beyond, &self.ones, span);
+            let factor = position.beside(least, beyond, &self.ones, span);
             scale::shrink(
                 &factor,
                 &mut own.east[at..at + len],
@@ -337,7 +337,7 @@ impl Rows {
             );
         }
         let first_link = part.first_link;
-        let factor = |column| place.pick(least, beyond, column);
+        let factor = |column| position.pick(least, beyond, column);
         part.links.scale(&ground.pipes.links, ground.lips, (row, first_link), true, factor);
     }
 
@@ -370,17 +370,17 @@ impl Rows {
     fn transfer(&mut self, ground: &Ground, parts: &mut Parts, row: usize, woken: &mut Vec<u32>) -> i32 {
         let [own, north] =
             self.ring.get_disjoint_mut([row % RING, (row + RING - 1) % RING]).expect("two rows");
-        let place = Place::new(ground.columns, row);
+        let position = Place::new(ground.columns, row);
         let part = parts.of(row);
         let mut deepest = [0; STRIP];
         for span in ground.active.row(row) {
             let (mine, len) = (span.first as usize - part.start, span.len as usize);
-            let around = place.around(&own.east, &own.south, &north.south, &self.zeros, span);
+            let around = position.around(&own.east, &own.south, &north.south, &self.zeros, span);
             let depth = &mut part.depth[mine..mine + len];
             move_units(&around, depth, &mut deepest);
             let strip = span.first / STRIP as u32;
             let marks = [ground.active.wet(), ground.active.moving()].map(|marks| &marks[strip as usize..]);
-            find_woken(&around, depth, marks, |place| woken.push(strip + place as u32));
+            find_woken(&around, depth, marks, |position| woken.push(strip + position as u32));
         }
         deepest.into_iter().fold(ground.active.asleep_depth(row), i32::max)
     }

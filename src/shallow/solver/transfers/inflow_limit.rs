@@ -24,21 +24,21 @@ impl Rows {
         if !own.may_fill {
             return false;
         }
-        let place = Place::new(columns, row);
+        let position = Place::new(columns, row);
         let [most, _] = &mut own.most;
         for span in active.row(row) {
-            let (at, len) = (place.of(span.first), span.len as usize);
-            let around = place.around(&own.east, &own.south, &north.south, &self.zeros, span);
+            let (at, len) = (position.of(span.first), span.len as usize);
+            let around = position.around(&own.east, &own.south, &north.south, &self.zeros, span);
             scale::inflow(&around, &mut most[at..at + len]);
         }
         let sums = &mut self.linked;
-        each_link(ground, parts, row, false, |column, units| sums[place.of(column)] += units);
+        each_link(ground, parts, row, false, |column, units| sums[position.of(column)] += units);
         for &column in ground.pipes.links.columns_of(row) {
-            most[place.of(column)] += std::mem::take(&mut sums[place.of(column)]) as f32;
+            most[position.of(column)] += std::mem::take(&mut sums[position.of(column)]) as f32;
         }
         let mut is_full = false;
         for span in active.row(row) {
-            let (at, first, len) = (place.of(span.first), span.first as usize, span.len as usize);
+            let (at, first, len) = (position.of(span.first), span.first as usize, span.len as usize);
             let (base, ceiling) = (&columns.bases()[first..], &columns.ceilings()[first..]);
             let depth = &part.depth[first - part.start..];
             is_full |= scale::find_most(base, ceiling, depth, &mut most[at..at + len]) < 1.0;
@@ -57,16 +57,16 @@ impl Rows {
         if !own.is_full {
             return;
         }
-        let place = Place::new(columns, row);
+        let position = Place::new(columns, row);
         let count = columns.grid.size[1];
         let beyond = if row + 1 < count && south.is_full { &south.most[0] } else { &self.ones };
         let before = if row > 0 && north.is_full { &north.most[0] } else { &self.ones };
         let [first_most, most] = &mut own.most;
         for span in active.row(row) {
-            let (at, first, len) = (place.of(span.first), span.first as usize, span.len as usize);
-            let around = place.around(&own.east, &own.south, &north.south, &self.zeros, span);
-            let near = place.beside(first_most, beyond, &self.ones, span);
-            let north_most = place.north(before, &self.ones, span);
+            let (at, first, len) = (position.of(span.first), span.first as usize, span.len as usize);
+            let around = position.around(&own.east, &own.south, &north.south, &self.zeros, span);
+            let near = position.beside(first_most, beyond, &self.ones, span);
+            let north_most = position.north(before, &self.ones, span);
             for x in 0..len {
                 let i = first + x;
                 let k = first_most[at + x];
@@ -88,7 +88,7 @@ impl Rows {
         }
         // What comes through links is not in the sum: their columns keep the first sweep's.
         for &column in pipes.links.columns_of(row) {
-            most[place.of(column)] = first_most[place.of(column)];
+            most[position.of(column)] = first_most[position.of(column)];
         }
     }
 
@@ -102,13 +102,13 @@ impl Rows {
         }
         let most = if own.is_full { &own.most[1] } else { &self.ones };
         let beyond = if south_is_full { &south.most[1] } else { &self.ones };
-        let place = Place::new(ground.columns, row);
+        let position = Place::new(ground.columns, row);
         let part = parts.of(row);
         let [flux_east, flux_south] = &mut part.flux;
         for span in ground.active.row(row) {
-            let (at, len) = (place.of(span.first), span.len as usize);
+            let (at, len) = (position.of(span.first), span.len as usize);
             let mine = span.first as usize - part.start;
-            let factor = place.beside(most, beyond, &self.ones, span);
+            let factor = position.beside(most, beyond, &self.ones, span);
             scale::fit(
                 &factor,
                 &mut own.east[at..at + len],
@@ -118,7 +118,7 @@ impl Rows {
             );
         }
         let first_link = part.first_link;
-        let factor = |column| place.pick(most, beyond, column);
+        let factor = |column| position.pick(most, beyond, column);
         part.links.scale(&ground.pipes.links, ground.lips, (row, first_link), false, factor);
     }
 }
@@ -130,8 +130,8 @@ pub(in crate::shallow::solver) fn most_through_links(
     row: usize,
     sums: &mut [i64],
 ) -> f32 {
-    let place = Place::new(ground.columns, row);
-    each_link(ground, parts, row, false, |column, units| sums[place.of(column)] += units);
+    let position = Place::new(ground.columns, row);
+    each_link(ground, parts, row, false, |column, units| sums[position.of(column)] += units);
     let columns = ground.pipes.links.columns_of(row).iter();
-    columns.map(|&column| std::mem::take(&mut sums[place.of(column)])).max().unwrap_or(0) as f32
+    columns.map(|&column| std::mem::take(&mut sums[position.of(column)])).max().unwrap_or(0) as f32
 }

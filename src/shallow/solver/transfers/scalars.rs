@@ -71,12 +71,12 @@ impl Lanes {
     /// Finds the concentrations in a row, from the depths that its transfers are scaled by.
     #[inline(never)]
     pub fn find_levels(&mut self, ground: &Ground, parts: &Parts, row: usize) {
-        let (part, place) = (parts.see(row), Place::new(ground.columns, row));
+        let (part, position) = (parts.see(row), Place::new(ground.columns, row));
         for (lane, amounts) in self.lanes.iter_mut().zip(&part.amounts) {
             let levels = &mut lane.level[row % RING];
             for span in ground.active.row(row) {
                 let (at, mine, len) =
-                    (place.of(span.first), span.first as usize - part.start, span.len as usize);
+                    (position.of(span.first), span.first as usize - part.start, span.len as usize);
                 let own = mine..mine + len;
                 find_levels(&amounts[own.clone()], &part.depth[own], &mut levels[at..at + len]);
             }
@@ -88,7 +88,7 @@ impl Lanes {
     pub fn move_links(&self, ground: &Ground, parts: &mut Parts, row: usize, changes: &mut [Changes; MOST]) {
         let links = &ground.pipes.links;
         let (is_own, own) = (parts.rows.contains(&row), indices(ground.columns, &parts.rows));
-        let place = Place::new(ground.columns, row);
+        let position = Place::new(ground.columns, row);
         let (part, mut next) = parts.both(row);
         for (scalar, lane) in self.lanes.iter().enumerate() {
             let [levels, beyond] = [row, row + 1].map(|row| &lane.level[row % RING]);
@@ -101,7 +101,7 @@ impl Lanes {
                 let (from, to, fall) = (links.from[link], links.to[link], ground.lips.at(link));
                 // From outside comes what is like the liquid inside.
                 let giver = if units > 0 || to == NONE { from } else { to };
-                let moved = share(place.pick(levels, beyond, giver), f64::from(units));
+                let moved = share(position.pick(levels, beyond, giver), f64::from(units));
                 let mut change = |column: u32, amount: f64| {
                     let column = column as usize;
                     if own.contains(&column) {
@@ -141,15 +141,15 @@ impl Lanes {
         changes: &mut [Changes; MOST],
     ) {
         let is_own = parts.rows.contains(&row);
-        let (part, place) = (parts.of(row), Place::new(ground.columns, row));
+        let (part, position) = (parts.of(row), Place::new(ground.columns, row));
         let Self { lanes, none } = self;
         for (scalar, (lane, act)) in lanes.iter_mut().zip(ground.acts).enumerate() {
             let [levels, beyond] =
                 [&lane.level[row % RING], &lane.level[(row + 1) % RING]].map(|levels| &levels[..]);
             let [own_south, north] = lane.south.get_disjoint_mut([row % 2, (row + 1) % 2]).expect("two rows");
             for span in ground.active.row(row) {
-                let (at, len) = (place.of(span.first), span.len as usize);
-                let beside = place.beside(levels, beyond, none, span);
+                let (at, len) = (position.of(span.first), span.len as usize);
+                let beside = position.beside(levels, beyond, none, span);
                 take_along(beside.own, beside.south, &south[at..], &mut own_south[at..at + len]);
                 if is_own {
                     take_along(beside.own, &beside.own[1..], &east[at..], &mut lane.east[at..at + len]);
@@ -161,7 +161,7 @@ impl Lanes {
             let (mut end, changes) = (0, &mut changes[scalar]);
             for span in ground.active.row(row) {
                 let (at, mine, len) =
-                    (place.of(span.first), span.first as usize - part.start, span.len as usize);
+                    (position.of(span.first), span.first as usize - part.start, span.len as usize);
                 if at != end {
                     lane.east[at - 1] = 0.0;
                 }
@@ -170,7 +170,7 @@ impl Lanes {
                     &lane.east[at..at + len],
                     &lane.east[at - 1..at - 1 + len],
                     &own_south[at..at + len],
-                    &place.north(north, none, span)[..len],
+                    &position.north(north, none, span)[..len],
                 ];
                 let (depth, amount) =
                     (&part.depth[mine..mine + len], &mut part.amounts[scalar][mine..mine + len]);

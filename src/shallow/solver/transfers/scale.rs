@@ -10,7 +10,7 @@ use crate::shallow::solver::flux::{greater, lesser};
 /// Depths and room are counted as this much less, and sums of four or more rounded transfers stay within them.
 pub const MARGIN: f32 = 1.0 - 1.0 / (1u32 << 20) as f32;
 
-/// The transfers (units) of a span's pipes on all sides; `west` begins one before `east`, so that each column's is at its place.
+/// The transfers (units) of a span's pipes on all sides; `west` begins one before `east`, so that each column's is at its position.
 pub struct Around<'a> {
     /// To the east.
     pub east: &'a [f32],
@@ -45,7 +45,7 @@ fn spare(depth: i32) -> f32 {
 }
 
 /// Sums what is to leave each column; whether it is more than the column has anywhere. Where columns may fill up, `into` is raised to the most that is to
-/// come into one of each place.
+/// come into one of each position.
 #[inline(always)]
 pub fn outflow<const FILLS: bool>(
     depth: &[i32],

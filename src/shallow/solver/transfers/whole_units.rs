@@ -18,7 +18,7 @@ pub unsafe fn whole(transfer: f32) -> i32 {
     unsafe { transfer.to_int_unchecked() }
 }
 
-/// Moves what the pipes of a span transfer; `deepest`, of the places of a strip, grows to the greatest new depths there.
+/// Moves what the pipes of a span transfer; `deepest`, of the positions of a strip, grows to the greatest new depths there.
 #[inline(always)]
 pub fn move_units(around: &Around, depth: &mut [i32], deepest: &mut [i32; STRIP]) {
     for strip in 0..depth.len() / STRIP {
@@ -37,15 +37,16 @@ fn move_strip(around: &[&[f32; STRIP]; 4], depth: &mut [i32; STRIP], deepest: &m
     }
 }
 
-/// Calls `woken` with the place of each strip that has liquid and was dry, or that rested and from or to which something moves.
+/// Calls `woken` with the position of each strip that has liquid and was dry, or that rested and from or to which something moves.
 #[inline(always)]
 pub fn find_woken(around: &Around, depth: &[i32], [wet, moving]: [&[bool]; 2], mut woken: impl FnMut(usize)) {
-    for (place, ((strip, wet), moving)) in
+    for (position, ((strip, wet), moving)) in
         depth.as_chunks::<STRIP>().0.iter().zip(wet).zip(moving).enumerate()
     {
-        if !wet && strip.iter().fold(0, |any, depth| any | depth) != 0 || !moving && is_stirred(around, place)
+        if !wet && strip.iter().fold(0, |any, depth| any | depth) != 0
+            || !moving && is_stirred(around, position)
         {
-            woken(place);
+            woken(position);
         }
     }
 }

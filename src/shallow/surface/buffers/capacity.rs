@@ -2,7 +2,7 @@
 
 use crate::shallow::columns::grid::BOTTOMLESS;
 use crate::shallow::surface::quartets::links::{RING, Scene};
-use crate::shallow::surface::quartets::strips::places;
+use crate::shallow::surface::quartets::strips::positions;
 use crate::shallow::surface::{Columns, Counts, STRIP};
 
 /// The largest counts that the surface of any liquid in these columns can have, so that a host sizes its buffers once. Liquids that are
@@ -18,8 +18,8 @@ pub fn bound(columns: &Columns) -> Counts {
         rows.swap(0, 1);
         rows[1].iter_mut().for_each(Vec::clear);
         for strip in columns.row(row) {
-            for place in places(columns.present(strip)) {
-                let index = strip * STRIP + place;
+            for position in positions(columns.present(strip)) {
+                let index = strip * STRIP + position;
                 let [under, base, ceiling] =
                     [columns.unders(), columns.bases(), columns.ceilings()].map(|of| of[index]);
                 rows[1][columns.cell(index)[0]].push(Room {
@@ -146,8 +146,8 @@ impl Walls {
         let scene = Scene { columns, depth: &[], above: &[] };
         let mut out = Self { pairs: 0, sides: vec![0; columns.len()] };
         for strip in 0..columns.strips().len() {
-            for place in places(columns.present(strip)) {
-                let index = strip * STRIP + place;
+            for position in positions(columns.present(strip)) {
+                let index = strip * STRIP + position;
                 let ceiling = columns.ceilings()[index];
                 let is_wall = RING.map(|step| {
                     scene

@@ -31,7 +31,7 @@ impl Index for u32 {
     }
 }
 
-/// The triangles of 16 quartets side by side, whose vertices in the north are a + place and in the south c + place: each index is a + `add`,
+/// The triangles of 16 quartets side by side, whose vertices in the north are a + position and in the south c + position: each index is a + `add`,
 /// and c - a more where `south` has all bits set; the other way around where `turned` has the bit of a quartet that is turned.
 struct Pattern {
     add: [u32; PAIR * STRIP],
@@ -52,10 +52,10 @@ impl Pattern {
         let mut out = Self { add: zeros, south: zeros, turned: zeros };
         let mut at = 0;
         while at < PAIR * STRIP {
-            let (place, corner) = ((at / PAIR) as u32, at % PAIR);
-            out.add[at] = place + add[corner];
+            let (position, corner) = ((at / PAIR) as u32, at % PAIR);
+            out.add[at] = position + add[corner];
             out.south[at] = 0u32.wrapping_sub(south[corner]);
-            out.turned[at] = turned[corner] << place;
+            out.turned[at] = turned[corner] << position;
             at += 1;
         }
         out
@@ -134,10 +134,10 @@ fn write_full<I: Index>(found: &Found, flipped: bool, out: &mut [I]) -> usize {
     at
 }
 
-/// Runs of places that are set.
+/// Runs of positions that are set.
 #[inline(always)]
-fn runs(places: u16) -> impl Iterator<Item = Range<usize>> {
-    let mut left = u32::from(places);
+fn runs(positions: u16) -> impl Iterator<Item = Range<usize>> {
+    let mut left = u32::from(positions);
     std::iter::from_fn(move || {
         let low = left.trailing_zeros();
         let run = left.checked_shr(low)?.trailing_ones();
@@ -181,16 +181,16 @@ mod tests {
         for flipped in [false, true] {
             let mut out = [0u32; PAIR * STRIP];
             PATTERNS[usize::from(flipped)].put(a, c, turned, 0..PAIR * STRIP, &mut out);
-            for (place, pair) in (0u32..).zip(out.as_chunks::<PAIR>().0) {
-                let [nw, sw] = [a + place, c + place];
+            for (position, pair) in (0u32..).zip(out.as_chunks::<PAIR>().0) {
+                let [nw, sw] = [a + position, c + position];
                 let [ne, se] = [nw + 1, sw + 1];
-                let up = if turned >> place & 1 == 1 {
+                let up = if turned >> position & 1 == 1 {
                     [[nw, sw, ne], [ne, sw, se]]
                 } else {
                     [[nw, sw, se], [ne, nw, se]]
                 };
                 let expected = if flipped { up.map(|[a, b, c]| [a, c, b]) } else { up };
-                assert_eq!(pair[..], expected.concat(), "{place}");
+                assert_eq!(pair[..], expected.concat(), "{position}");
             }
         }
     }

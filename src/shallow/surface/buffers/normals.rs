@@ -19,15 +19,15 @@ impl Shown<'_> {
     /// Normal of a wet column: x to the east, y up, z to the south.
     pub fn normal(&self, found: &Found, index: usize) -> [f32; 3] {
         let (columns, scene) = (self.scene.columns, self.scene);
-        let (strip, place) = (index / STRIP, index % STRIP);
+        let (strip, position) = (index / STRIP, index % STRIP);
         let state = &found.states[strip];
-        let [west, east, north, south] = if state.rough >> place & 1 == 1 {
+        let [west, east, north, south] = if state.rough >> position & 1 == 1 {
             let beside = |step| scene.wet_beside(index, step);
             [beside([-1, 0]), beside([1, 0]), beside([0, -1]), beside([0, 1])]
         } else {
             // Full quartets link it with columns of its own layer.
-            let has = |side: usize| state.sides[side] >> place & 1 == 1;
-            let across = |side: u32| side as usize * STRIP + place;
+            let has = |side: usize| state.sides[side] >> position & 1 == 1;
+            let across = |side: u32| side as usize * STRIP + position;
             [
                 has(0).then(|| index - 1),
                 has(1).then_some(index + 1),
@@ -57,7 +57,7 @@ pub(in crate::shallow) fn upright(x: f32, z: f32) -> [f32; 3] {
 pub(in crate::shallow::surface) struct Normals {
     /// By index.
     normals: Vec<[f32; 3]>,
-    /// Of each strip, the places whose normal is known.
+    /// Of each strip, the positions whose normal is known.
     known: Vec<u16>,
 }
 

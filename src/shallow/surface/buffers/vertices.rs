@@ -271,11 +271,18 @@ impl<'a> Vertices<'a> {
 
     /// Writes the vertices of some places of a strip, with or without wet columns on their sides, from `at` on.
     #[inline(always)]
-    fn put_outer(&self, span: &Span, strip: usize, places: Range<usize>, at: usize, target: &mut Target<'_>) {
-        let run = Run { first: strip * STRIP + places.start, len: places.len() };
+    fn put_outer(
+        &self,
+        span: &Span,
+        strip: usize,
+        positions: Range<usize>,
+        at: usize,
+        target: &mut Target<'_>,
+    ) {
+        let run = Run { first: strip * STRIP + positions.start, len: positions.len() };
         if let Some(out) = &mut target.normals {
             let normals = self.outer_normals(span, strip);
-            vectors(out, at, run.len).copy_from_slice(&normals[places]);
+            vectors(out, at, run.len).copy_from_slice(&normals[positions]);
         }
         self.put_run(span, run, at, target);
     }
@@ -390,17 +397,17 @@ fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Arou
             let smooth = state.used & state.wet & !state.rough & between;
             let mut left = state.used & between;
             while left != 0 {
-                let place = left.trailing_zeros();
-                let len = (smooth >> place).trailing_ones();
+                let position = left.trailing_zeros();
+                let len = (smooth >> position).trailing_ones();
                 if len <= SHORT {
-                    let vertex = vertices.vertex(first + place as usize, normals, around);
+                    let vertex = vertices.vertex(first + position as usize, normals, around);
                     vertices.put(next, &vertex, target);
                     next += 1;
                     left &= left - 1;
                     continue;
                 }
-                let end = place + len;
-                vertices.put_outer(span, strip, place as usize..end as usize, next, target);
+                let end = position + len;
+                vertices.put_outer(span, strip, position as usize..end as usize, next, target);
                 next += len as usize;
                 left &= u16::MAX.checked_shl(end).unwrap_or(0);
             }

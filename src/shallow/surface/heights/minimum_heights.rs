@@ -205,9 +205,9 @@ impl Lifts {
             numbers.clear();
             numbers.resize(columns.len(), 0);
         }
-        for (strip, place) in now.iter().enumerate() {
-            before += old.2[before..].iter().take_while(|other| *other < place).count();
-            if old.2.get(before) == Some(place) {
+        for (strip, position) in now.iter().enumerate() {
+            before += old.2[before..].iter().take_while(|other| *other < position).count();
+            if old.2.get(before) == Some(position) {
                 let (to, from) = (strip * STRIP..(strip + 1) * STRIP, before * STRIP..(before + 1) * STRIP);
                 least[to.clone()].copy_from_slice(&old.0[from.clone()]);
                 sunk[to].copy_from_slice(&old.1[from]);
@@ -257,8 +257,8 @@ impl Area<'_> {
         for row in rows.clone() {
             for strip in columns.row(row) {
                 let first = columns.strips()[strip].at as usize * STRIP;
-                for place in (0..STRIP).filter(|place| across.contains(&(first + place))) {
-                    let index = strip * STRIP + place;
+                for position in (0..STRIP).filter(|position| across.contains(&(first + position))) {
+                    let index = strip * STRIP + position;
                     let is_column = columns.is_column(index);
                     least[index] = if is_column { self.lift(index, self.least) } else { 0 };
                     sunk[index] = if is_column { self.sink(index, self.rim) } else { 0 };
@@ -282,9 +282,9 @@ impl Area<'_> {
     /// Lifts and sinks columns for a vertex that faces up.
     fn fit(&self, at: &Vec3, numbers: [&mut [i32]; 2], out: &mut Fitted) {
         let (grid, heights) = (self.scene.columns.grid, self.scene.columns.heights);
-        let place = [f64::from(at.x), f64::from(at.z)];
-        let place = [0, 1].map(|axis| (place[axis] - grid.origin[axis]) / grid.cell - 0.5);
-        let [across, along] = [0, 1].map(|axis| self.quartets(axis, place[axis]));
+        let position = [f64::from(at.x), f64::from(at.z)];
+        let position = [0, 1].map(|axis| (position[axis] - grid.origin[axis]) / grid.cell - 0.5);
+        let [across, along] = [0, 1].map(|axis| self.quartets(axis, position[axis]));
         if across.is_empty() || along.is_empty() {
             return;
         }
@@ -292,28 +292,31 @@ impl Area<'_> {
         // A vertex on a line between quartets is in both.
         let mut triples = [const { None::<Triple> }; 16];
         let quartets = along.flat_map(|z| across.clone().map(move |x| [x, z]));
-        let found = quartets
-            .flat_map(|[x, z]| self.triples([x, z], [place[0] - x as f64, place[1] - z as f64], height));
+        let found = quartets.flat_map(|[x, z]| {
+            self.triples([x, z], [position[0] - x as f64, position[1] - z as f64], height)
+        });
         triples.iter_mut().zip(found).for_each(|(out, triple)| *out = Some(triple));
         self.fit_triples(triples.iter().flatten(), numbers, out);
     }
 
-    /// The quartets along an axis that have a cell of the box and a place: cells from the centre of the first.
-    fn quartets(&self, axis: usize, place: f64) -> Range<usize> {
+    /// The quartets along an axis that have a cell of the box and a position: cells from the centre of the first.
+    fn quartets(&self, axis: usize, position: f64) -> Range<usize> {
         let last = self.scene.columns.grid.size[axis] - 1;
         let cells = &self.cells[axis];
         let range = cells.start.saturating_sub(1)..cells.end.min(last);
-        if cells.is_empty() || range.is_empty() || !(place >= range.start as f64 && place <= range.end as f64)
+        if cells.is_empty()
+            || range.is_empty()
+            || !(position >= range.start as f64 && position <= range.end as f64)
         {
             return 0..0;
         }
-        let first = place.floor() as usize;
-        let is_between = place == first as f64;
+        let first = position.floor() as usize;
+        let is_between = position == first as f64;
         let start = if is_between { first.saturating_sub(1) } else { first };
         start.max(range.start)..(first + 1).min(range.end)
     }
 
-    /// The triangles of film in a quartet that a place within is in: at most one along each diagonal, or both on a diagonal itself.
+    /// The triangles of film in a quartet that a position within is in: at most one along each diagonal, or both on a diagonal itself.
     fn triples(&self, [x, z]: [usize; 2], [u, w]: [f64; 2], height: f64) -> impl Iterator<Item = Triple> {
         let scene = self.scene;
         let (bases, unders, ceilings) =

@@ -102,8 +102,8 @@ fn find_strips(columns: &Columns, found: &Found, rule: &Rule<'_>, heights: &mut 
 #[inline(always)]
 fn are_over(depth: &[i32; STRIP], least: i32) -> bool {
     let mut under = [0; STRIP];
-    for place in 0..STRIP {
-        under[place] = i32::from(depth[place] < least);
+    for position in 0..STRIP {
+        under[position] = i32::from(depth[position] < least);
     }
     under == [0; STRIP]
 }
@@ -111,8 +111,8 @@ fn are_over(depth: &[i32; STRIP], least: i32) -> bool {
 /// Finds the heights of a strip whose columns are all at their full height.
 #[inline(always)]
 fn find_full(base: &[i32; STRIP], depth: &[i32; STRIP], least: &[i32; STRIP], out: &mut [i32; STRIP]) {
-    for place in 0..STRIP {
-        out[place] = base[place].wrapping_add(depth[place].max(least[place]));
+    for position in 0..STRIP {
+        out[position] = base[position].wrapping_add(depth[position].max(least[position]));
     }
 }
 
@@ -123,11 +123,11 @@ fn find_strip<const FADES: bool>(
     [fade, per_fade]: [f32; 2],
     out: &mut [i32; STRIP],
 ) {
-    for place in 0..STRIP {
-        let (base, depth) = (base[place], depth[place]);
+    for position in 0..STRIP {
+        let (base, depth) = (base[position], depth[position]);
         // Never below the underside of the solid.
-        let dry = base.wrapping_sub(sunk[place]).max(under[place]);
-        let full = base.wrapping_add(depth.max(least[place]));
+        let dry = base.wrapping_sub(sunk[position]).max(under[position]);
+        let full = base.wrapping_add(depth.max(least[position]));
         let wet = if FADES {
             let share = depth as f32 * per_fade;
             let risen = dry.wrapping_add((full.wrapping_sub(dry) as f32 * share) as i32);
@@ -135,7 +135,7 @@ fn find_strip<const FADES: bool>(
         } else {
             full
         };
-        out[place] = if depth > 0 { wet } else { dry };
+        out[position] = if depth > 0 { wet } else { dry };
     }
 }
 

@@ -8,7 +8,7 @@ use crate::shallow::surface::{Columns, NONE, STRIP};
 /// A column, or an extra.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::shallow) struct Entry {
-    /// Index of the column; of an extra, count of indices + its place among the walls.
+    /// Index of the column; of an extra, count of indices + its position among the walls.
     pub id: u32,
     /// Layer of the column.
     pub layer: u32,
@@ -115,13 +115,13 @@ impl Row {
         let Self { strips, entries, ends } = self;
         entries.clear();
         for cell in 0..CELLS {
-            let place = cell % STRIP;
+            let position = cell % STRIP;
             if cells >> cell & 1 == 1 {
                 for (layer, &strip) in strips[cell / STRIP].iter().enumerate() {
-                    if columns.present(strip) >> place & 1 == 0 {
+                    if columns.present(strip) >> position & 1 == 0 {
                         break;
                     }
-                    let index = strip * STRIP + place;
+                    let index = strip * STRIP + position;
                     entries.push(Entry {
                         id: index as u32,
                         layer: layer as u32,
@@ -132,7 +132,7 @@ impl Row {
                         wet: scene.is_wet(index),
                         wall: NONE,
                     });
-                    if found.states[strip].walls >> place & 1 == 1 {
+                    if found.states[strip].walls >> position & 1 == 1 {
                         add_walls(columns, walls, entries);
                     }
                 }
@@ -145,12 +145,12 @@ impl Row {
 /// Adds the extras of the last column, which is a wall.
 fn add_walls(columns: &Columns, walls: &[Wall], entries: &mut Vec<Entry>) {
     let Some(column) = entries.len().checked_sub(1) else { return };
-    for place in walls_of(walls, entries[column].id) {
-        let wall = place as u32;
-        if walls[place].is_own {
+    for position in walls_of(walls, entries[column].id) {
+        let wall = position as u32;
+        if walls[position].is_own {
             entries[column].wall = wall;
         } else {
-            let (id, height) = (columns.len() as u32 + wall, walls[place].height);
+            let (id, height) = (columns.len() as u32 + wall, walls[position].height);
             entries.push(Entry { id, height, under: 0, ceiling: 0, wet: false, wall, ..entries[column] });
         }
     }

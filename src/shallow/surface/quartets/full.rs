@@ -18,8 +18,8 @@ fn find_wet_strips(scene: Scene<'_>, active: Option<&[bool]>, found: &mut Found)
             continue;
         }
         let mut wet = 0;
-        for (place, depth) in depth.iter().enumerate() {
-            wet |= if *depth > 0 { 1 << place } else { 0u32 };
+        for (position, depth) in depth.iter().enumerate() {
+            wet |= if *depth > 0 { 1 << position } else { 0u32 };
         }
         if wet != 0 {
             found.states[strip].wet = wet as u16;
@@ -32,31 +32,31 @@ fn find_wet_strips(scene: Scene<'_>, active: Option<&[bool]>, found: &mut Found)
     found.find_spans(columns);
 }
 
-/// 16 places, and those to the east of them: depth, base, ceiling, underside.
+/// 16 positions, and those to the east of them: depth, base, ceiling, underside.
 type Windows<'a> = [[&'a [i32; STRIP]; 2]; 4];
 
-/// Places whose quartet is linked as a whole: the highest of its heights is under the lowest ceiling, the lowest not under the highest
+/// Positions whose quartet is linked as a whole: the highest of its heights is under the lowest ceiling, the lowest not under the highest
 /// underside; and those where the sum of the heights in the north-east and south-west is the greater.
 #[inline(always)]
 fn compare([depth, base, ceiling, under]: Windows<'_>, south: Windows<'_>) -> [u16; 2] {
     let [depth_s, base_s, ceiling_s, under_s] = south;
     let (mut linked, mut greater) = (0u32, 0u32);
-    for place in 0..STRIP {
-        let north = |at: usize| base[at][place].wrapping_add(depth[at][place].max(0));
-        let south = |at: usize| base_s[at][place].wrapping_add(depth_s[at][place].max(0));
+    for position in 0..STRIP {
+        let north = |at: usize| base[at][position].wrapping_add(depth[at][position].max(0));
+        let south = |at: usize| base_s[at][position].wrapping_add(depth_s[at][position].max(0));
         let [a, b, c, d] = [north(0), north(1), south(0), south(1)];
         let least = |[n, n_east]: [&[i32; STRIP]; 2], [s, s_east]: [&[i32; STRIP]; 2]| {
-            n[place].min(n_east[place]).min(s[place].min(s_east[place]))
+            n[position].min(n_east[position]).min(s[position].min(s_east[position]))
         };
         let most = |[n, n_east]: [&[i32; STRIP]; 2], [s, s_east]: [&[i32; STRIP]; 2]| {
-            n[place].max(n_east[place]).max(s[place].max(s_east[place]))
+            n[position].max(n_east[position]).max(s[position].max(s_east[position]))
         };
         let highest = a.max(b).max(c.max(d));
         let lowest = a.min(b).min(c.min(d));
         let is_linked = (lowest >= most(under, under_s)) & (highest < least(ceiling, ceiling_s));
-        linked |= if is_linked { 1 << place } else { 0 };
+        linked |= if is_linked { 1 << position } else { 0 };
         // a + d < b + c, without overflow.
-        greater |= if a.wrapping_sub(b) < c.wrapping_sub(d) { 1 << place } else { 0 };
+        greater |= if a.wrapping_sub(b) < c.wrapping_sub(d) { 1 << position } else { 0 };
     }
     [linked as u16, greater as u16]
 }
@@ -70,7 +70,7 @@ pub(in crate::shallow::surface) fn find_full(scene: Scene<'_>, found: &mut Found
 fn find_full_spans(scene: Scene<'_>, found: &mut Found) {
     let columns = scene.columns;
     let arrays = [scene.depth, columns.bases(), columns.ceilings(), columns.unders()];
-    // The last strip has no place behind it.
+    // The last strip has no position behind it.
     let last = columns.strips().len().saturating_sub(1);
     let mut ends = [[0; STRIP + 1]; 4];
     for (end, numbers) in ends.iter_mut().zip(arrays) {
@@ -130,7 +130,7 @@ fn find_full_spans(scene: Scene<'_>, found: &mut Found) {
     }
 }
 
-/// The strips before and behind a span, in its own row and those to the north and south: places in `states`.
+/// The strips before and behind a span, in its own row and those to the north and south: positions in `states`.
 struct Corners {
     west: usize,
     east: usize,
@@ -150,19 +150,19 @@ impl Corners {
     }
 }
 
-/// Each place of a strip with the value of the place to the east; of the last, that of the strip to the east.
+/// Each position of a strip with the value of the position to the east; of the last, that of the strip to the east.
 #[inline(always)]
 fn from_east(own: u16, east: u16) -> u16 {
     own >> 1 | east << 15
 }
 
-/// Each place of a strip with the value of the place to the west.
+/// Each position of a strip with the value of the position to the west.
 #[inline(always)]
 fn from_west(own: u16, west: u16) -> u16 {
     own << 1 | west >> 15
 }
 
-/// 16 places of a strip and the one behind.
+/// 16 positions of a strip and the one behind.
 #[inline(always)]
 fn windows(arrays: [&[i32]; 4], strip: usize) -> Windows<'_> {
     let [a, b, c, d] = arrays;
@@ -193,8 +193,8 @@ fn choose([a, b, c, d]: [u16; 4], greater: u16) -> u16 {
 /// Marks the odd quartets of a strip's wet columns, of which the quartets to the south-east, south-west, north-east and north-west are full
 /// where `covered` says so.
 fn add_odd(columns: &Columns, found: &mut Found, strip: usize, covered: [u16; 4]) {
-    let place = columns.strips()[strip];
-    let (row, at) = (place.row as usize, place.at as usize);
+    let position = columns.strips()[strip];
+    let (row, at) = (position.row as usize, position.at as usize);
     let [nx, nz] = columns.grid.size;
     let wet = found.states[strip].wet;
     // Columns with a cell to the east and to the west.

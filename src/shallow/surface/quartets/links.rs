@@ -46,7 +46,7 @@ impl<'a> Scene<'a> {
     /// The column whose room holds a height in the cell at a step of -1, 0 or 1 along x and z from a column's.
     pub fn beside(self, index: usize, [dx, dz]: [i32; 2], height: i32) -> Option<usize> {
         let columns = self.columns;
-        let (strip, place) = (index / STRIP, index % STRIP);
+        let (strip, position) = (index / STRIP, index % STRIP);
         let row = match dz {
             -1 => columns.north(strip),
             1 => columns.south(strip),
@@ -54,13 +54,13 @@ impl<'a> Scene<'a> {
         };
         // Mostly it is the one of the same layer.
         if row != NONE {
-            let (row, place) = (row as usize, place as i32 + dx);
-            let strip = match place {
+            let (row, position) = (row as usize, position as i32 + dx);
+            let strip = match position {
                 -1 => columns.west(row),
                 16 => columns.east(row),
                 _ => Some(row),
             };
-            let same = strip.map(|strip| strip * STRIP + (place & 15) as usize);
+            let same = strip.map(|strip| strip * STRIP + (position & 15) as usize);
             if let Some(same) = same.filter(|&same| self.holds(same, height)) {
                 return Some(same);
             }
@@ -84,14 +84,14 @@ impl<'a> Scene<'a> {
         (self.is_wet(other) && self.holds(index, self.height(other))).then_some(other)
     }
 
-    /// The strip of the lowest layer at a row and a place along x / 16.
+    /// The strip of the lowest layer at a row and a position along x / 16.
     pub fn lowest(self, [row, at]: [usize; 2]) -> Option<usize> {
         let range = self.columns.row(row);
         let wanted = Strip { row: row as u32, layer: 0, at: at as u32 };
         self.find(wanted, range.start + at, range.start..range.end.min(range.start + at + 1))
     }
 
-    /// The strip of the layer above at the same place.
+    /// The strip of the layer above at the same position.
     pub fn above(self, strip: usize) -> Option<usize> {
         let own = self.columns.strips()[strip];
         let across = self.columns.grid.size[0].div_ceil(STRIP);

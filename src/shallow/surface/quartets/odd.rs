@@ -2,7 +2,7 @@
 
 use super::cells::{Cells, Entry};
 use super::links::Scene;
-use super::strips::{Found, places};
+use super::strips::{Found, positions};
 use super::wall::Walled;
 use crate::shallow::surface::rim::boundary::Walls;
 
@@ -146,7 +146,7 @@ pub(in crate::shallow::surface) fn find_groups(
         let odd = found.blocks[block].odd;
         found.blocks[block].searched = odd;
         search.cells.enter(scene, found, &[], block, odd);
-        for quartet in places(odd) {
+        for quartet in positions(odd) {
             let is_plain = search.find(quartet, |wall| found.add_wall(wall as usize));
             if is_plain {
                 count += search.triangles.len();
@@ -173,7 +173,7 @@ pub(in crate::shallow::surface) fn find_groups(
             return;
         }
         search.cells.enter(scene, found, &walls.list, block, walled);
-        for quartet in places(walled) {
+        for quartet in positions(walled) {
             search.walled.find(&search.cells, &walls.list, quartet, &mut search.triangles);
             search.keep(1);
             count += search.triangles.len();
@@ -212,7 +212,7 @@ pub(in crate::shallow::surface) fn each_odd_triangle(
     let mut counts = search.counts.each_ref().map(|counts| counts.iter());
     for block in found.odd.iter() {
         let quartets = found.blocks[block];
-        for quartet in places(quartets.odd) {
+        for quartet in positions(quartets.odd) {
             let kind = usize::from(quartets.walled >> quartet & 1);
             let count = counts[kind].next().map_or(0, |count| *count as usize);
             let (own, behind) = rest[kind].split_at(count);

@@ -1,8 +1,8 @@
-//! What is known of strips in a frame, a bit for each place.
+//! What is known of strips in a frame, a bit for each position.
 
 use crate::shallow::surface::{Columns, NONE, STRIP};
 
-/// A strip, with a bit for each place.
+/// A strip, with a bit for each position.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in crate::shallow::surface) struct State {
     /// Wet columns.
@@ -84,7 +84,7 @@ impl Bits {
     /// Its indices, from the least.
     #[inline(always)]
     pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
-        self.0.iter().enumerate().flat_map(|(word, &bits)| places(bits).map(move |bit| word * 64 + bit))
+        self.0.iter().enumerate().flat_map(|(word, &bits)| positions(bits).map(move |bit| word * 64 + bit))
     }
 
     /// Finds the spans of a set of strips.
@@ -110,14 +110,14 @@ impl Bits {
     }
 }
 
-/// Places of the bits that are set, from the lowest.
+/// Positions of the bits that are set, from the lowest.
 #[inline(always)]
-pub(in crate::shallow::surface) fn places(bits: impl Into<u64>) -> impl Iterator<Item = usize> {
+pub(in crate::shallow::surface) fn positions(bits: impl Into<u64>) -> impl Iterator<Item = usize> {
     let mut bits: u64 = bits.into();
     std::iter::from_fn(move || {
-        let place = bits.trailing_zeros() as usize;
+        let position = bits.trailing_zeros() as usize;
         bits &= bits.wrapping_sub(1);
-        (place < 64).then_some(place)
+        (position < 64).then_some(position)
     })
 }
 
@@ -218,9 +218,9 @@ impl Found {
 
     /// The vertex of a column that has one.
     #[inline(always)]
-    pub fn vertex(&self, strip: usize, place: usize) -> u32 {
+    pub fn vertex(&self, strip: usize, position: usize) -> u32 {
         let state = &self.states[strip];
-        state.first + count(state.used & ((1 << place) - 1))
+        state.first + count(state.used & ((1 << position) - 1))
     }
 }
 

@@ -18,7 +18,7 @@ pub(in crate::shallow::surface) struct Walled {
     links: Vec<u64>,
     /// Words of an entry.
     words: usize,
-    /// Wet entries; entries that have a wall, with its place among the walls.
+    /// Wet entries; entries that have a wall, with its position among the walls.
     wet: Vec<usize>,
     at_walls: Vec<(usize, usize)>,
 }

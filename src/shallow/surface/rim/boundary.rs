@@ -1,7 +1,7 @@
 //! Where the liquid ends: walls and the extra vertices within them, and the means that dry and extra vertices take (thesis 4.2.3).
 
 use crate::shallow::surface::quartets::links::{RING, Scene, are_near, cell_at};
-use crate::shallow::surface::quartets::strips::{Found, places};
+use crate::shallow::surface::quartets::strips::{Found, positions};
 use crate::shallow::surface::{NONE, STRIP};
 
 /// The surface of linked wet columns that ends at a column's solid.
@@ -9,7 +9,7 @@ use crate::shallow::surface::{NONE, STRIP};
 pub(in crate::shallow::surface) struct Wall {
     /// Index of the column.
     pub column: u32,
-    /// The wet columns whose surface ends there, by place in the ring of cells around, or [`NONE`].
+    /// The wet columns whose surface ends there, by position in the ring of cells around, or [`NONE`].
     pub members: [u32; 8],
     /// They take the column's own vertex, which is dry and lies between columns linked with them; else an extra one.
     pub is_own: bool,
@@ -26,7 +26,7 @@ impl Wall {
     }
 }
 
-/// Places of a column's walls in a list in order of columns.
+/// Positions of a column's walls in a list in order of columns.
 pub(in crate::shallow::surface) fn walls_of(list: &[Wall], column: u32) -> std::ops::Range<usize> {
     let first = list.partition_point(|wall| wall.column < column);
     let count = list[first..].iter().take_while(|wall| wall.column == column).count();
@@ -42,7 +42,7 @@ pub(in crate::shallow::surface) struct Walls {
     pub list: Vec<Wall>,
     /// Whether a triangle has the extra vertex.
     pub used: Vec<bool>,
-    /// Columns around one whose surface ends there: place in the ring, index; and whether they have a wall.
+    /// Columns around one whose surface ends there: position in the ring, index; and whether they have a wall.
     nodes: Vec<(usize, u32, bool)>,
 }
 
@@ -63,8 +63,8 @@ impl Walls {
     /// Finds what ends at the columns that are marked as walls.
     pub fn find(&mut self, scene: Scene<'_>, found: &Found) {
         for strip in found.near.iter() {
-            for place in places(found.states[strip].walls) {
-                self.find_at(scene, strip * STRIP + place);
+            for position in positions(found.states[strip].walls) {
+                self.find_at(scene, strip * STRIP + position);
             }
         }
         self.used.resize(self.list.len(), false);
@@ -143,7 +143,7 @@ impl Walls {
     }
 }
 
-/// The wet columns that a vertex takes the mean of: place in the ring, index.
+/// The wet columns that a vertex takes the mean of: position in the ring, index.
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Around(Vec<(usize, usize)>);
 

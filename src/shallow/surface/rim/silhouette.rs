@@ -32,7 +32,7 @@ impl Silhouette {
         if self.hems.is_empty() {
             return Ok(&[]);
         }
-        self.place(columns);
+        self.position(columns);
         self.find_cells(columns.grid, positions);
         for face in faces {
             let corners = face.map(|vertex| vertex as usize);
@@ -72,7 +72,7 @@ impl Silhouette {
     }
 
     /// Puts the hems in order, and counts those of each cell.
-    fn place(&mut self, columns: &Columns) {
+    fn position(&mut self, columns: &Columns) {
         let Self { hems, ends, crowd, .. } = self;
         let cell = |hem: &Hem| columns.cell(hem.column as usize);
         hems.sort_unstable_by_key(|hem| {
@@ -85,12 +85,12 @@ impl Silhouette {
     }
 
     fn find_cells(&mut self, grid: Grid, positions: &[Vec3]) {
-        let place = |axis: usize, at: f32| {
+        let position = |axis: usize, at: f32| {
             let along = (f64::from(at) - grid.origin[axis]) / grid.cell - 0.5;
             along.floor().clamp(-2.0, grid.size[axis] as f64) as i32
         };
         self.cells.clear();
-        self.cells.extend(positions.iter().map(|at| [place(0, at.x), place(1, at.z)]));
+        self.cells.extend(positions.iter().map(|at| [position(0, at.x), position(1, at.z)]));
     }
 
     /// Looks how far a triangle reaches from the hems of a box of cells.

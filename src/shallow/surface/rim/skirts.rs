@@ -7,7 +7,7 @@ use super::ledges::{Hem, Ledges};
 use crate::shallow::surface::buffers::vertices::Vertices;
 use crate::shallow::surface::quartets::links::{RING, Scene, cell_at};
 use crate::shallow::surface::quartets::odd::Search;
-use crate::shallow::surface::quartets::strips::{Found, places, some};
+use crate::shallow::surface::quartets::strips::{Found, positions, some};
 use crate::shallow::surface::{Columns, Indices, NONE, STRIP, Target};
 
 /// The skirts of a surface; keeps its memory.
@@ -15,15 +15,15 @@ use crate::shallow::surface::{Columns, Indices, NONE, STRIP, Target};
 pub(in crate::shallow::surface) struct Skirts {
     /// Edges of odd quartets and of full ones beside them, between wet columns, as triangles have them.
     edges: Vec<[u32; 2]>,
-    /// Of each column the ways that such edges lead from it: a bit for each place of the ring of cells around. 0 between surfaces.
+    /// Of each column the ways that such edges lead from it: a bit for each position of the ring of cells around. 0 between surfaces.
     ways: Vec<u8>,
     /// The edges that have a skirt.
     open: Vec<[u32; 2]>,
     /// Hems, in order of their vertices, and the first of these.
     hems: Vec<Hem>,
     first: u32,
-    /// Of each column the place of its hem, or [`NONE`], as all are between surfaces.
-    places: Vec<u32>,
+    /// Of each column the position of its hem, or [`NONE`], as all are between surfaces.
+    positions: Vec<u32>,
 }
 
 impl Skirts {
@@ -39,13 +39,13 @@ impl Skirts {
         let len = scene.columns.len();
         self.forget();
         self.first = first;
-        let Self { edges, ways, open, hems, places, .. } = self;
+        let Self { edges, ways, open, hems, positions, .. } = self;
         let Some(ledges) = ledges else { return [0; 2] };
         if ways.len() != len {
             ways.clear();
             ways.resize(len, 0);
-            places.clear();
-            places.resize(len, NONE);
+            positions.clear();
+            positions.resize(len, NONE);
         }
         // With as many columns nothing is allocated any more: a column has eight ways at most.
         edges.reserve(8 * ledges.most);
@@ -73,12 +73,12 @@ impl Skirts {
             ways[edge[0] as usize] &= !(1 << at);
             open.push(*edge);
             for (end, side) in edge.iter().zip(sides(at)) {
-                let place = &mut places[*end as usize];
-                if *place == NONE {
-                    *place = hems.len() as u32;
+                let position = &mut positions[*end as usize];
+                if *position == NONE {
+                    *position = hems.len() as u32;
                     hems.push(Hem { column: *end, sides: [None; 4], rise: 0.0 });
                 }
-                hems[*place as usize].sides[usize::from(side)] = Some(0.0);
+                hems[*position as usize].sides[usize::from(side)] = Some(0.0);
             }
         }
         edges.iter().for_each(|[from, _]| ways[*from as usize] = 0);
@@ -111,7 +111,7 @@ impl Skirts {
         let mut out = out.as_chunks_mut::<3>().0.iter_mut();
         for edge in &self.open {
             let [a, b] = edge.map(|end| found.vertex(end as usize / STRIP, end as usize % STRIP));
-            let [c, d] = edge.map(|end| self.first + self.places[end as usize]);
+            let [c, d] = edge.map(|end| self.first + self.positions[end as usize]);
             for (corners, out) in [[b, a, c], [b, c, d]].into_iter().zip(&mut out) {
                 let [p, q, r] = corners;
                 *out = if flipped { [p, r, q] } else { corners }.map(&index);
@@ -121,14 +121,14 @@ impl Skirts {
 
     /// Forgets the surface before.
     fn forget(&mut self) {
-        self.hems.iter().for_each(|hem| self.places[hem.column as usize] = NONE);
+        self.hems.iter().for_each(|hem| self.positions[hem.column as usize] = NONE);
         self.edges.clear();
         self.open.clear();
         self.hems.clear();
     }
 }
 
-/// Place in the ring of cells around a column where another one is.
+/// Position in the ring of cells around a column where another one is.
 fn way(columns: &Columns, [from, to]: [u32; 2]) -> Option<u8> {
     if from == NONE || to == NONE {
         return None;
@@ -156,10 +156,10 @@ fn ends_within(scene: Scene<'_>, edge: [u32; 2], way: u8) -> bool {
 fn edges_of_full(scene: Scene<'_>, found: &Found, mut add: impl FnMut([u32; 2])) {
     let columns = scene.columns;
     let full = |strip: Option<usize>| strip.map_or(0, |strip| found.states[strip].full);
-    // A column at a place of a strip, or the first one of the strip to the east.
-    let at = |strip: usize, place: usize| match place {
+    // A column at a position of a strip, or the first one of the strip to the east.
+    let at = |strip: usize, position: usize| match position {
         STRIP => columns.east(strip).map(|east| (east * STRIP) as u32),
-        _ => Some((strip * STRIP + place) as u32),
+        _ => Some((strip * STRIP + position) as u32),
     };
     let mut join = |from: Option<u32>, to: Option<u32>| {
         if let (Some(from), Some(to)) = (from, to) {
@@ -174,24 +174,24 @@ fn edges_of_full(scene: Scene<'_>, found: &Found, mut add: impl FnMut([u32; 2]))
         // To the north of a quartet, and to its south.
         for strip in row.checked_sub(1).into_iter().flat_map(layers) {
             let edge = some(columns.south(strip));
-            for place in places(full(Some(strip)) & searched & !full(edge)) {
-                join(edge.and_then(|edge| at(edge, place)), edge.and_then(|edge| at(edge, place + 1)));
+            for position in positions(full(Some(strip)) & searched & !full(edge)) {
+                join(edge.and_then(|edge| at(edge, position)), edge.and_then(|edge| at(edge, position + 1)));
             }
         }
         for strip in layers(row + 1) {
-            for place in places(full(Some(strip)) & searched & !full(some(columns.north(strip)))) {
-                join(at(strip, place + 1), at(strip, place));
+            for position in positions(full(Some(strip)) & searched & !full(some(columns.north(strip)))) {
+                join(at(strip, position + 1), at(strip, position));
             }
         }
         for strip in layers(row) {
             let (own, south) = (full(Some(strip)), some(columns.south(strip)));
             let west = own << 1 | full(columns.west(strip)) >> 15;
-            for place in places(west & searched & !own) {
-                join(south.and_then(|south| at(south, place)), at(strip, place));
+            for position in positions(west & searched & !own) {
+                join(south.and_then(|south| at(south, position)), at(strip, position));
             }
             let east = own >> 1 & 0x7fff & searched & !own;
-            for place in places(east) {
-                join(at(strip, place + 1), south.and_then(|south| at(south, place + 1)));
+            for position in positions(east) {
+                join(at(strip, position + 1), south.and_then(|south| at(south, position + 1)));
             }
         }
         // Over the block's east side, where there may be no strip of the layer in it.

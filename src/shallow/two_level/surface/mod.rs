@@ -156,7 +156,7 @@ fn part<'t>(target: &'t mut Target<'_>, first: usize) -> Target<'t> {
     }
 }
 
-/// Writes vertex indices from a place on.
+/// Writes vertex indices from a position on.
 fn put_indices(indices: impl Iterator<Item = u32>, first: usize, out: &mut Indices<'_>) {
     match out {
         Indices::None => {}

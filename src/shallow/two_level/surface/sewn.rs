@@ -144,12 +144,12 @@ impl Sewn {
             if !triangle.iter().any(|id| stitches.sewn.binary_search(id).is_ok()) {
                 continue;
             }
-            let place = |id: u32| {
+            let position = |id: u32| {
                 let sewn = stitches.sewn.binary_search(&id).map(|at| self.heights[at]);
                 let [x, z] = all.middle(id);
                 [x, unit * sewn.unwrap_or_else(|_| f64::from(all.height(id))), z]
             };
-            let [a, b, c] = triangle.map(place);
+            let [a, b, c] = triangle.map(position);
             let [u, v] = [b, c].map(|end| [0, 1, 2].map(|axis| end[axis] - a[axis]));
             let normal = [0, 1, 2].map(|axis| {
                 let [next, last] = [(axis + 1) % 3, (axis + 2) % 3];

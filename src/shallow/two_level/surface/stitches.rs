@@ -67,8 +67,8 @@ impl Stitches {
         let vertex = |id: u32| {
             let end = usize::from(id >= first);
             let own = &columns[end][..both[end].vertices - both[end].extras];
-            let place = own.binary_search(&(id - [0, first][end])).ok()?;
-            Some(([0, both[0].vertices][end] + place) as u32)
+            let position = own.binary_search(&(id - [0, first][end])).ok()?;
+            Some(([0, both[0].vertices][end] + position) as u32)
         };
         sewn.extend(triangles.iter().flatten().filter(|id| vertex(**id).is_none()));
         sewn.sort_unstable();
@@ -141,7 +141,7 @@ fn each_piece(detail: &Detail, mut see: impl FnMut(Piece)) {
     for (axis, way) in sides {
         let Some(across) = outer(axis, way) else { continue };
         let along = &near[1 - axis];
-        // A place of a piece: before or behind along the edge, and fine or coarse.
+        // A position of a piece: before or behind along the edge, and fine or coarse.
         let corner = |is_behind: bool, is_coarse: bool| {
             let bits = [is_coarse == (way > 0), is_behind];
             let [x, z] = if axis == 0 { bits } else { [bits[1], bits[0]] };

@@ -41,15 +41,15 @@ impl Claims {
         }
         let claim = |object: &&Object<'_>| {
             let motion = object.body.motion();
-            let (mut meshes, mut places) = (Vec::new(), Vec::new());
+            let (mut meshes, mut positions) = (Vec::new(), Vec::new());
             for moment in 0..MOMENTS {
                 let part = f64::from(moment) / f64::from(MOMENTS - 1);
                 let mut pose = Vec::new();
                 motion.pose(from + (to - from) * part, &mut pose)?;
-                places.extend(bounds(&pose));
+                positions.extend(bounds(&pose));
                 meshes.push(Shell::at_rest(motion.triangles().to_vec(), pose));
             }
-            Ok(Claim { share: share(object), meshes, bounds: bounds(&places) })
+            Ok(Claim { share: share(object), meshes, bounds: bounds(&positions) })
         };
         Ok(Self::Each(removing.iter().map(claim).collect::<Result<_>>()?))
     }
@@ -79,13 +79,13 @@ pub struct ClaimsHere<'a> {
 
 impl ClaimsHere<'_> {
     /// Share of the snow at a position (m) that becomes grains.
-    pub fn share(&self, place: DVec3) -> f64 {
+    pub fn share(&self, position: DVec3) -> f64 {
         let mut best = (f64::INFINITY, self.share);
         for claim in &self.claims {
             for mesh in &claim.meshes {
                 // Only what is nearer than the best so far.
                 if let Some(distance) =
-                    mesh.distance(place, best.0.min(FARTHEST)).filter(|near| *near < best.0)
+                    mesh.distance(position, best.0.min(FARTHEST)).filter(|near| *near < best.0)
                 {
                     best = (distance, claim.share);
                 }

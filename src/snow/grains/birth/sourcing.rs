@@ -156,7 +156,7 @@ fn lost(old: &Probe<'_>, new: &Probe<'_>, cell: f32) -> f64 {
 /// A position where a grain may be created.
 struct Site {
     hash: u64,
-    place: DVec3,
+    position: DVec3,
     /// Share of the snow there that becomes grains.
     share: f64,
     /// Sites are chosen in ascending order of this random number, which makes the choice proportional to the shares
@@ -165,9 +165,9 @@ struct Site {
 }
 
 impl Site {
-    fn new(hash: u64, place: DVec3, share: f64) -> Self {
+    fn new(hash: u64, position: DVec3, share: f64) -> Self {
         let random = (hash >> 11) as f64 / (1u64 << 53) as f64;
-        Self { hash, place, share, turn: -libm::log1p(-random) / share }
+        Self { hash, position, share, turn: -libm::log1p(-random) / share }
     }
 }
 
@@ -189,7 +189,7 @@ impl Sourcing {
         volume * PACKING / (std::f64::consts::PI / 6.0 * self.diameter.powi(3))
     }
 
-    /// Memory (bytes) of [`Sourcing::places`] for the sites of `blocks` blocks with voxels of `cell` m.
+    /// Memory (bytes) of [`Sourcing::positions`] for the sites of `blocks` blocks with voxels of `cell` m.
     pub fn bytes(&self, blocks: usize, cell: f64) -> u64 {
         let sites = (cell / self.diameter).powi(3) * VOXELS as f64 * PACKING * 6.0 / std::f64::consts::PI;
         (blocks as f64 * sites * size_of::<Site>() as f64) as u64
@@ -200,7 +200,7 @@ impl Sourcing {
     ///
     /// # Errors
     /// When a grid cannot be read.
-    pub fn places(
+    pub fn positions(
         &self,
         [before, after]: [&FloatGrid; 2],
         removals: &[Removal],
@@ -221,8 +221,8 @@ impl Sourcing {
                 let low = DVec3::from(removal.origin.map(|at| (f64::from(at) - 0.5) * cell));
                 let high = low + DVec3::repeat(DIM as f64 * cell);
                 let claims = self.claims.in_box(&[low, high]);
-                let mut sites = self.sites(removal.origin, cell, windows, |place| claims.share(place));
-                sites.retain(|site| !is_behind(site.place));
+                let mut sites = self.sites(removal.origin, cell, windows, |position| claims.share(position));
+                sites.retain(|site| !is_behind(site.position));
                 let share = match sites.len() {
                     0 => claims.share((low + high) * 0.5),
                     count => sites.iter().map(|site| site.share).sum::<f64>() / count as f64,
@@ -237,7 +237,7 @@ impl Sourcing {
             let count = (paid.floor().max(0.0) as usize).min(sites.len());
             // A random choice that does not depend on the order of computation.
             sites.sort_unstable_by(|a, b| a.turn.total_cmp(&b.turn).then(a.hash.cmp(&b.hash)));
-            out.extend(sites[..count].iter().map(|site| site.place));
+            out.extend(sites[..count].iter().map(|site| site.position));
             let left = paid - count as f64;
             if left != 0.0 {
                 owed.insert(removal.origin, left);
@@ -269,11 +269,11 @@ impl Sourcing {
                     let hash = hash(self.seed, self.frame, [x, y, z]);
                     let shift = [0, 21, 42]
                         .map(|bit| ((hash >> bit & 0x1f_ffff) as f64 / 1_048_576.0 - 1.0) * JITTER * apart);
-                    let place =
+                    let position =
                         DVec3::new(x as f64 * half, y as f64 * half, z as f64 * half) + DVec3::from(shift);
-                    let at = [place.x / cell, place.y / cell, place.z / cell];
+                    let at = [position.x / cell, position.y / cell, position.z / cell];
                     if before.sample(at).0 < 0.0 && after.sample(at).0 > 0.0 {
-                        out.push(Site::new(hash, place, share(place)));
+                        out.push(Site::new(hash, position, share(position)));
                     }
                 }
             }

@@ -99,15 +99,15 @@ impl<'a> Seen<'a> {
     }
 
     /// Distance (diameters) of a member of the block of an index from the surface; none where no surface is near the block.
-    pub fn distance(&self, index: usize, at: At, place: V) -> Option<f32> {
+    pub fn distance(&self, index: usize, at: At, position: V) -> Option<f32> {
         let patch = self.patches.get(index)?.as_ref().filter(|patch| !patch.values.is_empty())?;
-        Some(patch.sample(self.voxel(at, place)).0 / self.diameter as f32)
+        Some(patch.sample(self.voxel(at, position)).0 / self.diameter as f32)
     }
 
-    /// A place in a block, in voxels.
-    fn voxel(&self, at: At, place: V) -> [f64; 3] {
+    /// A position in a block, in voxels.
+    fn voxel(&self, at: At, position: V) -> [f64; 3] {
         let scale = self.diameter / self.field.grid.voxel_size();
-        [0, 1, 2].map(|axis| (f64::from(at[axis]) * f64::from(EDGE) + f64::from(place[axis])) * scale)
+        [0, 1, 2].map(|axis| (f64::from(at[axis]) * f64::from(EDGE) + f64::from(position[axis])) * scale)
     }
 
     fn touch(&self, block: &Block, slot: u32, row: &Row, patch: &Patch, reach: f32) -> Option<Touch> {
@@ -115,7 +115,7 @@ impl<'a> Seen<'a> {
         if patch.least / self.diameter as f32 > near {
             return None;
         }
-        let (distance, gradient) = patch.sample(self.voxel(block.at, row.place));
+        let (distance, gradient) = patch.sample(self.voxel(block.at, row.position));
         let distance = distance / self.diameter as f32;
         if distance > near {
             return None;
@@ -127,7 +127,7 @@ impl<'a> Seen<'a> {
             grain: slot,
             collider: BASE,
             normal,
-            offset: dot(normal, row.place) - (distance - 0.5),
+            offset: dot(normal, row.position) - (distance - 0.5),
             friction: self.field.friction,
             ..Touch::default()
         })

@@ -25,27 +25,27 @@ pub const RIM_CORNER: u8 = 3;
 impl Ground {
     /// The ground of a mesh (m).
     pub fn new(mesh: &TriMesh) -> Self {
-        let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
-        let sides = Sides::of(&mesh.triangles, &places);
-        let mut triangles = sides.turned(&mesh.triangles, &places);
-        if sides.is_closed() && six_volumes(&triangles, &places) < 0.0
-            || !sides.is_closed() && area_up(&triangles, &places) < 0.0
+        let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
+        let sides = Sides::of(&mesh.triangles, &positions);
+        let mut triangles = sides.turned(&mesh.triangles, &positions);
+        if sides.is_closed() && six_volumes(&triangles, &positions) < 0.0
+            || !sides.is_closed() && area_up(&triangles, &positions) < 0.0
         {
             triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
-        let rims = |triangles: &[[u32; 3]]| Sides::of(triangles, &places).rims(triangles.len());
-        Self { shell: Shell::in_front(FRICTION, triangles, rims, places.clone()) }
+        let rims = |triangles: &[[u32; 3]]| Sides::of(triangles, &positions).rims(triangles.len());
+        Self { shell: Shell::in_front(FRICTION, triangles, rims, positions.clone()) }
     }
 
     /// Whether a mesh bounds a solid, so that it can be ground: each of its edges lies between two faces.
     pub fn is_solid(mesh: &TriMesh) -> bool {
-        let places: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast()).collect();
-        !mesh.triangles.is_empty() && Sides::of(&mesh.triangles, &places).is_closed()
+        let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
+        !mesh.triangles.is_empty() && Sides::of(&mesh.triangles, &positions).is_closed()
     }
 
     /// Whether a position (m) lies behind it, at most `within` (m) deep.
-    pub fn is_behind(&self, place: DVec3, within: f64) -> bool {
-        self.shell.is_behind(place, within)
+    pub fn is_behind(&self, position: DVec3, within: f64) -> bool {
+        self.shell.is_behind(position, within)
     }
 
     /// Its collider.
@@ -74,8 +74,8 @@ struct Side {
 }
 
 impl Sides {
-    fn of(triangles: &[[u32; 3]], places: &[DVec3]) -> Self {
-        let same = Weld::of(places, triangles).firsts;
+    fn of(triangles: &[[u32; 3]], positions: &[DVec3]) -> Self {
+        let same = Weld::of(positions, triangles).firsts;
         let side = |(index, triangle): (usize, &[u32; 3])| {
             let ends = triangle.map(|vertex| same[vertex as usize]);
             [0, 1, 2].map(|corner: usize| {
@@ -101,7 +101,7 @@ impl Sides {
     }
 
     /// The triangles, turned so that neighbours agree, as most of the area of each part was.
-    fn turned(&self, triangles: &[[u32; 3]], places: &[DVec3]) -> Vec<[u32; 3]> {
+    fn turned(&self, triangles: &[[u32; 3]], positions: &[DVec3]) -> Vec<[u32; 3]> {
         let pairs = self.edges().filter_map(|sides| match sides {
             [a, b] => Some((a.triangle, b.triangle, a.runs_up == b.runs_up)),
             _ => None,
@@ -133,7 +133,7 @@ impl Sides {
                 }
             }
             let area = |triangle: &usize| {
-                let [a, b, c] = triangles[*triangle].map(|vertex| places[vertex as usize]);
+                let [a, b, c] = triangles[*triangle].map(|vertex| positions[vertex as usize]);
                 (b - a).cross(&(c - a)).norm()
             };
             let is_turned = |triangle: &&usize| turns[**triangle] == Some(true);
@@ -173,20 +173,20 @@ impl Sides {
 }
 
 /// Six times the volume (m3) of a solid whose faces run counter-clockwise seen from outside.
-fn six_volumes(triangles: &[[u32; 3]], places: &[DVec3]) -> f64 {
+fn six_volumes(triangles: &[[u32; 3]], positions: &[DVec3]) -> f64 {
     // Relative to a position of its own, so that no precision is lost far from the world's origin.
-    let origin = places.first().copied().unwrap_or_default();
+    let origin = positions.first().copied().unwrap_or_default();
     let six = |triangle: &[u32; 3]| {
-        let [a, b, c] = triangle.map(|vertex| places[vertex as usize] - origin);
+        let [a, b, c] = triangle.map(|vertex| positions[vertex as usize] - origin);
         a.dot(&b.cross(&c))
     };
     triangles.iter().map(six).sum()
 }
 
 /// Twice the area (m2) that faces up, less what faces down, seen from above.
-fn area_up(triangles: &[[u32; 3]], places: &[DVec3]) -> f64 {
+fn area_up(triangles: &[[u32; 3]], positions: &[DVec3]) -> f64 {
     let up = |triangle: &[u32; 3]| {
-        let [a, b, c] = triangle.map(|vertex| places[vertex as usize]);
+        let [a, b, c] = triangle.map(|vertex| positions[vertex as usize]);
         (b - a).cross(&(c - a)).y
     };
     triangles.iter().map(up).sum()

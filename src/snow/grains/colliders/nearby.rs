@@ -17,7 +17,7 @@ pub struct Nearby {
     /// Leaves in reach of the last query, and the squares of the distances to their boxes (m2).
     reached: Vec<(u32, f32)>,
     /// Bounding box of the positions, and the distance from them within which surfaces are known (m).
-    places: [DVec3; 2],
+    positions: [DVec3; 2],
     far: f64,
     /// The boxes are clamped to this one (m).
     within: [DVec3; 2],
@@ -43,7 +43,7 @@ impl Nearby {
         self.boxes.clear();
         self.triangles.clear();
         (self.within, self.middle) = (bounds, (bounds[0] + bounds[1]) * 0.5);
-        (self.places, self.far) = ([*low, *high], within);
+        (self.positions, self.far) = ([*low, *high], within);
         shell.for_each_leaf(&[*low, *high], within, |leaf, bounds, way| self.push(leaf, bounds, way));
     }
 
@@ -67,12 +67,12 @@ impl Nearby {
 
     /// The nearest point of the mesh within a distance (m) plus its displacement in the sub-step. Queries the whole mesh
     /// outside the range of [`Nearby::find`].
-    pub fn nearest(&mut self, shell: &Shell, place: DVec3, within: f64) -> Option<Nearest> {
-        let [low, high] = &self.places;
-        if within > self.far || !(*low <= place && place <= *high) {
-            return shell.nearest(place, within);
+    pub fn nearest(&mut self, shell: &Shell, position: DVec3, within: f64) -> Option<Nearest> {
+        let [low, high] = &self.positions;
+        if within > self.far || !(*low <= position && position <= *high) {
+            return shell.nearest(position, within);
         }
-        let about = place - self.middle;
+        let about = position - self.middle;
         let about = [about.x as f32, about.y as f32, about.z as f32];
         let Self { which, boxes, triangles, reached, middle, .. } = self;
         let room = (self.within[1] - self.within[0]).max();
@@ -87,10 +87,10 @@ impl Nearby {
                 let triangles =
                     triangles[index].get_or_insert_with(|| Triangles::of(shell, leaf, *middle, room));
                 let way = f64::from(boxes[index / LANES].ways.0[index % LANES]);
-                triangles.compare(shell, leaf, (place, about), within + way, &mut best);
+                triangles.compare(shell, leaf, (position, about), within + way, &mut best);
             }
         }
-        best.found.map(|found| shell.resolve(found, place))
+        best.found.map(|found| shell.resolve(found, position))
     }
 }
 
@@ -117,8 +117,8 @@ impl Triangles {
         let mut corners = [[Lanes::all(FAR); 3]; 3];
         let mut largest = 0.0f64;
         for (lane, triangle) in shell.leaf_corners(leaf).enumerate() {
-            for (corner, place) in corners.iter_mut().zip(triangle) {
-                let about = place - middle;
+            for (corner, position) in corners.iter_mut().zip(triangle) {
+                let about = position - middle;
                 largest = largest.max(about.amax());
                 for axis in 0..3 {
                     corner[axis].0[lane] = about[axis] as f32;
@@ -136,7 +136,7 @@ impl Triangles {
         &self,
         shell: &Shell,
         leaf: u32,
-        (place, about): (DVec3, [f32; 3]),
+        (position, about): (DVec3, [f32; 3]),
         reach: f64,
         best: &mut Best,
     ) {
@@ -156,7 +156,7 @@ impl Triangles {
                 lane = if squares.0[other] < squares.0[lane] { other } else { lane };
                 others &= others - 1;
             }
-            shell.compare(leaf as usize * LANES + lane, place, square, best);
+            shell.compare(leaf as usize * LANES + lane, position, square, best);
             left &= near(best) & !(1 << lane);
         }
     }
@@ -191,17 +191,17 @@ fn prepare([a, b, c]: &[[Lanes; 3]; 3]) -> Triangles {
     }
 }
 
-fn squares(triangles: &Triangles, place: [f32; 3]) -> Lanes {
-    dispatch!(squares_of(triangles: &Triangles, place: [f32; 3]) -> Lanes)
+fn squares(triangles: &Triangles, position: [f32; 3]) -> Lanes {
+    dispatch!(squares_of(triangles: &Triangles, position: [f32; 3]) -> Lanes)
 }
 
 /// Squared distances (m2) of triangles from a position.
 #[inline(always)]
-fn squares_of(triangles: &Triangles, place: [f32; 3]) -> Lanes {
+fn squares_of(triangles: &Triangles, position: [f32; 3]) -> Lanes {
     let Triangles { corner, sides: [ab, ac], inverse, weights, normal, .. } = triangles;
-    let place = [Lanes::all(place[0]), Lanes::all(place[1]), Lanes::all(place[2])];
+    let position = [Lanes::all(position[0]), Lanes::all(position[1]), Lanes::all(position[2])];
     let (zero, one) = (Lanes::all(0.0), Lanes::all(1.0));
-    let from = minus(&place, corner);
+    let from = minus(&position, corner);
     let (first, second) = (side(&from, ab, inverse[0]), side(&from, ac, inverse[1]));
     let third = side(&minus(&from, ab), &minus(ac, ab), inverse[2]);
     let outside = first.min(second).min(third);
@@ -229,9 +229,9 @@ fn weight(
 
 /// Squared distances (m2) of edges from positions relative to the start of each edge.
 #[inline(always)]
-fn side(place: &[Lanes; 3], side: &[Lanes; 3], inverse: Lanes) -> Lanes {
-    let along = (dot(place, side) * inverse).max(Lanes::all(0.0)).min(Lanes::all(1.0));
-    let off = [place[0] - along * side[0], place[1] - along * side[1], place[2] - along * side[2]];
+fn side(position: &[Lanes; 3], side: &[Lanes; 3], inverse: Lanes) -> Lanes {
+    let along = (dot(position, side) * inverse).max(Lanes::all(0.0)).min(Lanes::all(1.0));
+    let off = [position[0] - along * side[0], position[1] - along * side[1], position[2] - along * side[2]];
     dot(&off, &off)
 }
 
@@ -250,19 +250,19 @@ fn cross(a: &[Lanes; 3], b: &[Lanes; 3]) -> [Lanes; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-fn reach(boxes: &[Boxes], place: [f32; 3], within: f32, out: &mut Vec<(u32, f32)>) {
-    dispatch!(reach_of(boxes: &[Boxes], place: [f32; 3], within: f32, out: &mut Vec<(u32, f32)>))
+fn reach(boxes: &[Boxes], position: [f32; 3], within: f32, out: &mut Vec<(u32, f32)>) {
+    dispatch!(reach_of(boxes: &[Boxes], position: [f32; 3], within: f32, out: &mut Vec<(u32, f32)>))
 }
 
 /// The boxes within a distance (m), plus their displacement, of a position, with the squares of their distances (m2).
 #[inline(always)]
-fn reach_of(boxes: &[Boxes], place: [f32; 3], within: f32, out: &mut Vec<(u32, f32)>) {
+fn reach_of(boxes: &[Boxes], position: [f32; 3], within: f32, out: &mut Vec<(u32, f32)>) {
     out.clear();
     for (first, Boxes { sides, ways }) in (0..).step_by(LANES).zip(boxes) {
         let zero = Lanes::all(0.0);
         let mut square = zero;
         for (axis, [low, high]) in sides.iter().enumerate() {
-            let at = Lanes::all(place[axis]);
+            let at = Lanes::all(position[axis]);
             let beyond = (*low - at).max(at - *high).max(zero);
             square = square + beyond * beyond;
         }
@@ -282,17 +282,17 @@ mod tests {
 
     /// Triangles of all shapes about the origin: slivers, some without area, and one that is far larger than the others.
     fn shell(random: &mut impl FnMut() -> f64) -> Shell {
-        let mut places = Vec::new();
+        let mut positions = Vec::new();
         for index in 0..90 {
             let first = DVec3::new(random(), random(), random());
             let size: f64 = [0.3, 1.0e-3, 0.0, 200.0][if index == 89 { 3 } else { index % 3 }];
             let along = DVec3::new(random(), random(), random()) * size.max(0.2);
             let across = DVec3::new(random(), random(), random()) * size;
-            places.extend([first, first + along, first + along * random() + across]);
+            positions.extend([first, first + along, first + along * random() + across]);
         }
         let triangles = (0..90).map(|index| [3 * index, 3 * index + 1, 3 * index + 2]).collect();
-        let mut shell = Shell::new(0.0, triangles, false, places.clone());
-        shell.follow(&places);
+        let mut shell = Shell::new(0.0, triangles, false, positions.clone());
+        shell.follow(&positions);
         shell
     }
 
@@ -311,10 +311,10 @@ mod tests {
             let within = 0.15 * (random() + 1.0);
             nearby.find(&shell, &[middle - corner, middle + corner], within);
             for _ in 0..200 {
-                let place = middle + DVec3::new(random(), random(), random()) * 0.2;
-                let expected = shell.nearest(place, within).map(|nearest| nearest.square);
-                let nearest = nearby.nearest(&shell, place, within).map(|nearest| nearest.square);
-                assert_eq!(nearest.is_some(), expected.is_some(), "{place} within {within}");
+                let position = middle + DVec3::new(random(), random(), random()) * 0.2;
+                let expected = shell.nearest(position, within).map(|nearest| nearest.square);
+                let nearest = nearby.nearest(&shell, position, within).map(|nearest| nearest.square);
+                assert_eq!(nearest.is_some(), expected.is_some(), "{position} within {within}");
                 if let (Some(nearest), Some(expected)) = (nearest, expected) {
                     assert!((nearest - expected).abs() <= 1.0e-8 * expected, "{nearest} for {expected}");
                     found += 1;

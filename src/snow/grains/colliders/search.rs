@@ -21,7 +21,7 @@ pub struct Scratch {
 struct Asking {
     slot: u32,
     /// Its position (m).
-    place: DVec3,
+    position: DVec3,
     /// Largest distance (diameters) of a surface that counts as near.
     reach: f64,
     /// Search distance for surfaces (diameters).
@@ -136,12 +136,12 @@ impl Search<'_> {
                 f64::from(norm(sub(way, self.travel.along))) + self.travel.beside
             };
             if self.is_within(row.limit, REACH + closing) && !(row.rests() && most == 0.0) {
-                let place = world(block.at, row.place, self.diameter);
-                room = [room[0].inf(&place), room[1].sup(&place)];
+                let position = world(block.at, row.position, self.diameter);
+                room = [room[0].inf(&position), room[1].sup(&position)];
                 // Near fast meshes, a grain would have to search again at once anyway.
                 let within = if most < 0.5 * AHEAD { reach + AHEAD } else { reach };
                 farthest = farthest.max(within);
-                asking.push(Asking { slot, place, reach, within });
+                asking.push(Asking { slot, position, reach, within });
             }
         }
         if asking.is_empty() {
@@ -161,23 +161,24 @@ impl Search<'_> {
     }
 
     /// Travel of the meshes at which one can reach a position (m), from a search within so many diameters.
-    fn limit(&self, place: DVec3, within: f64) -> f32 {
-        let square = |shell: &&Shell| shell.nearest(place, within * self.diameter).map(|found| found.square);
+    fn limit(&self, position: DVec3, within: f64) -> f32 {
+        let square =
+            |shell: &&Shell| shell.nearest(position, within * self.diameter).map(|found| found.square);
         let nearest = self.shells.iter().filter_map(square).fold(f64::INFINITY, f64::min).sqrt();
         (self.before + (nearest / self.diameter).min(within)) as f32 - SLACK
     }
 
     /// Finds what a grain touches, and updates its limit.
     fn touch(&self, asking: &Asking, nearby: &mut [Nearby], row: &mut Row, touches: &mut Vec<Touch>) {
-        let Asking { slot, place, reach, within } = *asking;
+        let Asking { slot, position, reach, within } = *asking;
         let mut free = within;
         for (shell, nearby) in self.shells.iter().zip(nearby) {
-            let Some(nearest) = nearby.nearest(shell, place, within * self.diameter) else { continue };
+            let Some(nearest) = nearby.nearest(shell, position, within * self.diameter) else { continue };
             let distance = nearest.square.sqrt() / self.diameter;
             free = free.min(distance);
             if distance <= reach + nearest.motion.norm() / self.diameter {
-                let touch = shell.touch(slot, row, place, &nearest, self.diameter, self.dt);
-                let is_close = dot(touch.normal, row.place) - touch.offset < rest::NEAR;
+                let touch = shell.touch(slot, row, position, &nearest, self.diameter, self.dt);
+                let is_close = dot(touch.normal, row.position) - touch.offset < rest::NEAR;
                 let moves = nearest.motion.norm() > 1.0e-6 * self.diameter;
                 if !row.rests() || is_close && moves {
                     rest::wake(row);
@@ -205,9 +206,10 @@ mod tests {
 
     /// A triangle with displacements of its corners (m).
     fn moved(ways: [[f64; 3]; 3]) -> Shell {
-        let places = [DVec3::zeros(), DVec3::x(), DVec3::z()];
-        let mut shell = Shell::new(0.0, vec![[0, 1, 2]], false, places.to_vec());
-        let next: Vec<DVec3> = places.iter().zip(ways).map(|(place, way)| place + DVec3::from(way)).collect();
+        let positions = [DVec3::zeros(), DVec3::x(), DVec3::z()];
+        let mut shell = Shell::new(0.0, vec![[0, 1, 2]], false, positions.to_vec());
+        let next: Vec<DVec3> =
+            positions.iter().zip(ways).map(|(position, way)| position + DVec3::from(way)).collect();
         shell.follow(&next);
         shell
     }

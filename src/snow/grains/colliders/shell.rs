@@ -119,8 +119,8 @@ impl Shell {
     }
 
     /// Whether a position (m) is inside, at most `within` (m) deep.
-    pub fn is_behind(&self, place: DVec3, within: f64) -> bool {
-        self.nearest(place, within).is_some_and(|nearest| self.side(place, &nearest).1)
+    pub fn is_behind(&self, position: DVec3, within: f64) -> bool {
+        self.nearest(position, within).is_some_and(|nearest| self.side(position, &nearest).1)
     }
 
     /// Positions of the vertices (m).
@@ -129,8 +129,8 @@ impl Shell {
     }
 
     /// Distance (m) of a position from the surface; none if it is over `within`.
-    pub fn distance(&self, place: DVec3, within: f64) -> Option<f64> {
-        self.nearest(place, within).map(|found| found.square.sqrt())
+    pub fn distance(&self, position: DVec3, within: f64) -> Option<f64> {
+        self.nearest(position, within).map(|found| found.square.sqrt())
     }
 
     /// Sets the acceleration up to which the surface holds grains (weights of a grain).
@@ -142,8 +142,8 @@ impl Shell {
     fn sort(&mut self) {
         let spread = |x: u64| (0..16).fold(0u64, |out, bit| out | (x >> bit & 1) << (3 * bit));
         let (mut low, mut high) = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
-        for place in &self.now {
-            (low, high) = (low.inf(place), high.sup(place));
+        for position in &self.now {
+            (low, high) = (low.inf(position), high.sup(position));
         }
         let size = (high - low).max().max(1.0e-9);
         let now = &self.now;
@@ -171,9 +171,9 @@ impl Shell {
             (*bounds, *way) = (EMPTY, 0.0);
             for triangle in triangles.iter().skip(leaf * LEAF).take(LEAF) {
                 for &index in triangle {
-                    let place = now[index as usize];
-                    *bounds = [bounds[0].inf(&place), bounds[1].sup(&place)];
-                    *way = way.max((next[index as usize] - place).norm());
+                    let position = now[index as usize];
+                    *bounds = [bounds[0].inf(&position), bounds[1].sup(&position)];
+                    *way = way.max((next[index as usize] - position).norm());
                 }
             }
         });
@@ -217,12 +217,12 @@ impl Shell {
         &self,
         slot: u32,
         row: &Row,
-        place: DVec3,
+        position: DVec3,
         nearest: &Nearest,
         diameter: f64,
         dt: f64,
     ) -> Touch {
-        let (distance, inside, out) = self.side(place, nearest);
+        let (distance, inside, out) = self.side(position, nearest);
         let normal = [out.x as f32, out.y as f32, out.z as f32];
         let gap = (if inside { -distance } else { distance }) / diameter - 0.5;
         let velocity = nearest.motion / dt;
@@ -230,7 +230,7 @@ impl Shell {
             grain: slot,
             collider: self.collider,
             normal,
-            offset: dot(normal, row.place) - gap as f32,
+            offset: dot(normal, row.position) - gap as f32,
             velocity: [velocity.x as f32, velocity.y as f32, velocity.z as f32],
             friction: self.friction,
             stick: self.stick,
@@ -240,11 +240,11 @@ impl Shell {
     }
 
     /// Distance (m) of a position from its nearest point, whether it is inside, and the outward direction.
-    fn side(&self, place: DVec3, nearest: &Nearest) -> (f64, bool, DVec3) {
+    fn side(&self, position: DVec3, nearest: &Nearest) -> (f64, bool, DVec3) {
         let distance = nearest.square.sqrt();
         let inside = self.closed && nearest.height < 0.0 && !nearest.is_on_rim;
         let out = if distance > LEAST {
-            (place - nearest.point) * (if inside { -1.0 } else { 1.0 } / distance)
+            (position - nearest.point) * (if inside { -1.0 } else { 1.0 } / distance)
         } else {
             nearest.normal
         };
@@ -253,22 +253,27 @@ impl Shell {
 
     /// Distance (m) and direction in which a ball of a radius (m) must move to leave the mesh; none if it does not overlap
     /// the mesh or no surface lies within three radii. The mesh must be at rest.
-    pub fn depth(&self, place: DVec3, radius: f64) -> Option<(f64, DVec3)> {
-        self.depth_beside(place, radius, self.nearest(place, DEPTHS * radius))
+    pub fn depth(&self, position: DVec3, radius: f64) -> Option<(f64, DVec3)> {
+        self.depth_beside(position, radius, self.nearest(position, DEPTHS * radius))
     }
 
     /// The same if the nearest point within [`DEPTHS`] radii is known.
-    pub fn depth_beside(&self, place: DVec3, radius: f64, nearest: Option<Nearest>) -> Option<(f64, DVec3)> {
+    pub fn depth_beside(
+        &self,
+        position: DVec3,
+        radius: f64,
+        nearest: Option<Nearest>,
+    ) -> Option<(f64, DVec3)> {
         let nearest = nearest?;
-        let (distance, inside, out) = self.side(place, &nearest);
+        let (distance, inside, out) = self.side(position, &nearest);
         let depth = if inside { radius + distance } else { radius - distance };
         (depth > 0.0).then_some((depth, out))
     }
 
     /// The nearest point of the surface within a distance (m) plus its displacement in the sub-step.
-    pub fn nearest(&self, place: DVec3, within: f64) -> Option<Nearest> {
+    pub fn nearest(&self, position: DVec3, within: f64) -> Option<Nearest> {
         let apart = |bounds: &[DVec3; 2]| {
-            let outside = (bounds[0] - place).sup(&(place - bounds[1])).sup(&DVec3::zeros());
+            let outside = (bounds[0] - position).sup(&(position - bounds[1])).sup(&DVec3::zeros());
             outside.norm_squared()
         };
         let mut best = Best::default();
@@ -288,31 +293,37 @@ impl Shell {
                 depth += 2;
                 continue;
             }
-            self.compare_all(node - (self.leaves - 1), place, reach, &mut best);
+            self.compare_all(node - (self.leaves - 1), position, reach, &mut best);
         }
-        best.found.map(|found| self.resolve(found, place))
+        best.found.map(|found| self.resolve(found, position))
     }
 
     /// Compares the triangles of a leaf with the best so far and with the square of a reach (m2).
-    fn compare_all(&self, leaf: usize, place: DVec3, reach: f64, best: &mut Best) {
+    fn compare_all(&self, leaf: usize, position: DVec3, reach: f64, best: &mut Best) {
         let first = leaf * LEAF;
         for index in first..(first + LEAF).min(self.triangles.len()) {
-            self.compare(index, place, reach, best);
+            self.compare(index, position, reach, best);
         }
     }
 
     /// Compares a triangle with the best so far and with the square of a reach (m2).
-    pub(in crate::snow::grains) fn compare(&self, index: usize, place: DVec3, reach: f64, best: &mut Best) {
+    pub(in crate::snow::grains) fn compare(
+        &self,
+        index: usize,
+        position: DVec3,
+        reach: f64,
+        best: &mut Best,
+    ) {
         let [a, b, c] = self.corners(index);
-        let weights = nearest_weights(place, a, b, c);
+        let weights = nearest_weights(position, a, b, c);
         let point = a * weights[0] + b * weights[1] + c * weights[2];
-        let square = (place - point).norm_squared();
+        let square = (position - point).norm_squared();
         let mut height = None;
         let is_better = match &mut best.found {
             None => square <= reach,
             Some(other) => {
                 let tie = 1.0e-9 * (square + other.square);
-                let over = |triangle: usize| self.plane(triangle, place).0.abs();
+                let over = |triangle: usize| self.plane(triangle, position).0.abs();
                 // At a shared edge or vertex, the triangle whose plane is farthest from the position decides its side.
                 square < other.square - tie
                     || square <= other.square + tie
@@ -364,21 +375,21 @@ impl Shell {
     }
 
     /// Height (m) of a position above the plane of a triangle, and the normal of the plane.
-    fn plane(&self, triangle: usize, place: DVec3) -> (f64, DVec3) {
+    fn plane(&self, triangle: usize, position: DVec3) -> (f64, DVec3) {
         let [a, b, c] = self.corners(triangle);
         let across = (b - a).cross(&(c - a));
         let length = across.norm();
         let normal = if length > 0.0 { across / length } else { DVec3::y() };
-        ((place - a).dot(&normal), normal)
+        ((position - a).dot(&normal), normal)
     }
 
-    pub(in crate::snow::grains) fn resolve(&self, found: Found, place: DVec3) -> Nearest {
+    pub(in crate::snow::grains) fn resolve(&self, found: Found, position: DVec3) -> Nearest {
         let Found { square, triangle, weights, point, .. } = found;
         let way = |corner: usize| {
             let index = self.triangles[triangle][corner] as usize;
             (self.next[index] - self.now[index]) * weights[corner]
         };
-        let (height, normal) = self.plane(triangle, place);
+        let (height, normal) = self.plane(triangle, position);
         let is_on_rim = self.rims.as_ref().is_some_and(|rims| is_on_rim(rims[triangle], weights));
         Nearest { square, point, motion: way(0) + way(1) + way(2), height, normal, is_on_rim }
     }
@@ -423,13 +434,13 @@ const EMPTY: [DVec3; 2] = [
 ];
 
 /// Barycentric weights of the point of a triangle nearest to a position (Ericson, Real-Time Collision Detection, 5.1.5).
-fn nearest_weights(place: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
-    let (ab, ac, ap) = (b - a, c - a, place - a);
+fn nearest_weights(position: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
+    let (ab, ac, ap) = (b - a, c - a, position - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
     if d1 <= 0.0 && d2 <= 0.0 {
         return [1.0, 0.0, 0.0];
     }
-    let bp = place - b;
+    let bp = position - b;
     let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
     if d3 >= 0.0 && d4 <= d3 {
         return [0.0, 1.0, 0.0];
@@ -439,7 +450,7 @@ fn nearest_weights(place: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
         let t = d1 / (d1 - d3);
         return [1.0 - t, t, 0.0];
     }
-    let cp = place - c;
+    let cp = position - c;
     let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
     if d6 >= 0.0 && d5 <= d6 {
         return [0.0, 0.0, 1.0];

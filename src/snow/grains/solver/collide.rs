@@ -55,7 +55,7 @@ fn dot8(a: V8, b: V8) -> Lanes {
 /// Eight grains of a batch.
 #[derive(Clone, Copy)]
 pub struct Eight {
-    place: V8,
+    position: V8,
     /// Inverse masses.
     pub weight: Lanes,
     /// Whether a chain of contacts led down to something fixed in the last sub-step.
@@ -75,7 +75,7 @@ impl Eight {
         let free = hold.is_less(Lanes::all(SUPPORTED));
         let weight = free.choose(hold, hold - Lanes::all(SUPPORTED));
         let supported = Lanes::all(1.5).is_less(hold);
-        Self { place: [x, y, z], weight, supported, velocity: [u, v, w], still }
+        Self { position: [x, y, z], weight, supported, velocity: [u, v, w], still }
     }
 
     /// Writes the velocities.
@@ -119,7 +119,7 @@ impl Contact {
         let weights = a.weight + b.weight;
         // 1 / weights, exact for 1 and 2.
         let inverse = Lanes::all(1.5) - Lanes::all(0.5) * weights;
-        let apart = sub8(sub8(a.place, batch.shift()), b.place);
+        let apart = sub8(sub8(a.position, batch.shift()), b.position);
         let distance = dot8(apart, apart).sqrt();
         let [x, y, z] = scaled8(apart, one / distance.max(Lanes::all(LEAST)));
         // Two grains at the same position separate vertically.
@@ -256,8 +256,8 @@ mod tests {
         let params = Params { gravity: 0.0, friction: 0.0, rests: false, ..Params::for_cell(1.5) };
         let mut heap = Heap::new(2.0 * params.radius);
         for (id, speed) in [(0, 0.0), (1, -1.0)] {
-            let place = DVec3::new(0.5, 0.5 + f64::from(id), 0.5) * heap.diameter;
-            heap.add(id, place, [0.0, speed, 0.0]).unwrap();
+            let position = DVec3::new(0.5, 0.5 + f64::from(id), 0.5) * heap.diameter;
+            heap.add(id, position, [0.0, speed, 0.0]).unwrap();
         }
         heap.rows.iter_mut().for_each(|row| row.hold = 1.0 + SUPPORTED);
         let division = Division { dt: 1.0e-3, sub_steps: 1 };

@@ -255,7 +255,7 @@ impl Layout {
             batch.lanes().map(|lane| {
                 let (row, other) = (rows[batch.owners[lane] as usize], rows[batch.others()[lane] as usize]);
                 let shift = batch.shift().map(|shift| shift.0[lane]);
-                1.0 - norm(sub(sub(row.place, shift), other.place))
+                1.0 - norm(sub(sub(row.position, shift), other.position))
             })
         });
         pairs.filter(|overlap| *overlap > -0.02).map(|overlap| overlap.max(0.0)).collect()
@@ -398,12 +398,12 @@ fn find_in(scratch: &mut Scratch, blocks: &[Block], index: usize) {
         };
         for owner in own {
             let [xs, ys, zs] = &block.anchors;
-            let place = [xs[owner as usize], ys[owner as usize], zs[owner as usize]];
+            let position = [xs[owner as usize], ys[owner as usize], zs[owner as usize]];
             for run in &runs {
-                scan(place, run, &mut scratch.pairs);
+                scan(position, run, &mut scratch.pairs);
             }
             before.high = owner;
-            scan(place, &before, &mut scratch.pairs);
+            scan(position, &before, &mut scratch.pairs);
             scratch.starts.push(scratch.pairs.len() as u32);
         }
     }
@@ -411,9 +411,9 @@ fn find_in(scratch: &mut Scratch, blocks: &[Block], index: usize) {
 
 /// Adds the pairs of a grain with members of a run.
 #[inline(always)]
-fn scan(place: V, run: &Run<'_>, pairs: &mut Vec<Pair>) {
+fn scan(position: V, run: &Run<'_>, pairs: &mut Vec<Pair>) {
     let reach = Lanes::all(run.reach * run.reach);
-    let [x, y, z] = sub(place, run.shift);
+    let [x, y, z] = sub(position, run.shift);
     let [xs, ys, zs] = &run.block.anchors;
     let mut member = run.low;
     while member < run.high {

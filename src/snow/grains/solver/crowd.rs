@@ -28,7 +28,7 @@ const PER_BLOCK: i32 = (EDGE / CELL) as i32;
 /// Most grains in a cell that is not crowded; a random packing fits ten.
 pub const MOST: usize = 14;
 /// The same before a step: only a cell with more than this, as from a file of grains at one position, would give grains too
-/// many neighbours. Grains that the last step could not place are not tried again.
+/// many neighbours. Grains that the last step could not position are not tried again.
 pub const MOST_BEFORE: usize = 64;
 /// Grains that a crowded cell keeps in addition to one for each octant that is clear of surfaces.
 const KEPT: usize = 2;
@@ -72,14 +72,14 @@ impl Heap {
         }
         let slots = (0u32..).zip(self.rows.iter().zip(&self.at));
         let mut slots: Vec<(Cell, u32)> =
-            slots.map(|(slot, (row, at))| (cell(*at, row.place), slot)).collect();
+            slots.map(|(slot, (row, at))| (cell(*at, row.position), slot)).collect();
         slots.par_sort_unstable();
         let mut map =
             Map { slots, rows: &self.rows, colliders, diameter: self.diameter, blocks: HashMap::new() };
         let moves = Flow::begin(&mut map, &crowded)?.run(ctx, &mut map)?;
-        for Move { slot, cell, place } in &moves {
+        for Move { slot, cell, position } in &moves {
             let row = &mut self.rows[*slot as usize];
-            (row.place, self.at[*slot as usize]) = (*place, block(*cell));
+            (row.position, self.at[*slot as usize]) = (*position, block(*cell));
             rest::wake(row);
             rest::begin_again(row);
         }
@@ -102,7 +102,7 @@ impl Heap {
             let mut first = 0;
             for at in at.chunk_by(|a, b| a == b) {
                 let counts = counts.entry(at[0]).or_insert([0; CELLS]);
-                rows[first..first + at.len()].iter().for_each(|row| counts[index_of(row.place)] += 1);
+                rows[first..first + at.len()].iter().for_each(|row| counts[index_of(row.position)] += 1);
                 first += at.len();
             }
             counts
@@ -129,7 +129,7 @@ struct Move {
     slot: u32,
     cell: Cell,
     /// Position within its block (diameters).
-    place: V,
+    position: V,
 }
 
 /// Positions of grains and surfaces.
@@ -173,15 +173,15 @@ impl Map<'_, '_> {
     }
 
     /// Which side of the surfaces a position (diameters, within the cell's block) is on.
-    fn side_of(&self, cell: Cell, place: V) -> Side {
+    fn side_of(&self, cell: Cell, position: V) -> Side {
         let at = block(cell);
-        self.blocks[&at].side(world(at, place, self.diameter))
+        self.blocks[&at].side(world(at, position, self.diameter))
     }
 
     /// Slots of the grains of a cell: those on the side of its centre, and those that a mesh separates from it.
     fn on_two_sides(&self, cell: Cell, centre: &Side) -> [Vec<u32>; 2] {
         let is_beyond = |slot: &u32| {
-            !centre.out.is_empty() && self.side_of(cell, self.rows[*slot as usize].place).is_across(centre)
+            !centre.out.is_empty() && self.side_of(cell, self.rows[*slot as usize].position).is_across(centre)
         };
         let (beyond, here) = self.grains(cell).partition(is_beyond);
         [here, beyond]
@@ -190,7 +190,7 @@ impl Map<'_, '_> {
     /// Contents of a cell whose surroundings have been read. Octants are listed only if the cell has free space or `asks` is
     /// set.
     fn know(&self, cell: Cell, asks: bool) -> Known {
-        let side = |place: V| self.side_of(cell, place);
+        let side = |position: V| self.side_of(cell, position);
         let corner = cell.map(|at| at.rem_euclid(PER_BLOCK) as f32 * CELL);
         let known = side(add(corner, [0.5 * CELL; 3]));
         let grains: Vec<u32> = self.grains(cell).collect();
@@ -198,17 +198,17 @@ impl Map<'_, '_> {
         let mut eighths = Vec::new();
         if known.distance > -DEEPEST && (asks || count < LOOSE) {
             let is_in = |slot: &u32, eighth: usize| {
-                let place = self.rows[*slot as usize].place;
-                (0..3).all(|axis| (place[axis] - corner[axis] >= 0.5 * CELL) == (eighth >> axis & 1 == 1))
+                let position = self.rows[*slot as usize].position;
+                (0..3).all(|axis| (position[axis] - corner[axis] >= 0.5 * CELL) == (eighth >> axis & 1 == 1))
             };
             for eighth in 0..8 {
-                let place = add(corner, scattered(cell, eighth));
+                let position = add(corner, scattered(cell, eighth));
                 let is_clear = || {
-                    let beside = side(place);
+                    let beside = side(position);
                     beside.distance >= CLEAR && !beside.is_across(&known)
                 };
                 if known.distance >= CLEAR + CORNER || is_clear() {
-                    eighths.push((place, grains.iter().any(|slot| is_in(slot, eighth))));
+                    eighths.push((position, grains.iter().any(|slot| is_in(slot, eighth))));
                 }
             }
         }
@@ -249,7 +249,7 @@ impl Flow {
             let crowd = flow.start(cell, known.side, here.get(known.eighths.len() + KEPT..));
             flow.came.insert(cell, crowd);
             if let Some(first) = beyond.first() {
-                let side = map.side_of(cell, map.rows[*first as usize].place);
+                let side = map.side_of(cell, map.rows[*first as usize].position);
                 flow.start(cell, side, beyond.get(KEPT..));
             }
         }
@@ -305,9 +305,9 @@ impl Flow {
                         entry.insert((crowd, first + index));
                         let (count, eighths) = &known[index];
                         let room = LOOSE.saturating_sub(*count);
-                        for (place, _) in eighths.iter().filter(|(_, is_taken)| !is_taken).take(room) {
+                        for (position, _) in eighths.iter().filter(|(_, is_taken)| !is_taken).take(room) {
                             let Some(slot) = self.pools[crowd as usize].pop() else { break };
-                            moves.push(Move { slot, cell, place: *place });
+                            moves.push(Move { slot, cell, position: *position });
                         }
                         front.push((cell, crowd, first + index));
                     }
@@ -365,13 +365,13 @@ impl Flow {
 }
 
 /// The cell of a position in a block.
-fn cell(at: At, place: V) -> Cell {
-    [0, 1, 2].map(|axis| at[axis] * PER_BLOCK + (place[axis] / CELL) as i32)
+fn cell(at: At, position: V) -> Cell {
+    [0, 1, 2].map(|axis| at[axis] * PER_BLOCK + (position[axis] / CELL) as i32)
 }
 
 /// Index of the cell of a position in its block.
-fn index_of(place: V) -> usize {
-    place.iter().fold(0, |index, x| index * PER_BLOCK as usize + (x / CELL) as usize)
+fn index_of(position: V) -> usize {
+    position.iter().fold(0, |index, x| index * PER_BLOCK as usize + (x / CELL) as usize)
 }
 
 /// The cell of an index in a block.
@@ -404,40 +404,40 @@ mod tests {
     use crate::snow::grains::heap::Floor;
 
     /// Positions (m) of grains of diameter 1 m on a floor, beside a mesh, after crowding was relieved.
-    fn spread(places: &[DVec3], mesh: Option<(TriMesh, bool)>) -> Vec<DVec3> {
+    fn spread(positions: &[DVec3], mesh: Option<(TriMesh, bool)>) -> Vec<DVec3> {
         let mut heap = Heap::new(1.0);
-        for (id, place) in (0..).zip(places) {
-            heap.add(id, *place, [0.0; 3]).unwrap();
+        for (id, position) in (0..).zip(positions) {
+            heap.add(id, *position, [0.0; 3]).unwrap();
         }
         let floor = Some(Floor { height: 0.0, friction: 0.5 });
         let mut colliders = Colliders { floor, ..Colliders::default() };
         if let Some((mesh, closed)) = mesh {
-            let pose: Vec<DVec3> = mesh.positions.iter().map(|place| place.cast::<f64>()).collect();
+            let pose: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast::<f64>()).collect();
             let mut shell = Shell::new(0.5, mesh.triangles, closed, pose.clone());
             shell.follow(&pose);
             colliders.shells.push((shell, Box::new(|_, _| Ok(()))));
         }
         let ctx = Context::new(Pool::new(2).unwrap());
         ctx.step(1, || ctx.phase("move", || heap.make_room(&ctx, &colliders, MOST))).unwrap();
-        assert_eq!(heap.ids(), (0..places.len() as u32).collect::<Vec<u32>>());
-        heap.places().collect()
+        assert_eq!(heap.ids(), (0..positions.len() as u32).collect::<Vec<u32>>());
+        heap.positions().collect()
     }
 
-    fn fullest(places: &[DVec3]) -> usize {
+    fn fullest(positions: &[DVec3]) -> usize {
         let mut counts = HashMap::new();
-        places
+        positions
             .iter()
-            .for_each(|place| *counts.entry(place.map(|x| (x / 2.0).floor() as i64)).or_insert(0) += 1);
+            .for_each(|position| *counts.entry(position.map(|x| (x / 2.0).floor() as i64)).or_insert(0) += 1);
         counts.into_values().max().unwrap_or(0)
     }
 
     #[test]
     fn grains_at_one_place_spread_and_stay_above_the_floor() {
-        let places = spread(&[DVec3::new(0.3, 0.6, -0.2); 3000], None);
-        assert!(fullest(&places) <= MOST, "{}", fullest(&places));
-        assert!(places.iter().all(|place| place.y >= 0.5), "one is in the floor");
+        let positions = spread(&[DVec3::new(0.3, 0.6, -0.2); 3000], None);
+        assert!(fullest(&positions) <= MOST, "{}", fullest(&positions));
+        assert!(positions.iter().all(|position| position.y >= 0.5), "one is in the floor");
         // A hemisphere with seven grains per eight cubic diameters.
-        let farthest = places.iter().map(|place| place.norm()).fold(0.0, f64::max);
+        let farthest = positions.iter().map(|position| position.norm()).fold(0.0, f64::max);
         assert!(
             farthest < 1.8 * (3000.0 * 8.0 / 7.0 / (2.0 / 3.0 * std::f64::consts::PI)).cbrt(),
             "{farthest}"
@@ -454,8 +454,9 @@ mod tests {
         let moved: Vec<&DVec3> =
             after.iter().zip(&before).filter(|(a, b)| (*a - *b).norm() > 0.01).map(|(a, _)| a).collect();
         assert!(moved.len() > 1400, "{}", moved.len());
-        let is_beside = |place: &&DVec3| place.x.abs().max(place.z.abs()) >= 15.4 && place.y >= 0.5;
-        assert!(moved.iter().all(is_beside), "{:?}", moved.iter().find(|place| !is_beside(place)));
+        let is_beside =
+            |position: &&DVec3| position.x.abs().max(position.z.abs()) >= 15.4 && position.y >= 0.5;
+        assert!(moved.iter().all(is_beside), "{:?}", moved.iter().find(|position| !is_beside(position)));
     }
 
     #[test]
@@ -466,15 +467,19 @@ mod tests {
             let [normal, along] = [DVec3::new(cosine, 0.0, sine), DVec3::new(-sine, 0.0, cosine)];
             for shift in [0.0, 0.7, 1.3, 1.9] {
                 let mut turned = sheet.clone();
-                for place in &mut turned.positions {
-                    let to = normal * shift + along * f64::from(place.z) + DVec3::y() * f64::from(place.y);
-                    *place = to.cast::<f32>();
+                for position in &mut turned.positions {
+                    let to =
+                        normal * shift + along * f64::from(position.z) + DVec3::y() * f64::from(position.y);
+                    *position = to.cast::<f32>();
                 }
                 let from = normal * (shift + 0.7 * side) + DVec3::y() * 0.6;
-                let places = spread(&[from; 2000], Some((turned, false)));
-                assert!(fullest(&places) <= MOST);
-                let is_beside = |place: &DVec3| (place.dot(&normal) - shift) * side >= 0.49;
-                assert!(places.iter().all(is_beside), "one is on the other side, {turn} degrees at {shift}");
+                let positions = spread(&[from; 2000], Some((turned, false)));
+                assert!(fullest(&positions) <= MOST);
+                let is_beside = |position: &DVec3| (position.dot(&normal) - shift) * side >= 0.49;
+                assert!(
+                    positions.iter().all(is_beside),
+                    "one is on the other side, {turn} degrees at {shift}"
+                );
             }
         }
     }

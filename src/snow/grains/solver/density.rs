@@ -34,7 +34,8 @@ impl Layout {
             let (others, shift) = (batch.others(), batch.shift());
             for lane in batch.lanes() {
                 let [owner, other] = [batch.owners[lane], others[lane]].map(|slot| slot as usize);
-                let apart = sub(sub(rows[owner].place, shift.map(|shift| shift.0[lane])), rows[other].place);
+                let apart =
+                    sub(sub(rows[owner].position, shift.map(|shift| shift.0[lane])), rows[other].position);
                 if norm(apart) < 1.0 + NEAR {
                     for slot in [owner, other] {
                         counts[slot].fetch_add(1, Ordering::Relaxed);

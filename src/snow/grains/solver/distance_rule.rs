@@ -47,7 +47,7 @@ impl Heap {
         let may_rest =
             |row: &Row| !row.rests() && row.is_supported() && !rest::has_just_woken(row) && !is_fast(row);
         let cell = |row: &Row, at: &At| -> Cell {
-            world(*at, row.place, diameter).map(|x| (x / edge).floor() as i32).into()
+            world(*at, row.position, diameter).map(|x| (x / edge).floor() as i32).into()
         };
         let mut cells = self.cells(&may_rest, &cell);
         let sources = self.cells(&is_fast, &cell);
@@ -121,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_with_places_nearer_than_the_distance_are_around_a_cell() {
+    fn cells_with_positions_nearer_than_the_distance_are_around_a_cell() {
         for distance in [0.2, 1.0, 1.7, 4.0] {
             let runs = runs(distance);
             let sources = |at: Cell| is_near([0; 3], &[[-9, 0, 0], at, [9, 0, 0]], &runs);

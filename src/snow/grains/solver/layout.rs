@@ -135,8 +135,8 @@ pub fn holds(at: At) -> bool {
 }
 
 /// Index of the cell of a position in a block.
-fn cell(place: V) -> usize {
-    let [x, y, z] = place.map(|x| ((x * (CELLS as f32 / EDGE)) as usize).min(CELLS - 1));
+fn cell(position: V) -> usize {
+    let [x, y, z] = position.map(|x| ((x * (CELLS as f32 / EDGE)) as usize).min(CELLS - 1));
     (y * CELLS + x) * CELLS + z
 }
 
@@ -148,7 +148,11 @@ pub fn order(rows: &[Row], ids: &[u32], at: &[At]) -> Vec<u32> {
         .filter(|(_, (_, _, at))| holds(**at))
         .map(|(from, (row, id, at))| {
             let [x, y, z] = [0, 1, 2].map(|axis| (at[axis] + MIDDLE[axis]) as u64);
-            Key { cell: ((x << 21 | z) << 14 | y) << 8 | cell(row.place) as u64, id: *id, from: from as u32 }
+            Key {
+                cell: ((x << 21 | z) << 14 | y) << 8 | cell(row.position) as u64,
+                id: *id,
+                from: from as u32,
+            }
         })
         .collect();
     keys.par_sort_unstable();
@@ -251,9 +255,9 @@ impl Layout {
                 block.members.push(slot);
                 (block.is_changed, block.is_stirred) = (true, true);
                 if !block.has_strayed {
-                    let place = anchor(&rows[slot as usize], ahead, block.skin);
-                    block.anchors.iter_mut().zip(place).for_each(|(anchors, place)| {
-                        anchors.insert(anchors.len() - LANES.min(anchors.len()), place);
+                    let position = anchor(&rows[slot as usize], ahead, block.skin);
+                    block.anchors.iter_mut().zip(position).for_each(|(anchors, position)| {
+                        anchors.insert(anchors.len() - LANES.min(anchors.len()), position);
                     });
                 }
             }
@@ -272,7 +276,7 @@ impl Layout {
         let rows = &*rows;
         let homes = Shared::new(&mut self.homes);
         let changed = self.blocks.par_iter_mut().filter(|block| which(block));
-        changed.for_each_init(Ranking::default, |Ranking { places, members }, block| {
+        changed.for_each_init(Ranking::default, |Ranking { positions, members }, block| {
             if block.has_strayed {
                 let square = |&slot: &u32| {
                     let velocity = rows[slot as usize].velocity;
@@ -281,24 +285,24 @@ impl Layout {
                 let fastest = block.members.iter().map(square).fold(0.0, f32::max).sqrt();
                 block.skin = if fastest * ahead / SUB_STEPS_AHEAD > FAST { THIN_SKIN } else { SKIN };
             }
-            let place = |member: usize, slot: u32| {
+            let position = |member: usize, slot: u32| {
                 if block.has_strayed {
                     anchor(&rows[slot as usize], ahead, block.skin)
                 } else {
                     [0, 1, 2].map(|axis: usize| block.anchors[axis][member])
                 }
             };
-            places.clear();
-            places.extend(block.members.iter().enumerate().map(|(member, &slot)| {
-                let place = place(member, slot);
-                (place, cell(place) as u32)
+            positions.clear();
+            positions.extend(block.members.iter().enumerate().map(|(member, &slot)| {
+                let position = position(member, slot);
+                (position, cell(position) as u32)
             }));
             // A counting sort by cell, then the few of a cell by identity.
             let mut starts = [0u32; ALL_CELLS + 1];
-            places.iter().for_each(|(_, cell)| starts[*cell as usize + 1] += 1);
+            positions.iter().for_each(|(_, cell)| starts[*cell as usize + 1] += 1);
             (0..ALL_CELLS).for_each(|cell| starts[cell + 1] += starts[cell]);
             let mut next = starts;
-            let count = places.len();
+            let count = positions.len();
             members.clear();
             members.resize(count, 0);
             block.anchors.iter_mut().for_each(|anchors| {
@@ -306,18 +310,20 @@ impl Layout {
                 anchors.resize(count + LANES, f32::INFINITY);
             });
             let [xs, ys, zs] = &mut block.anchors;
-            for ((place, cell), &slot) in places.iter().zip(&block.members) {
+            for ((position, cell), &slot) in positions.iter().zip(&block.members) {
                 let at = next[*cell as usize] as usize;
                 next[*cell as usize] += 1;
                 members[at] = slot;
-                (xs[at], ys[at], zs[at]) = (place[0], place[1], place[2]);
+                (xs[at], ys[at], zs[at]) = (position[0], position[1], position[2]);
             }
             for cell in starts.windows(2) {
                 for from in cell[0] as usize + 1..cell[1] as usize {
                     let mut at = from;
                     while at > cell[0] as usize && ids[members[at] as usize] < ids[members[at - 1] as usize] {
                         members.swap(at, at - 1);
-                        [&mut *xs, &mut *ys, &mut *zs].into_iter().for_each(|places| places.swap(at, at - 1));
+                        [&mut *xs, &mut *ys, &mut *zs]
+                            .into_iter()
+                            .for_each(|positions| positions.swap(at, at - 1));
                         at -= 1;
                     }
                 }
@@ -359,7 +365,7 @@ impl Layout {
 #[derive(Default)]
 struct Ranking {
     /// Anchor and cell of each member.
-    places: Vec<(V, u32)>,
+    positions: Vec<(V, u32)>,
     members: Vec<u32>,
 }
 
@@ -371,8 +377,8 @@ fn anchor(row: &Row, ahead: f32, skin: f32) -> V {
     let way = scaled(row.velocity, ahead);
     let length = norm(way);
     let share = if length > most { most / length } else { 1.0 };
-    let place = add(row.place, scaled(way, share));
-    place.map(|x| x.clamp(0.0, EDGE))
+    let position = add(row.position, scaled(way, share));
+    position.map(|x| x.clamp(0.0, EDGE))
 }
 
 /// Count of sub-steps for which pairs should last.
@@ -384,30 +390,30 @@ const FAST: f32 = 0.06;
 /// Moves a grain to the block that it lies in.
 pub fn settle(row: &mut Row, at: &mut At) {
     for axis in 0..3 {
-        let (place, since, at) = (&mut row.place[axis], &mut row.since[axis], &mut at[axis]);
-        let blocks = (*place / EDGE).floor();
+        let (position, since, at) = (&mut row.position[axis], &mut row.since[axis], &mut at[axis]);
+        let blocks = (*position / EDGE).floor();
         if blocks != 0.0 {
             *at = at.saturating_add(blocks as i32);
-            *place -= blocks * EDGE;
+            *position -= blocks * EDGE;
             *since -= blocks * EDGE;
             // A position just below 0 rounds to the edge itself.
-            if *place >= EDGE {
+            if *position >= EDGE {
                 *at = at.saturating_add(1);
-                *place = 0.0;
+                *position = 0.0;
                 *since -= EDGE;
             }
         }
         // So little below 0 that it, or an eighth of it, is a denormal that was flushed to 0.
-        if *place <= 0.0 {
-            *place = 0.0;
+        if *position <= 0.0 {
+            *position = 0.0;
         }
     }
 }
 
 /// World position (m) of a position in a block.
-pub fn world(at: At, place: V, diameter: f64) -> DVec3 {
+pub fn world(at: At, position: V, diameter: f64) -> DVec3 {
     DVec3::from(
-        [0, 1, 2].map(|axis| (f64::from(at[axis]) * f64::from(EDGE) + f64::from(place[axis])) * diameter),
+        [0, 1, 2].map(|axis| (f64::from(at[axis]) * f64::from(EDGE) + f64::from(position[axis])) * diameter),
     )
 }
 
@@ -416,13 +422,13 @@ pub fn locate(world: DVec3, diameter: f64) -> (At, V) {
     let mut row = Row::default();
     let mut at = [0; 3];
     for axis in 0..3 {
-        let place = world[axis] / diameter;
-        let block = (place / f64::from(EDGE)).floor();
+        let position = world[axis] / diameter;
+        let block = (position / f64::from(EDGE)).floor();
         at[axis] = block as i32;
-        row.place[axis] = (place - block * f64::from(EDGE)) as f32;
+        row.position[axis] = (position - block * f64::from(EDGE)) as f32;
     }
     settle(&mut row, &mut at);
-    (at, row.place)
+    (at, row.position)
 }
 
 #[cfg(test)]
@@ -431,16 +437,20 @@ mod tests {
     use crate::numeric::cpu::FlushDenormals;
 
     #[test]
-    fn every_place_settles_in_a_block() {
-        for place in [-6.0e-38, -1.0e-45, -1.0e-8, -0.0, 0.0, 7.999_999_5, 8.0, -8.0, -8.1, 31.0, -1.0e6] {
-            let mut row = Row { place: [place; 3], since: [place; 3], ..Row::default() };
+    fn every_position_settles_in_a_block() {
+        for position in [-6.0e-38, -1.0e-45, -1.0e-8, -0.0, 0.0, 7.999_999_5, 8.0, -8.0, -8.1, 31.0, -1.0e6] {
+            let mut row = Row { position: [position; 3], since: [position; 3], ..Row::default() };
             let mut at = [3; 3];
             let flush = FlushDenormals::begin();
             settle(&mut row, &mut at);
             drop(flush);
-            assert!(row.place.iter().all(|x| (0.0..EDGE).contains(x)), "{place} becomes {:?}", row.place);
-            let whole = f64::from(at[0] - 3) * f64::from(EDGE) + f64::from(row.place[0]);
-            assert!((whole - f64::from(place)).abs() < 1.0e-6, "{place} becomes {whole}");
+            assert!(
+                row.position.iter().all(|x| (0.0..EDGE).contains(x)),
+                "{position} becomes {:?}",
+                row.position
+            );
+            let whole = f64::from(at[0] - 3) * f64::from(EDGE) + f64::from(row.position[0]);
+            assert!((whole - f64::from(position)).abs() < 1.0e-6, "{position} becomes {whole}");
         }
     }
 }

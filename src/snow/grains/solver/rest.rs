@@ -59,9 +59,9 @@ pub fn judge(row: &mut Row, rule: Option<Rest>) {
     let moving = rule.map_or(0.0, |rule| rule.moving);
     row.still = if row.still == JUST_WOKEN { moving } else { row.still };
     row.hold = if is_supported { 1.0 + SUPPORTED } else { 1.0 };
-    let way = sub(row.place, row.since);
+    let way = sub(row.position, row.since);
     if dot(way, way) > WAY * WAY {
-        (row.since, row.still) = (row.place, 0.0);
+        (row.since, row.still) = (row.position, 0.0);
     } else {
         row.still += 1.0;
     }
@@ -91,5 +91,5 @@ pub fn wake(row: &mut Row) {
 
 /// Restarts the time that the grain must lie still.
 pub fn begin_again(row: &mut Row) {
-    (row.since, row.still) = (row.place, JUST_WOKEN);
+    (row.since, row.still) = (row.position, JUST_WOKEN);
 }

@@ -12,7 +12,7 @@ pub type V = [f32; 3];
 #[repr(C, align(64))]
 pub struct Row {
     /// Position within its block (diameters), relative to the block's least corner.
-    pub place: V,
+    pub position: V,
     /// Inverse mass (1, or 0 at rest), plus 2 if a chain of contacts led down to something fixed in the last sub-step.
     pub hold: f32,
     /// Velocity (m/s).
@@ -23,7 +23,7 @@ pub struct Row {
     pub push: V,
     /// Result of the contacts of this sub-step: 1 if supported, plus 2 if something wakes it.
     pub marks: f32,
-    /// Reference position: the grain counts as moving once it is too far from it (diameters, like `place`).
+    /// Reference position: the grain counts as moving once it is too far from it (diameters, like `position`).
     pub since: V,
     /// Distance (diameters) that meshes may travel from the start of the step before one can touch it.
     pub limit: f32,
@@ -55,7 +55,7 @@ impl Row {
 /// Four consecutive numbers of a row, starting with the position, velocity or push.
 #[derive(Clone, Copy)]
 pub enum Part {
-    /// `place` and `hold`.
+    /// `position` and `hold`.
     Place = 0,
     /// `velocity` and `still`.
     Velocity = 4,

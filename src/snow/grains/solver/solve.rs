@@ -166,7 +166,7 @@ fn begin_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients) {
     touch.friction_now = friction(row, touch, c);
     if c.restitution > 0.0 && !row.rests() {
         let approach = -dot(sub(row.velocity, touch.velocity), touch.normal);
-        let gap = dot(touch.normal, row.place) - touch.offset;
+        let gap = dot(touch.normal, row.position) - touch.offset;
         if approach > c.bouncing.max(gap * c.diameter / c.dt) {
             touch.bounce = c.restitution * approach;
         }
@@ -218,7 +218,7 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, motion: Moti
                 fastest = fastest.max(dot(row.velocity, row.velocity));
             }
             rest::judge(row, c.rest);
-            let strayed = [0, 1, 2].map(|axis| row.place[axis] - anchors[axis][member]);
+            let strayed = [0, 1, 2].map(|axis| row.position[axis] - anchors[axis][member]);
             block.has_strayed |= dot(strayed, strayed) > far;
             block.is_awake |= !row.rests();
         }
@@ -241,7 +241,7 @@ fn move_on(row: &mut Row, c: &Coefficients, motion: &Motion) {
         row.velocity = add(bounded(driven, motion.fastest), fall);
     }
     let way = add(scaled(row.velocity, c.dt / c.diameter), row.push);
-    row.place = add(row.place, way);
+    row.position = add(row.position, way);
     // The travel of the meshes, which uses up the limit, includes `along`.
     row.limit += norm(motion.along) - norm(sub(way, motion.along));
     // Its square may be over 0 in diameters and underflow to 0 in m/s.
@@ -267,7 +267,7 @@ fn resist(row: &mut Row, touch: &mut Touch, c: &Coefficients, last: bool) {
         return;
     }
     let normal = touch.normal;
-    let gap = dot(normal, row.place) - touch.offset;
+    let gap = dot(normal, row.position) - touch.offset;
     let relative = sub(row.velocity, touch.velocity);
     let along = dot(relative, normal);
     let least = if gap < c.band { -touch.stick * c.weight } else { 0.0 };
@@ -296,7 +296,7 @@ fn hold(row: &mut Row, touch: &Touch, c: &Coefficients) {
     if row.rests() {
         return;
     }
-    let gap = dot(touch.normal, row.place) - touch.offset;
+    let gap = dot(touch.normal, row.position) - touch.offset;
     let moves = dot(row.velocity, touch.normal) * (c.dt / c.diameter) + dot(row.push, touch.normal);
     let missing = (-gap).min(FARTHEST) - moves;
     if missing > HELD {

@@ -75,17 +75,17 @@ impl<'a> Surfaces<'a> {
     }
 
     /// Which side of the surfaces a position (m) is on.
-    pub fn side(&self, place: DVec3) -> Side {
+    pub fn side(&self, position: DVec3) -> Side {
         let mut side = Side { distance: FAR, out: Vec::new() };
         if let Some(floor) = &self.floor {
-            side.distance = side.distance.min((place.y - floor.height) / self.diameter);
+            side.distance = side.distance.min((position.y - floor.height) / self.diameter);
         }
         if let Some((cell, window)) = &self.field {
-            let distance = f64::from(window.sample([0, 1, 2].map(|axis| place[axis] / cell)).0);
+            let distance = f64::from(window.sample([0, 1, 2].map(|axis| position[axis] / cell)).0);
             side.distance = side.distance.min(distance / self.diameter);
         }
         for (index, (shell, _)) in self.shells.iter().enumerate() {
-            if let Some((depth, out)) = shell.depth(place, FAR * self.diameter) {
+            if let Some((depth, out)) = shell.depth(position, FAR * self.diameter) {
                 side.distance = side.distance.min(FAR - depth / self.diameter);
                 side.out.push((index, out));
             }
@@ -94,9 +94,10 @@ impl<'a> Surfaces<'a> {
     }
 
     /// Collects the triangles near positions (m) for [`Surfaces::release`].
-    pub fn find(&self, places: impl Iterator<Item = DVec3>, nearby: &mut Vec<Nearby>) {
+    pub fn find(&self, positions: impl Iterator<Item = DVec3>, nearby: &mut Vec<Nearby>) {
         let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
-        let [low, high] = places.fold(none, |[low, high], place| [low.inf(&place), high.sup(&place)]);
+        let [low, high] =
+            positions.fold(none, |[low, high], position| [low.inf(&position), high.sup(&position)]);
         let room = DVec3::repeat((FARTHEST + 0.5) * self.diameter);
         nearby.resize_with(self.shells.len(), Nearby::default);
         for ((shell, _), nearby) in self.shells.iter().zip(nearby) {
@@ -107,63 +108,63 @@ impl<'a> Surfaces<'a> {
     /// Displacement (diameters) that moves a grain at a position (m) out of the surfaces, and whether it is trapped: it has no free
     /// position, and is only moved out of the ground.
     pub fn release(&self, from: DVec3, nearby: &mut [Nearby]) -> (V, bool) {
-        let way = |place: DVec3| {
-            let way = (place - from) / self.diameter;
+        let way = |position: DVec3| {
+            let way = (position - from) / self.diameter;
             [0, 1, 2].map(|axis| way[axis] as f32)
         };
-        let mut place = from;
+        let mut position = from;
         for _ in 0..ROUNDS {
             let mut is_out = true;
-            self.for_each_way_out(&mut place, nearby, false, |depth| is_out &= depth <= ROUNDED * DEEP);
+            self.for_each_way_out(&mut position, nearby, false, |depth| is_out &= depth <= ROUNDED * DEEP);
             if is_out {
-                return (way(place), false);
+                return (way(position), false);
             }
-            if (place - from).norm() > FARTHEST * self.diameter {
+            if (position - from).norm() > FARTHEST * self.diameter {
                 break;
             }
         }
-        place = from;
+        position = from;
         for _ in 0..ROUNDS {
             let mut is_out = true;
-            self.for_each_way_out(&mut place, nearby, true, |depth| is_out &= depth <= ROUNDED * DEEP);
+            self.for_each_way_out(&mut position, nearby, true, |depth| is_out &= depth <= ROUNDED * DEEP);
             if is_out {
                 break;
             }
         }
-        (way(place), true)
+        (way(position), true)
     }
 
     /// Moves a position (m) out of each surface in turn, or of ground only, and reports the depth (diameters) that it had in each.
     fn for_each_way_out(
         &self,
-        place: &mut DVec3,
+        position: &mut DVec3,
         nearby: &mut [Nearby],
         only_ground: bool,
         mut tell: impl FnMut(f64),
     ) {
         let half = 0.5 * self.diameter;
         if let Some(floor) = &self.floor {
-            let depth = floor.height + half - place.y;
+            let depth = floor.height + half - position.y;
             tell(depth / self.diameter);
-            place.y += depth.max(0.0);
+            position.y += depth.max(0.0);
         }
         if let Some((cell, window)) = self.field.as_ref().filter(|_| !only_ground) {
-            let (distance, gradient) = window.sample([0, 1, 2].map(|axis| place[axis] / cell));
+            let (distance, gradient) = window.sample([0, 1, 2].map(|axis| position[axis] / cell));
             let depth = half - f64::from(distance);
             tell(depth / self.diameter);
             let steep = dot(gradient, gradient).sqrt();
             if depth > 0.0 && steep > 1.0e-6 {
-                *place += DVec3::from(gradient.map(f64::from)) * (depth / f64::from(steep));
+                *position += DVec3::from(gradient.map(f64::from)) * (depth / f64::from(steep));
             }
         }
         for ((shell, _), nearby) in self.shells.iter().zip(nearby) {
             if only_ground && !shell.is_ground() {
                 continue;
             }
-            let nearest = nearby.nearest(shell, *place, DEPTHS * half);
-            if let Some((depth, out)) = shell.depth_beside(*place, half, nearest) {
+            let nearest = nearby.nearest(shell, *position, DEPTHS * half);
+            if let Some((depth, out)) = shell.depth_beside(*position, half, nearest) {
                 tell(depth / self.diameter);
-                *place += out * depth.max(0.0);
+                *position += out * depth.max(0.0);
             }
         }
     }

@@ -65,15 +65,15 @@ impl End<'_> {
         let blocks = which.par_iter().zip(&around).with_max_len(1);
         let released = blocks.map_init(Vec::new, |nearby: &mut Vec<Nearby>, (&block, surfaces)| {
             let at = self.layout.blocks[block as usize].at;
-            let place = |slot: u32| world(at, seen[slot as usize].place, self.diameter);
+            let position = |slot: u32| world(at, seen[slot as usize].position, self.diameter);
             let deep = &deep[block as usize];
-            surfaces.find(deep.iter().map(|&slot| place(slot)), nearby);
-            deep.iter().map(|&slot| (slot, surfaces.release(place(slot), nearby))).collect::<Vec<_>>()
+            surfaces.find(deep.iter().map(|&slot| position(slot)), nearby);
+            deep.iter().map(|&slot| (slot, surfaces.release(position(slot), nearby))).collect::<Vec<_>>()
         });
         let released: Vec<Vec<(u32, (V, bool))>> = released.collect();
         let mut trapped = Vec::new();
         for (slot, (way, is_trapped)) in released.into_iter().flatten() {
-            rows[slot as usize].place = add(rows[slot as usize].place, way);
+            rows[slot as usize].position = add(rows[slot as usize].position, way);
             if is_trapped {
                 trapped.push(ids[slot as usize]);
             }
@@ -101,14 +101,14 @@ impl End<'_> {
                 return !row.rests();
             }
             let moved = dot(touch.velocity, touch.normal) * (self.dt / self.diameter) as f32;
-            let depth = touch.offset + moved - dot(touch.normal, row.place);
+            let depth = touch.offset + moved - dot(touch.normal, row.position);
             depth > if row.rests() { 0.5 * DEEP as f32 } else { -NEAR }
         };
         let was_pushed_in = |slot: &&u32| {
             let row = &rows[**slot as usize];
             let is_in_mesh = || row.limit > 0.0 && f64::from(row.limit) - self.travelled < 0.5;
             let is_in_field = || {
-                let distance = field.and_then(|field| field.distance(index, block.at, row.place));
+                let distance = field.and_then(|field| field.distance(index, block.at, row.position));
                 distance.is_some_and(|distance| distance < 0.5)
             };
             !row.rests() && (has_mesh && is_in_mesh() || is_in_field())

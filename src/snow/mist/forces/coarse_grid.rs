@@ -5,15 +5,15 @@ use rayon::prelude::*;
 use crate::flow::{Coord, Flow, tiles::FACES};
 use crate::geometry::DVec3;
 
-/// Cells between two places.
+/// Cells between two positions.
 const SPACING: usize = 4;
-/// Places along the edge of a tile, both ends included.
+/// Positions along the edge of a tile, both ends included.
 const EDGE: usize = 8 / SPACING + 1;
-/// Places of a tile.
-pub const PLACES: usize = EDGE * EDGE * EDGE;
+/// Positions of a tile.
+pub const POSITIONS: usize = EDGE * EDGE * EDGE;
 
-/// The places (m) of a tile with cells of an edge (m).
-pub fn places(tile: Coord, cell: f64) -> [DVec3; PLACES] {
+/// The positions (m) of a tile with cells of an edge (m).
+pub fn positions(tile: Coord, cell: f64) -> [DVec3; POSITIONS] {
     std::array::from_fn(|index| {
         let at = [index / (EDGE * EDGE), index / EDGE % EDGE, index % EDGE];
         let cells = |axis: usize| f64::from(tile[axis] * 8 + (at[axis] * SPACING) as i32);
@@ -21,9 +21,9 @@ pub fn places(tile: Coord, cell: f64) -> [DVec3; PLACES] {
     })
 }
 
-/// Changes the velocity (m/s) at all faces of active cells: `change(old, value)` of the vectors at the places of their tiles,
+/// Changes the velocity (m/s) at all faces of active cells: `change(old, value)` of the vectors at the positions of their tiles,
 /// interpolated linearly.
-pub fn change(flow: &mut Flow, values: &[[[f32; 3]; PLACES]], change: impl Fn(f32, f32) -> f32 + Sync) {
+pub fn change(flow: &mut Flow, values: &[[[f32; 3]; POSITIONS]], change: impl Fn(f32, f32) -> f32 + Sync) {
     let (tiles, velocity, _) = flow.fields();
     for (axis, field) in velocity.iter_mut().enumerate() {
         field.par_iter_mut().enumerate().with_min_len(8).for_each(|(slot, faces)| {
@@ -47,7 +47,7 @@ pub fn change(flow: &mut Flow, values: &[[[f32; 3]; PLACES]], change: impl Fn(f3
 }
 
 /// The component on an axis at the lower face on it of a cell of a tile, 8 along that axis for the upper faces of the last ones.
-fn at_face(values: &[[f32; 3]; PLACES], axis: usize, at: [usize; 3]) -> f32 {
+fn at_face(values: &[[f32; 3]; POSITIONS], axis: usize, at: [usize; 3]) -> f32 {
     let (mut low, mut share) = ([0; 3], [0.0f32; 3]);
     for along in 0..3 {
         let half = if along == axis { 0.0 } else { 0.5 };
@@ -72,15 +72,16 @@ mod tests {
     #[test]
     fn a_linear_field_is_exact_at_the_faces() {
         let edge = 0.5;
-        let field =
-            |place: DVec3| [place.x - 2.0 * place.z, place.y, 3.0 * place.z + place.x].map(|x| x as f32);
+        let field = |position: DVec3| {
+            [position.x - 2.0 * position.z, position.y, 3.0 * position.z + position.x].map(|x| x as f32)
+        };
         let tile = [2, -1, 0];
-        let values = places(tile, edge).map(field);
+        let values = positions(tile, edge).map(field);
         for (axis, cell) in [(0, [0, 0, 0]), (1, [7, 7, 7]), (2, [3, 4, 5]), (0, [8, 7, 1])] {
             let mut at = cell.map(|x| x as f64 + 0.5);
             at[axis] -= 0.5;
-            let place = DVec3::from([0, 1, 2].map(|i| (f64::from(tile[i] * 8) + at[i]) * edge));
-            assert!((at_face(&values, axis, cell) - field(place)[axis]).abs() < 1e-4);
+            let position = DVec3::from([0, 1, 2].map(|i| (f64::from(tile[i] * 8) + at[i]) * edge));
+            assert!((at_face(&values, axis, cell) - field(position)[axis]).abs() < 1e-4);
         }
     }
 }

@@ -32,12 +32,12 @@ pub fn stir(ctx: &Context, flow: &mut Flow, params: &Params, time: f64, dt: f64)
     let tiles = &flow.tiles().coords()[..flow.tiles().active()];
     let at = |tile: &_| {
         ctx.check()?;
-        Ok(coarse_grid::places(*tile, cell).map(|place| {
-            let push = eddies.curl(place) * (params.turbulence * dt);
+        Ok(coarse_grid::positions(*tile, cell).map(|position| {
+            let push = eddies.curl(position) * (params.turbulence * dt);
             [push.x as f32, push.y as f32, push.z as f32]
         }))
     };
-    let values: Result<Vec<[[f32; 3]; coarse_grid::PLACES]>> =
+    let values: Result<Vec<[[f32; 3]; coarse_grid::POSITIONS]>> =
         tiles.par_iter().with_min_len(8).map(at).collect();
     coarse_grid::change(flow, &values?, |old, push| old + push);
     Ok(())
@@ -68,9 +68,9 @@ impl Eddies {
         }
     }
 
-    /// A noise at a place (m).
-    fn potential(&self, component: usize, place: DVec3) -> f64 {
-        let [x, y, z] = ((place - self.shift) / self.size).into();
+    /// A noise at a position (m).
+    fn potential(&self, component: usize, position: DVec3) -> f64 {
+        let [x, y, z] = ((position - self.shift) / self.size).into();
         let of_set = |(noises, weight): &([FastNoiseLite; 3], f64)| match *weight {
             0.0 => 0.0,
             weight => weight * f64::from(noises[component].get_noise_3d(x, y, z)),
@@ -78,13 +78,13 @@ impl Eddies {
         of_set(&self.sets[0]) + of_set(&self.sets[1])
     }
 
-    /// Their curl at a place (m), with a root mean square of 1.
-    fn curl(&self, place: DVec3) -> DVec3 {
+    /// Their curl at a position (m), with a root mean square of 1.
+    fn curl(&self, position: DVec3) -> DVec3 {
         let half = 0.5 * STEP * self.size;
         let slope = |component: usize, axis: usize| {
             let mut off = DVec3::zeros();
             off[axis] = half;
-            (self.potential(component, place + off) - self.potential(component, place - off)) / STEP
+            (self.potential(component, position + off) - self.potential(component, position - off)) / STEP
         };
         UNIT * DVec3::new(slope(2, 1) - slope(1, 2), slope(0, 2) - slope(2, 0), slope(1, 0) - slope(0, 1))
     }
@@ -125,12 +125,12 @@ mod tests {
         let strength = f64::sqrt(squares / count);
         assert!((strength - 1.0).abs() < 0.03, "{strength}");
         let h = 0.5 * STEP * 0.2;
-        let place = DVec3::new(0.31, 0.12, 0.77);
+        let position = DVec3::new(0.31, 0.12, 0.77);
         let divergence: f64 = (0..3)
             .map(|axis| {
                 let mut off = DVec3::zeros();
                 off[axis] = h;
-                (eddies.curl(place + off)[axis] - eddies.curl(place - off)[axis]) / (2.0 * h)
+                (eddies.curl(position + off)[axis] - eddies.curl(position - off)[axis]) / (2.0 * h)
             })
             .sum();
         // Of a unit field of this size, slopes are about 1 / size = 5.

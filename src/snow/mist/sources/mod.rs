@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::flow::{Coord, Tile};
 use crate::geometry::DVec3;
 
-/// Farthest place of a grain from the origin on an axis (cells).
+/// Farthest position of a grain from the origin on an axis (cells).
 const FARTHEST_CELL: f64 = 1e7;
 /// Acceleration (m/s2) up to which a grain is taken to fly freely, under gravity and the drag of air; at twice as much it is hit.
 const FREE: f64 = 20.0;
@@ -21,7 +21,7 @@ const LARGEST: f64 = 64.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Source {
     /// Position (m) at the end of the step.
-    pub place: DVec3,
+    pub position: DVec3,
     /// Velocity (m/s).
     pub velocity: [f32; 3],
     /// Radius (m) of the grain.
@@ -34,7 +34,7 @@ pub struct Source {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Start {
     /// Position (m): that of its birth where it was born in the step.
-    pub place: DVec3,
+    pub position: DVec3,
     /// Velocity (m/s), 0 where it was born in the step.
     pub velocity: [f32; 3],
 }
@@ -43,11 +43,11 @@ impl Source {
     /// Checks that it can raise mist in cells of an edge (m).
     ///
     /// # Errors
-    /// A number that is not finite; a place that is too far from the origin; a radius that is negative or too large.
+    /// A number that is not finite; a position that is too far from the origin; a radius that is negative or too large.
     pub(super) fn check(&self, cell: f64) -> Result<()> {
-        let [x, y, z] = self.place.into();
+        let [x, y, z] = self.position.into();
         let at = format!("grain at ({x:.3}, {y:.3}, {z:.3}) m");
-        if !self.place.iter().all(|x| x.abs() <= FARTHEST_CELL * cell) {
+        if !self.position.iter().all(|x| x.abs() <= FARTHEST_CELL * cell) {
             return Err(Error::argument(format!(
                 "the {at} is farther than {FARTHEST_CELL:.0} cells from the origin"
             )));
@@ -56,7 +56,7 @@ impl Source {
             return Err(Error::argument(format!("the velocity of the {at} is not finite")));
         }
         if let Some(start) = self.start {
-            let is_near = start.place.iter().all(|x| x.abs() <= FARTHEST_CELL * cell);
+            let is_near = start.position.iter().all(|x| x.abs() <= FARTHEST_CELL * cell);
             if !(is_near && start.velocity.iter().all(|speed| speed.is_finite())) {
                 return Err(Error::argument(format!(
                     "the {at} began the step with a velocity that is not finite, or farther than {FARTHEST_CELL:.0} cells from the origin"
@@ -88,13 +88,13 @@ impl Source {
     fn motion(&self, start: &Start, dt: f64) -> Motion {
         let now = DVec3::from(self.velocity.map(f64::from)) * dt;
         let before = DVec3::from(start.velocity.map(f64::from)) * dt;
-        let (gain, off) = (now - before, start.place + now - self.place);
+        let (gain, off) = (now - before, start.position + now - self.position);
         let middle = (off.dot(&gain) / gain.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
         // What the velocities do not lead to is spread over the step.
         let rest = gain * middle - off;
         let free = 2.0 - gain.norm() / (FREE * dt * dt);
         let width = 2.0 * middle.min(1.0 - middle) * free.clamp(0.0, 1.0);
-        Motion { from: start.place, before: before + rest, gain, middle, width }
+        Motion { from: start.position, before: before + rest, gain, middle, width }
     }
 }
 
@@ -113,7 +113,7 @@ struct Motion {
 
 impl Motion {
     /// Position (m) at a share 0..=1 of the step.
-    fn place(&self, share: f64) -> DVec3 {
+    fn position(&self, share: f64) -> DVec3 {
         let into = share - (self.middle - 0.5 * self.width);
         let gained = if into <= 0.0 {
             0.0
@@ -150,11 +150,11 @@ pub fn ways(sources: &[Source], params: &Params, dt: f64, [first, last]: [f64; 2
         let (velocity, ends) = match &source.start {
             None => {
                 let now = DVec3::from(source.velocity.map(f64::from)) * dt;
-                (source.velocity, [first, last].map(|share| source.place - now * (1.0 - share)))
+                (source.velocity, [first, last].map(|share| source.position - now * (1.0 - share)))
             }
             Some(start) => {
                 let motion = source.motion(start, dt);
-                let ends = [first, last].map(|share| motion.place(share));
+                let ends = [first, last].map(|share| motion.position(share));
                 let mean = (ends[1] - ends[0]) / time;
                 ([mean.x as f32, mean.y as f32, mean.z as f32], ends)
             }
@@ -206,7 +206,7 @@ const SEED_BYTES: u64 = 4 * size_of::<Tile>() as u64;
 fn box_of(way: &Way, cell: f64) -> [Coord; 2] {
     let [from, to] = way.ends;
     let reach = DVec3::repeat(2.0 * way.radius + cell);
-    let tile = |place: DVec3| [0, 1, 2].map(|axis| (place[axis] / (8.0 * cell)).floor() as i32);
+    let tile = |position: DVec3| [0, 1, 2].map(|axis| (position[axis] / (8.0 * cell)).floor() as i32);
     [tile(from.inf(&to) - reach), tile(from.sup(&to) + reach)]
 }
 
@@ -228,9 +228,9 @@ fn tiles_of(way: &Way, cell: f64) -> Vec<Coord> {
     out
 }
 
-/// Distance (m) of a place from a segment.
-fn distance(place: DVec3, from: DVec3, to: DVec3) -> f64 {
-    let (way, off) = (to - from, place - from);
+/// Distance (m) of a position from a segment.
+fn distance(position: DVec3, from: DVec3, to: DVec3) -> f64 {
+    let (way, off) = (to - from, position - from);
     let share = (off.dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
     (off - way * share).norm()
 }
@@ -253,9 +253,9 @@ fn seed(group: &[(Coord, u32)], ways: &[Way], params: &Params) -> Seed {
         let rows = x.flat_map(|x| y.clone().map(move |y| x << 6 | y << 3));
         for cell in rows.flat_map(|row| z.clone().map(move |z| row | z)) {
             let at = [cell >> 6, cell >> 3 & 7, cell & 7];
-            let place =
+            let position =
                 [0, 1, 2].map(|axis| (f64::from(coord[axis] * 8 + at[axis] as i32) + 0.5) * params.cell);
-            let apart = distance(DVec3::from(place), from, to);
+            let apart = distance(DVec3::from(position), from, to);
             let cover = (0.5 + (2.0 * radius - apart) / params.cell).clamp(0.0, 1.0) as f32;
             if cover > 0.0 {
                 density[cell] = density[cell].max(cover);

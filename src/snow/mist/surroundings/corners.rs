@@ -37,14 +37,14 @@ impl Lattice {
     }
 
     /// All corners (m) of a tile.
-    pub fn places(self, tile: Coord) -> impl Iterator<Item = DVec3> {
+    pub fn positions(self, tile: Coord) -> impl Iterator<Item = DVec3> {
         let count = self.corners();
         let at = move |index: usize| [index / (count * count), index / count % count, index % count];
-        (0..count.pow(3)).map(move |index| self.place(tile, at(index)))
+        (0..count.pow(3)).map(move |index| self.position(tile, at(index)))
     }
 
     /// The corner (m) at an index in a tile.
-    pub fn place(&self, tile: Coord, at: [usize; 3]) -> DVec3 {
+    pub fn position(&self, tile: Coord, at: [usize; 3]) -> DVec3 {
         let index = |axis: usize| f64::from(tile[axis] * 8 * self.parts as i32 + at[axis] as i32);
         DVec3::new(index(0), index(1), index(2)) * self.spacing()
     }
@@ -94,9 +94,9 @@ impl<'a> Grid<'a> {
         let bounds: Vec<Option<[[i32; 3]; 2]>> = bounds.map(|bounds| Some(bounds).filter(is_near)).collect();
         let mut all = if edge > WIDEST {
             let near = tiles.iter().zip(&bounds).filter(|(_, bounds)| bounds.is_some());
-            let places: Vec<DVec3> = near.flat_map(|(tile, _)| lattice.places(*tile)).collect();
+            let positions: Vec<DVec3> = near.flat_map(|(tile, _)| lattice.positions(*tile)).collect();
             let mut values = Vec::new();
-            grid.sample_linear(ctx, &places, &mut values)?;
+            grid.sample_linear(ctx, &positions, &mut values)?;
             let each = values.chunks(lattice.corners().pow(3));
             each.map(|values| Distances::Corners(values.to_vec())).collect::<Vec<_>>()
         } else {

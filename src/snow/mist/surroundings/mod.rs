@@ -138,9 +138,10 @@ impl<'a> Moving<'a> {
         let jumps = farthest > FASTEST_OBJECT * (to - from);
         // A turn may lead outside the box of both poses.
         let room = DVec3::repeat(if jumps { 0.0 } else { farthest });
-        let places = last.iter().chain(first.iter().filter(|_| !jumps));
+        let positions = last.iter().chain(first.iter().filter(|_| !jumps));
         let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
-        let [low, high] = places.fold(none, |[low, high], place| [low.inf(place), high.sup(place)]);
+        let [low, high] =
+            positions.fold(none, |[low, high], position| [low.inf(position), high.sup(position)]);
         Ok(Self {
             body,
             is_sheet,
@@ -218,9 +219,10 @@ impl Walls<'_> {
         let cell = mist.params().cell;
         let lattice = Lattice { cell, parts: 1 };
         let raising = sources.iter().filter(|source| source.raises(mist.params()));
-        let places = raising.map(|source| source.place).chain(lattice.bounds(mist.flow().tiles().coords()));
+        let positions =
+            raising.map(|source| source.position).chain(lattice.bounds(mist.flow().tiles().coords()));
         let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
-        let bounds = places.fold(none, |[low, high], at| [low.inf(&at), high.sup(&at)]);
+        let bounds = positions.fold(none, |[low, high], at| [low.inf(&at), high.sup(&at)]);
         let near = self.bodies.iter().filter(|body| body.is_near(&bounds, NEAR * cell));
         near.map(|body| body.speed).fold(0.0, f64::max)
     }
@@ -412,13 +414,13 @@ impl Around<'_> {
         let mut distances = [Vec::with_capacity(count.pow(3)), Vec::with_capacity(count.pow(3))];
         for corner in 0..count.pow(3) {
             let at = [corner / (count * count), corner / count % count, corner % count];
-            let place = self.lattice.place(tile, at);
+            let position = self.lattice.position(tile, at);
             // Level sets are sampled in their own cells: the corner's number keeps what is exact so.
             let number = DVec3::from(
                 [0, 1, 2].map(|axis| f64::from(tile[axis] * 8 * self.lattice.parts as i32 + at[axis] as i32)),
             );
             let of = |grid: &Grid<'_>| grid.at(index, corner, number);
-            let floor = self.floor.map(|floor| (place.y - floor) as f32);
+            let floor = self.floor.map(|floor| (position.y - floor) as f32);
             let [base, fixed] = self.still.each_ref().map(|grid| grid.as_ref().and_then(of));
             let open = self.opened.as_ref().and_then(of).map_or(f32::NEG_INFINITY, |swept| -swept);
             let base = base.map(|base| base.max(open));
@@ -426,7 +428,7 @@ impl Around<'_> {
             let moving = self.moving.iter().filter_map(of);
             let solids = [still.fold(far, f32::min), moving.fold(far, f32::min)];
             for side in 0..2 {
-                let near = sheets[side].iter().filter_map(|sheet| sheet.shell.nearest(place, half));
+                let near = sheets[side].iter().filter_map(|sheet| sheet.shell.nearest(position, half));
                 let nearest = near.map(|near| (near.square.sqrt() - half) as f32);
                 distances[side].push(nearest.fold(solids[side], f32::min));
             }
@@ -460,10 +462,10 @@ impl Around<'_> {
             return 0.0;
         }
         let half = 0.5 * self.lattice.cell;
-        let mut place = self.lattice.place(tile, cell.map(|x| x * parts)).add_scalar(half);
-        place[axis] -= half;
+        let mut position = self.lattice.position(tile, cell.map(|x| x * parts)).add_scalar(half);
+        position[axis] -= half;
         let near = self.surfaces[1].iter().filter_map(|shell| {
-            let found = shell.shell.nearest(place, NEAR * self.lattice.cell)?;
+            let found = shell.shell.nearest(position, NEAR * self.lattice.cell)?;
             Some((found.square, found.motion[axis] * shell.rate))
         });
         let nearest = near.reduce(|a, b| if b.0 < a.0 { b } else { a });

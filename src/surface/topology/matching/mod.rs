@@ -66,8 +66,8 @@ impl Default for Matching {
 /// A node of the grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Node {
-    /// Its place (cells).
-    pub place: [i32; 3],
+    /// Its position (cells).
+    pub position: [i32; 3],
     /// Signed distance from the mesh (cells), negative inside; may be cut off beyond sqrt(3).
     pub gamma: f32,
     /// Signed distance from the particles' surface (cells), negative inside; where that is farther than its band is wide, the
@@ -102,7 +102,7 @@ pub struct Matched {
 /// solve their equations, and with 0 they become phi.
 ///
 /// # Errors
-/// Parameters out of range; two nodes at the same place; distances that are not finite; more memory than the context allows; cancel.
+/// Parameters out of range; two nodes at the same position; distances that are not finite; more memory than the context allows; cancel.
 pub fn match_topology(ctx: &Context, nodes: &[Node], matching: &Matching) -> Result<Matched> {
     matching.validate()?;
     ctx.check()?;
@@ -162,7 +162,7 @@ mod tests {
         Context::new(Pool::new(threads).unwrap())
     }
 
-    /// Places of a box, ascending.
+    /// Positions of a box, ascending.
     fn each(low: [i32; 3], high: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
         let on = move |axis: usize| low[axis]..=high[axis];
         on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])))
@@ -175,36 +175,42 @@ mod tests {
     /// Two balls with a radius of 8 and 1.5 between them. For phi they lie `shift` farther along y, and a neck has grown
     /// between them; flagged within 7 of the gap.
     fn balls(shift: f64) -> Vec<Node> {
-        let node = |place: [i32; 3]| {
-            let place_of = DVec3::from(place.map(f64::from));
-            let ball = |side: f64, shift: f64| (place_of - DVec3::new(side * 8.75, shift, 0.0)).norm() - 8.0;
+        let node = |position: [i32; 3]| {
+            let position_of = DVec3::from(position.map(f64::from));
+            let ball =
+                |side: f64, shift: f64| (position_of - DVec3::new(side * 8.75, shift, 0.0)).norm() - 8.0;
             let (a, b) = (ball(-1.0, shift), ball(1.0, shift));
             // Smooth minimum.
             let near = (6.0 - (a - b).abs()).max(0.0) / 6.0;
             let phi = a.min(b) - near * near * 1.5;
             let gamma = ball(-1.0, 0.0).min(ball(1.0, 0.0));
-            let is_flagged = place_of.norm() <= 7.0;
-            Node { place, gamma: gamma.clamp(-4.0, 4.0) as f32, phi: phi.clamp(-5.0, 5.0) as f32, is_flagged }
+            let is_flagged = position_of.norm() <= 7.0;
+            Node {
+                position,
+                gamma: gamma.clamp(-4.0, 4.0) as f32,
+                phi: phi.clamp(-5.0, 5.0) as f32,
+                is_flagged,
+            }
         };
         each(HALF.map(|x| -x), HALF).map(node).collect()
     }
 
-    /// Index of a place in the grid of two balls.
-    fn index(place: [i32; 3]) -> usize {
-        (0..3).fold(0, |at, axis| at * (2 * HALF[axis] + 1) as usize + (place[axis] + HALF[axis]) as usize)
+    /// Index of a position in the grid of two balls.
+    fn index(position: [i32; 3]) -> usize {
+        (0..3).fold(0, |at, axis| at * (2 * HALF[axis] + 1) as usize + (position[axis] + HALF[axis]) as usize)
     }
 
     /// Whether a way over nodes inside leads from one ball's centre to the other's.
     fn are_joined(gamma: &[f32]) -> bool {
         let mut is_seen = vec![false; gamma.len()];
         let mut due = vec![[-9, 0, 0]];
-        while let Some(place) = due.pop() {
-            let at = index(place);
+        while let Some(position) = due.pop() {
+            let at = index(position);
             if gamma[at] >= 0.0 || std::mem::replace(&mut is_seen[at], true) {
                 continue;
             }
             for side in 0..6usize {
-                let mut next = place;
+                let mut next = position;
                 next[side / 2] += if side.is_multiple_of(2) { -1 } else { 1 };
                 if (0..3).all(|axis| next[axis].abs() <= HALF[axis]) {
                     due.push(next);
@@ -216,18 +222,18 @@ mod tests {
 
     /// Nodes in a box, some missing, with values that look random.
     fn noise() -> Vec<Node> {
-        let random = |place: [i32; 3], salt: u32| {
+        let random = |position: [i32; 3], salt: u32| {
             let mix = |sum: u32, x: u32| (sum ^ x).wrapping_mul(0x9e37_79b1).rotate_left(13) ^ (sum >> 7);
-            place.into_iter().map(|x| x as u32).fold(mix(salt, 77), mix).wrapping_mul(0x85eb_ca6b) >> 8
+            position.into_iter().map(|x| x as u32).fold(mix(salt, 77), mix).wrapping_mul(0x85eb_ca6b) >> 8
         };
-        let value = |place, salt| (random(place, salt) % 6000) as f32 / 1000.0 - 3.0;
+        let value = |position, salt| (random(position, salt) % 6000) as f32 / 1000.0 - 3.0;
         each([-9, -7, -5], [12, 8, 9])
-            .filter(|place| !random(*place, 1).is_multiple_of(7))
-            .map(|place| Node {
-                place,
-                gamma: value(place, 2),
-                phi: value(place, 3),
-                is_flagged: random(place, 4).is_multiple_of(3),
+            .filter(|position| !random(*position, 1).is_multiple_of(7))
+            .map(|position| Node {
+                position,
+                gamma: value(position, 2),
+                phi: value(position, 3),
+                is_flagged: random(position, 4).is_multiple_of(3),
             })
             .collect()
     }
@@ -243,10 +249,10 @@ mod tests {
 
     /// Nodes of two planes and between them, where Gamma says nothing.
     fn planes() -> Vec<Node> {
-        let node = |place: [i32; 3]| {
-            let is_flagged = (1..12).contains(&place[0]);
-            let phi = (place[0] * 3 + place[1] * 5 + place[2]) as f32 / 8.0 % 1.0;
-            Node { place, gamma: if is_flagged { 3.0 } else { phi + psi(place[0]) }, phi, is_flagged }
+        let node = |position: [i32; 3]| {
+            let is_flagged = (1..12).contains(&position[0]);
+            let phi = (position[0] * 3 + position[1] * 5 + position[2]) as f32 / 8.0 % 1.0;
+            Node { position, gamma: if is_flagged { 3.0 } else { phi + psi(position[0]) }, phi, is_flagged }
         };
         each([0; 3], [12, 4, 3]).map(node).collect()
     }
@@ -259,8 +265,9 @@ mod tests {
             assert_eq!((out.fixed, out.free), (2 * 20, 11 * 20));
             assert!(out.iterations < 400, "{solver:?} took {}", out.iterations);
             assert!(out.residual < 1e-9, "{solver:?} left {}", out.residual);
-            let far =
-                greatest(nodes.iter().zip(&out.gamma).map(|(node, out)| out - node.phi - psi(node.place[0])));
+            let far = greatest(
+                nodes.iter().zip(&out.gamma).map(|(node, out)| out - node.phi - psi(node.position[0])),
+            );
             assert!(far < 1e-6, "{solver:?} is off by {far}");
         }
     }
@@ -319,13 +326,13 @@ mod tests {
             assert!(out.iterations < 100, "{solver:?} took {}", out.iterations);
             let mut stayed = 0;
             for (node, gamma) in nodes.iter().zip(&out.gamma) {
-                let is_far = node.place.iter().any(|x| x.abs() > 15);
+                let is_far = node.position.iter().any(|x| x.abs() > 15);
                 let is_fixed = !node.is_flagged && node.gamma.abs() <= 1.7;
                 if is_far || is_fixed {
-                    assert_eq!(node.gamma.to_bits(), gamma.to_bits(), "{solver:?} at {:?}", node.place);
+                    assert_eq!(node.gamma.to_bits(), gamma.to_bits(), "{solver:?} at {:?}", node.position);
                     stayed += 1;
                 } else if !node.is_flagged {
-                    assert_eq!(node.gamma < 0.0, *gamma < 0.0, "{solver:?} at {:?}", node.place);
+                    assert_eq!(node.gamma < 0.0, *gamma < 0.0, "{solver:?} at {:?}", node.position);
                 }
             }
             assert!(stayed > nodes.len() / 3 && stayed < nodes.len());
@@ -355,25 +362,25 @@ mod tests {
     #[test]
     fn no_sign_changes_at_the_rim() {
         // A drop of phi above liquid, across the rim at x = 10; flagged within 2 of the origin.
-        let node = |place: [i32; 3]| {
-            let drop = (DVec3::from(place.map(f64::from)) - DVec3::new(10.0, 0.0, 7.0)).norm() - 4.0;
-            let height = f64::from(place[2]) + 0.5;
-            let is_flagged = place.iter().all(|x| x.abs() <= 2);
+        let node = |position: [i32; 3]| {
+            let drop = (DVec3::from(position.map(f64::from)) - DVec3::new(10.0, 0.0, 7.0)).norm() - 4.0;
+            let height = f64::from(position[2]) + 0.5;
+            let is_flagged = position.iter().all(|x| x.abs() <= 2);
             let phi = height.min(drop).clamp(-4.0, 4.0) as f32;
-            Node { place, gamma: height.clamp(-3.0, 3.0) as f32, phi, is_flagged }
+            Node { position, gamma: height.clamp(-3.0, 3.0) as f32, phi, is_flagged }
         };
         let nodes: Vec<Node> = each([-14, -12, -12], [18, 12, 14]).map(node).collect();
         for solver in SOLVERS {
             let out = match_topology(&context(1), &nodes, &matching(solver, 1e-4, 8)).unwrap();
             let mut counts = [0; 2];
             for (node, gamma) in nodes.iter().zip(&out.gamma) {
-                let far = node.place.iter().map(|x| x.abs()).max().unwrap();
+                let far = node.position.iter().map(|x| x.abs()).max().unwrap();
                 if far >= 10 {
-                    assert_eq!(node.gamma < 0.0, *gamma < 0.0, "{solver:?} at {:?}", node.place);
+                    assert_eq!(node.gamma < 0.0, *gamma < 0.0, "{solver:?} at {:?}", node.position);
                     counts[0] += usize::from(far == 10 && node.phi < 0.0 && node.gamma > 0.0);
                 }
                 if far > 10 {
-                    assert_eq!(node.gamma.to_bits(), gamma.to_bits(), "{solver:?} at {:?}", node.place);
+                    assert_eq!(node.gamma.to_bits(), gamma.to_bits(), "{solver:?} at {:?}", node.position);
                 }
                 counts[1] += usize::from(node.gamma != *gamma);
             }
@@ -386,7 +393,7 @@ mod tests {
         // psi is -5.5 all along.
         let values = [(-1.5, 4.0, false), (1.0, 2.0, true), (3.0, 3.5, false), (3.0, 4.0, false)];
         let node = |(x, (gamma, phi, is_flagged)): (i32, (f32, f32, bool))| Node {
-            place: [x, 0, 0],
+            position: [x, 0, 0],
             gamma,
             phi,
             is_flagged,
@@ -402,22 +409,22 @@ mod tests {
 
     #[test]
     fn free_nodes_without_a_fixed_one_take_phi() {
-        let island = each([20, 0, 0], [22, 2, 2]).map(|place| {
-            let phi = 0.25 * (place[0] - 21) as f32 + 0.5 * place[1] as f32;
-            Node { place, gamma: -1.0, phi, is_flagged: true }
+        let island = each([20, 0, 0], [22, 2, 2]).map(|position| {
+            let phi = 0.25 * (position[0] - 21) as f32 + 0.5 * position[1] as f32;
+            Node { position, gamma: -1.0, phi, is_flagged: true }
         });
-        let other = each([0; 3], [2, 2, 2]).map(|place| Node {
-            place,
+        let other = each([0; 3], [2, 2, 2]).map(|position| Node {
+            position,
             gamma: 0.5,
             phi: 0.25,
-            is_flagged: place == [1; 3],
+            is_flagged: position == [1; 3],
         });
         let nodes: Vec<Node> = island.chain(other).collect();
         for solver in SOLVERS {
             let out = match_topology(&context(1), &nodes, &matching(solver, 1e-8, 3)).unwrap();
             assert_eq!((out.fixed, out.free), (26, 28));
             for (node, gamma) in nodes.iter().zip(&out.gamma) {
-                let expected = if node.place[0] >= 20 { node.phi } else { 0.5 };
+                let expected = if node.position[0] >= 20 { node.phi } else { 0.5 };
                 assert!((gamma - expected).abs() < 1e-6, "{solver:?}: {gamma} is not {expected}");
             }
         }
@@ -425,7 +432,7 @@ mod tests {
 
     #[test]
     fn nothing_is_nothing_and_what_makes_no_sense_is_refused() {
-        let node = Node { place: [1, 2, 3], gamma: 0.5, phi: 0.25, is_flagged: true };
+        let node = Node { position: [1, 2, 3], gamma: 0.5, phi: 0.25, is_flagged: true };
         for solver in SOLVERS {
             let small = Matching { solver, ..Matching::default() };
             let out = match_topology(&context(1), &[], &small).unwrap();

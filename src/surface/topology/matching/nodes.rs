@@ -21,7 +21,7 @@ enum Role {
 
 /// The nodes that are solved for.
 pub struct Free {
-    /// Their indices, ascending by place.
+    /// Their indices, ascending by position.
     pub nodes: Vec<u32>,
     /// The equation of each.
     pub rows: Vec<Row>,
@@ -36,7 +36,7 @@ impl Free {
     /// Those within `reach` cells, on each axis, of flagged ones.
     ///
     /// # Errors
-    /// Two nodes at the same place; distances that are not finite; more memory than the context allows; cancel.
+    /// Two nodes at the same position; distances that are not finite; more memory than the context allows; cancel.
     pub fn of(ctx: &Context, nodes: &[Node], reach: i32) -> Result<Self> {
         let sorted = sorted(nodes)?;
         let roles = roles(ctx, nodes, &sorted, reach)?;
@@ -85,15 +85,15 @@ fn keeps_its_side(node: &Node) -> bool {
     (node.phi < 0.0) == (node.gamma < 0.0) && !is_near(node.phi)
 }
 
-/// Places of nodes, ascending, with their indices.
+/// Positions of nodes, ascending, with their indices.
 fn sorted(nodes: &[Node]) -> Result<Vec<(Coord, u32)>> {
     if nodes.len() >= NONE as usize {
         return Err(Error::argument(format!("{} nodes are too many to match", nodes.len())));
     }
     if let Some(node) = nodes.iter().find(|node| !(node.gamma.is_finite() && node.phi.is_finite())) {
-        return Err(Error::argument(format!("the distances of node {:?} are not finite", node.place)));
+        return Err(Error::argument(format!("the distances of node {:?} are not finite", node.position)));
     }
-    let mut sorted: Vec<(Coord, u32)> = nodes.iter().map(|node| node.place).zip(0..).collect();
+    let mut sorted: Vec<(Coord, u32)> = nodes.iter().map(|node| node.position).zip(0..).collect();
     sorted.par_sort_unstable();
     match sorted.windows(2).find(|pair| pair[0].0 == pair[1].0) {
         Some(pair) => Err(Error::argument(format!("node {:?} is there twice", pair[0].0))),
@@ -101,18 +101,18 @@ fn sorted(nodes: &[Node]) -> Result<Vec<(Coord, u32)>> {
     }
 }
 
-/// The role of each node, in the order of places.
+/// The role of each node, in the order of positions.
 fn roles(ctx: &Context, nodes: &[Node], sorted: &[(Coord, u32)], reach: i32) -> Result<Vec<Role>> {
     ctx.check()?;
     let flagged = sorted.iter().filter(|(_, at)| nodes[*at as usize].is_flagged);
-    let flagged = Flagged::new(flagged.map(|(place, _)| *place));
-    let role = |(place, at): &(Coord, u32)| {
+    let flagged = Flagged::new(flagged.map(|(position, _)| *position));
+    let role = |(position, at): &(Coord, u32)| {
         let node = &nodes[*at as usize];
         if node.is_flagged {
             Role::Free
         } else if is_near(node.gamma) {
             Role::Fixed
-        } else if flagged.is_within(place, reach) {
+        } else if flagged.is_within(position, reach) {
             Role::Free
         } else {
             Role::Kept
@@ -126,20 +126,20 @@ fn roles(ctx: &Context, nodes: &[Node], sorted: &[(Coord, u32)], reach: i32) -> 
     Ok(roles.concat())
 }
 
-/// The nodes before and behind some on x, y and z; [`NONE`]: there is none. All are indices in the order of places; those of the
+/// The nodes before and behind some on x, y and z; [`NONE`]: there is none. All are indices in the order of positions; those of the
 /// piece ascend.
 fn beside(sorted: &[(Coord, u32)], piece: &[u32]) -> Vec<[u32; 6]> {
     let mut out = vec![[NONE; 6]; piece.len()];
     for side in 0..6 {
-        // What is beside ascending places ascends too: both lists are run through once.
+        // What is beside ascending positions ascends too: both lists are run through once.
         let mut last: Option<usize> = None;
         for (found, at) in out.iter_mut().zip(piece) {
             let Some(wanted) = step(sorted[*at as usize].0, side) else { continue };
-            let mut next = last.unwrap_or_else(|| sorted.partition_point(|(place, _)| *place < wanted));
-            while sorted.get(next).is_some_and(|(place, _)| *place < wanted) {
+            let mut next = last.unwrap_or_else(|| sorted.partition_point(|(position, _)| *position < wanted));
+            while sorted.get(next).is_some_and(|(position, _)| *position < wanted) {
                 next += 1;
             }
-            if sorted.get(next).is_some_and(|(place, _)| *place == wanted) {
+            if sorted.get(next).is_some_and(|(position, _)| *position == wanted) {
                 found[side] = next as u32;
             }
             last = Some(next);
@@ -148,11 +148,11 @@ fn beside(sorted: &[(Coord, u32)], piece: &[u32]) -> Vec<[u32; 6]> {
     out
 }
 
-/// The place beside one: before and behind it on x, y, z.
-fn step(mut place: Coord, side: usize) -> Option<Coord> {
+/// The position beside one: before and behind it on x, y, z.
+fn step(mut position: Coord, side: usize) -> Option<Coord> {
     let axis = side / 2;
-    place[axis] = place[axis].checked_add(if side.is_multiple_of(2) { -1 } else { 1 })?;
-    Some(place)
+    position[axis] = position[axis].checked_add(if side.is_multiple_of(2) { -1 } else { 1 })?;
+    Some(position)
 }
 
 /// Flagged nodes in a binary tree of boxes, split at medians. A leaf is a run of them on z.
@@ -168,13 +168,13 @@ struct Part {
 }
 
 impl Flagged {
-    /// Of places that ascend.
-    fn new(places: impl Iterator<Item = Coord>) -> Self {
+    /// Of positions that ascend.
+    fn new(positions: impl Iterator<Item = Coord>) -> Self {
         let mut runs: Vec<[Coord; 2]> = Vec::new();
-        for place in places {
+        for position in positions {
             match runs.last_mut() {
-                Some([_, [x, y, z]]) if [*x, *y, z.wrapping_add(1)] == place => *z = place[2],
-                _ => runs.push([place; 2]),
+                Some([_, [x, y, z]]) if [*x, *y, z.wrapping_add(1)] == position => *z = position[2],
+                _ => runs.push([position; 2]),
             }
         }
         let mut tree = Self { boxes: Vec::new() };
@@ -213,23 +213,23 @@ impl Flagged {
         index as u32
     }
 
-    /// Whether a place is within `reach` cells of one of them on each axis.
-    fn is_within(&self, place: &Coord, reach: i32) -> bool {
-        !self.boxes.is_empty() && self.has_within(0, place, i64::from(reach))
+    /// Whether a position is within `reach` cells of one of them on each axis.
+    fn is_within(&self, position: &Coord, reach: i32) -> bool {
+        !self.boxes.is_empty() && self.has_within(0, position, i64::from(reach))
     }
 
-    fn has_within(&self, index: usize, place: &Coord, reach: i64) -> bool {
+    fn has_within(&self, index: usize, position: &Coord, reach: i64) -> bool {
         let part = &self.boxes[index];
         let (mut nearest, mut farthest) = (0i64, 0i64);
         for axis in 0..3 {
-            let [at, low, high] = [place[axis], part.low[axis], part.high[axis]].map(i64::from);
+            let [at, low, high] = [position[axis], part.low[axis], part.high[axis]].map(i64::from);
             nearest = nearest.max(low - at).max(at - high);
             farthest = farthest.max(high - at).max(at - low);
         }
         if nearest > reach || farthest <= reach || part.right == 0 {
             return nearest <= reach;
         }
-        self.has_within(index + 1, place, reach) || self.has_within(part.right as usize, place, reach)
+        self.has_within(index + 1, position, reach) || self.has_within(part.right as usize, position, reach)
     }
 }
 
@@ -237,19 +237,19 @@ impl Flagged {
 mod tests {
     use super::*;
 
-    /// Places that look random, within so many cells of the origin on each axis; ascending.
+    /// Positions that look random, within so many cells of the origin on each axis; ascending.
     fn scattered(count: u32, size: u32) -> Vec<Coord> {
-        let place = |n: u32| {
+        let position = |n: u32| {
             let of = |axis: u32| {
                 (n.wrapping_mul(2_654_435_761).wrapping_add(axis.wrapping_mul(40_503)) >> (axis * 5 + 7))
                     % (2 * size + 1)
             };
             [0, 1, 2].map(|axis| of(axis) as i32 - size as i32)
         };
-        let mut places: Vec<Coord> = (0..count).map(place).collect();
-        places.sort_unstable();
-        places.dedup();
-        places
+        let mut positions: Vec<Coord> = (0..count).map(position).collect();
+        positions.sort_unstable();
+        positions.dedup();
+        positions
     }
 
     #[test]
@@ -258,10 +258,11 @@ mod tests {
         let tree = Flagged::new(flagged.iter().copied());
         let mut counts = [0; 2];
         for reach in [1, 2, 5] {
-            for place in scattered(400, 17) {
-                let is_near = |other: &Coord| (0..3).all(|axis| (other[axis] - place[axis]).abs() <= reach);
+            for position in scattered(400, 17) {
+                let is_near =
+                    |other: &Coord| (0..3).all(|axis| (other[axis] - position[axis]).abs() <= reach);
                 let expected = flagged.iter().any(is_near);
-                assert_eq!(tree.is_within(&place, reach), expected, "{place:?} within {reach}");
+                assert_eq!(tree.is_within(&position, reach), expected, "{position:?} within {reach}");
                 counts[usize::from(expected)] += 1;
             }
         }

@@ -242,7 +242,7 @@ fn held(rows: &[Row]) -> Vec<bool> {
 
 /// Most held nodes in a row on any axis.
 fn widest(rows: &[Row], is_held: &[bool]) -> u32 {
-    // How many end at each node: rows ascend by place, so that those before it are known.
+    // How many end at each node: rows ascend by position, so that those before it are known.
     let mut runs = vec![[0u32; 3]; rows.len()];
     let mut most = 0u32;
     for (at, row) in rows.iter().enumerate().filter(|(at, _)| is_held[*at]) {
