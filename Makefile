@@ -7,10 +7,11 @@ PREFIX := /usr/local
 # Chosen together, packages have the features that the tests build them with: nothing is built twice.
 BUILD := cargo build --release -p frazil -p make_scenes --lib --bin frazil --bin make_scenes
 
-# The library without OpenVDB, with its own features: in its own folder.
-CORE := cargo build --release -p frazil --no-default-features --lib --target-dir target/core
+# The library without OpenVDB, by an invocation of its own: chosen together with the whole one it would get its features. Its archive has the same
+# name, and moves away; `$(BUILD)` puts the whole one back.
+CORE := cargo build --release -p frazil --no-default-features --lib && mkdir -p target/core && cp target/release/libfrazil.a target/core/
 
-.PHONY: setup setup-core demo test test-hosts test-core test-clients test-dist sanitize skinning-numbers pictures lint gates bench header install install-core hosts hosts-core dist
+.PHONY: setup setup-core demo test test-hosts test-core test-clients test-dist sanitize fuzz deny msrv site skinning-numbers pictures lint gates bench header install install-core hosts hosts-core dist
 
 # Everything a build needs, from Debian's packages; quick when it is there.
 setup:
@@ -68,12 +69,15 @@ lint:
 	@if cargo clippy --version >/dev/null 2>&1; then cargo clippy --release --workspace --all-targets -- -D warnings; else echo "lint: clippy is not installed, skipped"; fi
 	clang-format --dry-run -Werror cpp/*.cc cpp/*.h
 
-test: setup lint
+# What cannot run for want of data or of another program is listed at the end.
+test: setup
+	@mkdir -p target && rm -f target/skipped.txt
 	cargo test --release
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --lib
 	./tools/bare-cli
 	@$(MAKE) --no-print-directory test-hosts
 	@$(MAKE) --no-print-directory test-core
+	@./tools/skipped
 
 # The C header, from the texts in src/capi.
 header: setup
@@ -99,7 +103,7 @@ hosts: setup
 test-hosts: hosts
 	./tools/header target/frazil.h
 	cmp target/frazil.h include/frazil.h
-	ctest --test-dir target/ctest --output-on-failure
+	ctest --test-dir target/ctest --output-on-failure --output-log target/ctest/frazil.log
 	FRAZIL_LIBRARY=target/install/lib/libfrazil.so.1 PYTHONPATH=python /usr/bin/python3 tests/python/test_frazil.py
 
 # Programs of hosts of the core library, built against an installed one.
@@ -112,7 +116,7 @@ hosts-core: setup
 
 test-core: hosts-core
 	./tools/core-symbols target/core/install
-	ctest --test-dir target/core/ctest --output-on-failure
+	ctest --test-dir target/core/ctest --output-on-failure --output-log target/core/ctest/frazil.log
 
 # AddressSanitizer and UndefinedBehaviorSanitizer on the C and C++ sides, valgrind on all programs.
 sanitize: hosts
@@ -136,6 +140,27 @@ test-clients: setup
 skinning-numbers:
 	@./tools/clients
 	blender -b --factory-startup -noaudio --python-exit-code 7 --python tests/clients/skinning.py -- "$${FRAZIL_DATA:-../shared/data}/character/CesiumMan.glb" tests/clients/cesium_man.txt
+
+# Each reader fuzzed for a while: make fuzz [SECONDS=60] [TARGETS="mesh particles"]; nightly Rust and cargo-fuzz.
+SECONDS := 60
+TARGETS := mesh particles image gltf scene states
+fuzz:
+	@for target in $(TARGETS); do \
+	    cargo +nightly fuzz run --fuzz-dir tests/fuzz "$$target" -- -max_total_time=$(SECONDS) -rss_limit_mb=2048 -timeout=10 || exit 1; \
+	done
+
+# Licences, advisories and sources of the dependencies; needs cargo-deny.
+deny:
+	cargo deny --all-features check
+
+# The oldest Rust that builds frazil, as Cargo.toml says; needs that toolchain.
+msrv: setup
+	cargo +$(RUST_NEEDED) check --release --all-features --lib --bins --target-dir target/msrv
+
+# The manuals as pages: target/site/index.html; installs pandoc.
+site:
+	@./tools/setup "$(RUST_NEEDED)" pandoc
+	@./tools/site target/site
 
 # The pictures of characters and liquids in docs/, from models and caches in FRAZIL_DATA; those of the walker, the jelly and the drop
 # come from `make demo`.

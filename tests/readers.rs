@@ -4,6 +4,8 @@
 #[path = "common/program.rs"]
 #[allow(dead_code)]
 mod program;
+#[path = "common/skip.rs"]
+mod skip;
 
 use std::fs::File;
 use std::io::BufReader;
@@ -12,6 +14,7 @@ use std::process::Command;
 
 use program::CUBE;
 use serde_json::Value;
+use skip::skipped;
 use tempfile::TempDir;
 use vdb_rs::{Map, MetadataValue, VdbReader};
 
@@ -91,7 +94,7 @@ fn pyopenvdb_sees_the_same_grids() {
                 print(g.name, g.activeVoxelCount(), g.gridClass, g.transform.voxelSize()[0], sep='|')\n";
     let has_module = Command::new("/usr/bin/python3").args(["-c", "import pyopenvdb"]).output();
     if !has_module.is_ok_and(|output| output.status.success()) {
-        eprintln!("skipped: python3-openvdb is not installed");
+        skipped("python3-openvdb is not installed");
         return;
     }
     let (folder, grids) = frames();
@@ -117,7 +120,7 @@ fn vdb_print_is_content() {
     let (folder, _) = frames();
     match Command::new("vdb_print").current_dir(folder.path()).args(["-l", "out/base/base.0003.vdb"]).output()
     {
-        Err(_) => eprintln!("skipped: libopenvdb-tools is not installed"),
+        Err(_) => skipped("libopenvdb-tools is not installed"),
         Ok(output) => {
             assert!(output.status.success());
             assert!(String::from_utf8_lossy(&output.stdout).contains("surface"));

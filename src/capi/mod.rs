@@ -1,19 +1,18 @@
-//! The C ABI that `include/frazil.h` declares. Thin: arguments are checked and converted to the library's types,
-//! results are handed out; nothing is computed here.
+//! The C ABI that `include/frazil.h` declares. A thin layer: arguments are checked and converted to the library's types, results are handed
+//! out; nothing is computed here.
 //!
-//! One file for each noun. Raw pointers are followed in `ffi/views.rs` and `ffi/handle.rs` only; every function runs inside
-//! `ffi::guard::guard`. The texts of this room are the header's: cbindgen copies them, and `float[3]` is not a link.
+//! One file for each kind of object. Raw pointers are followed in `ffi/views.rs` and `ffi/handle.rs` only; every function runs inside
+//! `ffi::guard::guard`. cbindgen copies the comments of this folder into the header; `float[3]` is not a link.
 //!
 //! # Safety
-//! Every function has the same requirements, as stated in the header's preamble: pointers are NULL or point to what
-//! their parameter says, handles were not destroyed, views describe memory that may be read, spans such that may be
-//! written.
+//! Every function has the same requirements, stated in the header's preamble: pointers are NULL or point to what their parameter states,
+//! handles were not destroyed, views describe readable memory, spans writable memory.
 #![allow(non_camel_case_types, clippy::missing_safety_doc, clippy::too_many_arguments)]
 #![allow(rustdoc::broken_intra_doc_links)]
-// What only grids and the systems need.
+// Needed only by grids and the systems.
 #![cfg_attr(not(feature = "vdb"), allow(dead_code, unused_imports))]
 
-// In the header's order.
+// In the order of the header.
 mod ffi;
 
 pub mod runtime;

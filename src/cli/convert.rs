@@ -22,9 +22,9 @@ use super::points;
 use super::session::Session;
 use super::session::exit::{Failure, Phase};
 
-/// Turn meshes, sequences of them, characters and points into other files.
+/// Convert meshes, sequences of meshes, characters and points to other files.
 ///
-/// What moves needs a pattern for its output (hero.%04d.ply) and --frames.
+/// Moving input needs a pattern for its output (hero.%04d.ply) and --frames.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -47,7 +47,7 @@ pub struct Args {
     /// A character's clip; it begins at the first of --frames.
     #[arg(long, value_name = "NAME")]
     clip: Option<String>,
-    /// Of a character only the nodes of this name and what hangs on them; * stands for any letters.
+    /// Only nodes of this name of a character, and their descendants; * stands for any letters.
     #[arg(long, value_name = "NAME")]
     node: Option<String>,
     #[command(flatten)]
@@ -58,7 +58,7 @@ pub struct Args {
     /// Factor from metres to the output's unit.
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = positive)]
     to_scale: f64,
-    /// Edge of the voxels that points get in a .vdb (m) [default: as a .ply of points says].
+    /// Edge of the voxels of points in a .vdb (m) [default: as the .ply of points says].
     #[arg(long, value_name = "M", value_parser = positive)]
     voxel: Option<f64>,
 }
@@ -101,10 +101,10 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     each.finish()
 }
 
-/// Arrays of the vertices that are their velocities (m/s).
+/// Arrays of the vertices that hold their velocities (m/s).
 pub const VELOCITY: [&str; 3] = ["vx", "vy", "vz"];
 
-/// Renames velocities, which other programs call by other names, to ours ([`VELOCITY`]).
+/// Renames velocities that other programs named otherwise to our names ([`VELOCITY`]).
 pub fn name_velocities(arrays: &mut [MeshArray]) {
     for stem in VELOCITIES {
         let named = |axis: &str| {
@@ -121,7 +121,7 @@ pub fn name_velocities(arrays: &mut [MeshArray]) {
     }
 }
 
-/// The vectors of the vertices whose parts are the arrays of these names.
+/// The vertex vectors whose components are the arrays of these names.
 pub fn vectors(arrays: &[MeshArray], names: [&str; 3]) -> Option<Vec<Vec3>> {
     let part = |name: &str| arrays.iter().find(|array| array.on == On::Vertices && array.name == name);
     let [x, y, z] = names.map(part);
@@ -129,7 +129,7 @@ pub fn vectors(arrays: &[MeshArray], names: [&str; 3]) -> Option<Vec<Vec3>> {
     Some(parts.map(|((x, y), z)| Vec3::new(*x as f32, *y as f32, *z as f32)).collect())
 }
 
-/// The names of arrays in three parts but velocities, without their x, y and z.
+/// The names, without their x, y and z, of arrays in three components, except velocities.
 fn stems(arrays: &[MeshArray]) -> Vec<&str> {
     let has = |name: String| arrays.iter().any(|array| array.name == name);
     let stem = |array: &'_ MeshArray| array.name.len().checked_sub(1).filter(|_| array.name.ends_with('x'));
@@ -148,13 +148,13 @@ fn listed(names: &[&str]) -> String {
     }
 }
 
-/// The name of a mesh in USD, after the file or the pattern that it comes from.
+/// The name of a mesh in USD, from the name of its file or pattern.
 pub fn prim_name(input: &Path) -> String {
     let stem = input.file_stem().unwrap_or_default().to_string_lossy();
     usd::prim_name(stem.split(['%', '#', '$', '.']).next().unwrap_or_default())
 }
 
-/// Refuses the name of a file that no mesh is written into.
+/// Refuses an output file of a type that cannot hold a mesh.
 pub fn check_output(path: &Path) -> Result<(), Failure> {
     let extension = extension(path);
     if extension == "usda" || io::mesh::EXTENSIONS.contains(&extension.as_str()) {
@@ -163,18 +163,18 @@ pub fn check_output(path: &Path) -> Result<(), Failure> {
     Err(Failure::refused(format!("{}: the output must be a .obj, .ply, .stl or .usda file", path.display())))
 }
 
-/// What decides on what is lost between two files of meshes.
+/// What determines the losses between two mesh files.
 pub struct Losses<'a> {
     /// File or pattern.
     pub output: &'a Path,
-    /// Whether positions stay what they are.
+    /// Whether positions are unchanged.
     pub keeps_space: bool,
     /// Whether the input is a sequence whose meshes all get the triangles of the first.
     pub is_sequence: bool,
 }
 
 impl Losses<'_> {
-    /// Warns about what a file of the input, from which these texture coordinates were read, contains and the output cannot.
+    /// Warns about what an input file, from which these texture coordinates were read, contains and the output cannot hold.
     pub fn warn(&self, one: &Path, uvs: Option<&Uvs>) -> frazil::Result<()> {
         let mut lost = if is_gltf(one) { Character::extras(one)? } else { io::mesh::extras::of(one)? };
         let uvs = uvs.filter(|_| io::mesh::holds_uvs(self.output));
@@ -191,7 +191,7 @@ impl Losses<'_> {
         if !lost.is_empty() {
             log::warn!("{}: {} are not carried over", one.display(), listed(&lost));
         }
-        // Those that have words of their own were told above.
+        // These have their own warnings above.
         const TOLD: [&str; 7] = ["vx", "vy", "vz", "red", "green", "blue", "alpha"];
         if extension(one) != "ply" {
             return Ok(());
@@ -216,9 +216,9 @@ impl Losses<'_> {
     }
 }
 
-/// What is converted.
+/// The input of a conversion.
 enum Source {
-    /// A mesh that stands, or a character.
+    /// A static mesh, or a character.
     One(Box<dyn Motion>),
     Sequence(Sequence),
 }
@@ -226,14 +226,14 @@ enum Source {
 /// A mesh for each frame.
 struct Sequence {
     pattern: Pattern,
-    /// Last frame that is wanted.
+    /// Last frame to convert.
     last: i32,
-    /// The frames that follow without a gap, as long as their faces do not change.
+    /// Consecutive frames, as long as their faces do not change.
     run: Option<Box<dyn Motion>>,
 }
 
 impl Source {
-    /// Writes the mesh of a frame; the count of its triangles.
+    /// Writes the mesh of a frame; returns its number of triangles.
     fn write(
         &mut self,
         args: &Args,
@@ -274,7 +274,7 @@ impl Sequence {
             match args.write(path, motion, frame, true) {
                 Ok(()) => return Ok(motion.triangles().len()),
                 Err(error @ (frazil::Error::Cancelled | frazil::Error::Io { .. })) => return Err(error),
-                // Its faces, or those of the next frame, are others.
+                // Its faces differ from those of the run or of the next frame.
                 Err(_) => self.run = None,
             }
         }
@@ -308,7 +308,7 @@ impl Args {
         })
     }
 
-    /// Warns, for the first file that is converted, about what it contains and the output cannot.
+    /// Warns, for the first file that is converted, about what it contains and the output cannot hold.
     fn warn_once(
         &self,
         one: &Path,
@@ -328,7 +328,7 @@ impl Args {
         losses.warn(one, motion.drawn().uvs)
     }
 
-    /// What is converted, in metres with Y up, and at which frames.
+    /// The input, in metres with Y up, and its frames.
     fn source(&self) -> Result<(Source, FrameChoice), Failure> {
         let is_character = is_gltf(&self.input);
         if !is_character && (self.clip.is_some() || self.node.is_some()) {
@@ -357,12 +357,12 @@ impl Args {
         }
     }
 
-    /// A mesh, or meshes, that were read less the origin, in metres with Y up.
+    /// A mesh, or meshes, read relative to the origin, in metres with Y up.
     fn placed(&self, motion: Box<dyn Motion>) -> Box<dyn Motion> {
         Box::new(Placed::new(motion, self.space.space().without_origin(), Keys::default()))
     }
 
-    /// A mesh that does not move.
+    /// A static mesh.
     fn still(&self, path: &Path) -> frazil::Result<Box<dyn Motion>> {
         Ok(self.placed(Box::new(Rigid::of_polygons(
             io::mesh::read_any_from(path, self.space.origin.at)?,
@@ -370,7 +370,7 @@ impl Args {
         ))))
     }
 
-    /// The arrays of a frame's mesh, where the output holds any: characters have none.
+    /// The arrays of a frame's mesh, if the output holds any: characters have none.
     fn arrays(&self, output: &Path, frame: i32, is_sequence: bool) -> frazil::Result<Vec<MeshArray>> {
         let input = Pattern::parse(&self.input).map_or_else(|| self.input.clone(), |p| p.path(frame));
         if is_gltf(&input) || extension(output) == "stl" {
@@ -380,19 +380,19 @@ impl Args {
         if extension(output) == "usda" {
             name_velocities(&mut arrays);
         }
-        // In another space velocities would be others.
+        // Velocities are not converted to another space.
         arrays.retain(|array| self.keeps_space() || !VELOCITY.contains(&&*array.name));
-        // Each mesh of a sequence may cut its polygons in its own way, but all get the triangles of the first.
+        // Each mesh of a sequence may triangulate its polygons differently, but all get the triangles of the first.
         arrays.retain(|array| array.on != On::Corners || !is_sequence);
         Ok(arrays)
     }
 
-    /// Whether positions stay what they are.
+    /// Whether positions are unchanged.
     fn keeps_space(&self) -> bool {
         self.space.space().keeps_vectors() && self.to_scale == 1.0 && self.to_up == Axis::Y
     }
 
-    /// Writes the mesh of a frame; as part of a sequence its velocities take it to the next one.
+    /// Writes the mesh of a frame; in a sequence its velocities lead to the next frame.
     fn write(&self, path: &Path, motion: &dyn Motion, frame: i32, is_sequence: bool) -> frazil::Result<()> {
         let time = f64::from(frame) / self.fps;
         let (mut pose, mut velocities) = (Vec::new(), Vec::new());
@@ -417,11 +417,11 @@ impl Args {
         motion.velocities_ahead(time, 1.0 / self.fps, &mut velocities)?;
         out(&mut velocities);
         let own = vectors(&arrays, VELOCITY);
-        // USD has velocities of its own.
+        // USD has its own velocities.
         let is_own = |array: &MeshArray| array.on == On::Vertices && VELOCITY.contains(&&*array.name);
         let others = arrays.iter().filter(|array| !(own.is_some() && is_own(array)));
         let others: Vec<&MeshArray> = others.collect();
-        // Of a sequence they are what takes each mesh to the next.
+        // In a sequence, velocities lead from each mesh to the next.
         let own = own.filter(|_| !is_sequence);
         let velocities = own.unwrap_or_else(|| usd::to_floats(&velocities));
         let name = prim_name(&self.input);

@@ -1,26 +1,26 @@
-//! Frames that are made one by one: one that cannot be made does not cost the others.
+//! Frames that are made one by one: a frame that cannot be made does not cost the others.
 
 use frazil::{Error, Result};
 
 use super::session::exit::Failure;
 
-/// Failed frames that are named one by one, and those that are listed in the end.
+/// Number of failed frames that are named one by one, and of those listed at the end.
 const MAX_NAMED: usize = 20;
 
-/// How the frames of a run went so far.
+/// The result of a run's frames so far.
 #[derive(Default)]
 pub struct Each {
     made: usize,
     failed: Vec<i32>,
-    /// The error of the first of them, and whether it came before its work began.
+    /// The error of the first failed frame, and whether it occurred before its work began.
     first: Option<(String, bool)>,
 }
 
 impl Each {
-    /// Counts a frame; its result, none where it failed.
+    /// Counts a frame; returns its result, none if it failed.
     ///
     /// # Errors
-    /// What every other frame would fail with too: cancel; an argument or a limit of memory that is refused before any frame is made.
+    /// Errors that every other frame would have too: cancel; an argument or a memory limit that is refused before any frame is made.
     pub fn take<T>(&mut self, frame: i32, result: Result<T>) -> std::result::Result<Option<T>, Failure> {
         match result {
             Ok(done) => {
@@ -48,10 +48,10 @@ impl Each {
         self.failed.push(frame);
     }
 
-    /// Ends the run.
+    /// Finishes the run.
     ///
     /// # Errors
-    /// Names the first frame that could not be made, and lists the others: exit code 1, or 2 where none was begun.
+    /// Names the first frame that could not be made, and lists the others: exit code 1, or 2 if none was begun.
     pub fn finish(self) -> std::result::Result<(), Failure> {
         let Some((first, is_before)) = self.first else { return Ok(()) };
         if self.made == 0 {

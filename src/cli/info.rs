@@ -1,4 +1,4 @@
-//! `frazil info`: what files hold.
+//! `frazil info`: the contents of files.
 
 use std::path::{Path, PathBuf};
 
@@ -11,14 +11,14 @@ use super::output;
 use super::session::Session;
 use super::session::exit::{Failure, Phase};
 
-/// Say what .vdb, mesh (.obj, .ply, .stl), character (.glb, .gltf) and particle files (.bgeo, .vtk, .vtu, .xyz, .ply) hold.
+/// Report what .vdb, mesh (.obj, .ply, .stl), character (.glb, .gltf) and particle files (.bgeo, .vtk, .vtu, .xyz, .ply) hold.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  frazil info cache/base/base.0048.vdb --measure")]
 pub struct Args {
     /// Files.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Measure area and volume too (reads everything).
+    /// Measure area and volume too (reads the whole file).
     #[arg(long)]
     measure: bool,
     #[command(flatten)]
@@ -103,10 +103,10 @@ fn character(path: &Path, origin: &Origin) -> frazil::Result<Vec<Value>> {
     Ok(vec![entry])
 }
 
-/// Nodes that are listed in one line.
+/// Maximum number of nodes listed in one line.
 const FEW_NODES: usize = 6;
 
-/// How a clip's lowest parts move while they stand (the file's unit, Y up).
+/// How the lowest parts of a clip move while they stand (in the file's unit, Y up).
 fn clip_gait(path: &Path, clip: &str, seconds: f64) -> frazil::Result<Value> {
     let play = Play { clip: Some(clip.into()), repeat: false, ..Play::default() };
     let Some(gait) = gait(&Character::open(path, play)?, 0.0, seconds)? else {
@@ -145,7 +145,7 @@ fn lines(entry: &Value) -> String {
     text
 }
 
-/// One entry in words; clips and trees in a line each.
+/// One entry as text; clips and trees in one line each.
 fn told(key: &str, value: &Value, part: &Value) -> String {
     let line = |name: &str, text: &str| format!("  {name:<22} {text}\n");
     let rows = |rows: Vec<String>| -> String {
@@ -165,7 +165,7 @@ fn told(key: &str, value: &Value, part: &Value) -> String {
         ("node_tree", Value::Array(nodes)) => {
             rows(nodes.iter().map(|node| node.as_str().unwrap_or_default().to_string()).collect())
         }
-        // The tree has them.
+        // Already listed in the tree.
         ("nodes", Value::Array(nodes)) if part.get("node_tree").is_some() => {
             line(key, &format!("{} with a mesh", nodes.len()))
         }

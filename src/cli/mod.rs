@@ -73,7 +73,7 @@ impl Command {
     }
 }
 
-/// Runs the program; nothing that a user can do makes it panic or print a trace.
+/// Runs the program; no user input makes it panic or print a trace.
 pub fn run() -> ExitCode {
     #[cfg(feature = "vdb")]
     if let Some(code) = frazil::vdb::reading::guard::serve(std::env::args_os().skip(1)) {
@@ -96,7 +96,7 @@ pub fn run() -> ExitCode {
     ended.unwrap_or(session::exit::FAILED).into()
 }
 
-/// Says that a file needs what this program was built without.
+/// The error for a file that needs a feature this program was built without.
 #[cfg(not(feature = "vdb"))]
 fn needs_openvdb<T>(path: &std::path::Path) -> frazil::Result<T> {
     Err(frazil::Error::file(path, "needs OpenVDB, which this frazil was built without"))

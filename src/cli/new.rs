@@ -1,18 +1,18 @@
-//! `frazil new`: a scene to begin with.
+//! `frazil new`: a scene to start from.
 
 use frazil::scene::{self, reference, template};
 
 use super::output;
 use super::session::exit::{Failure, Phase};
 
-/// Print a commented scene to begin with.
+/// Print a commented scene to start from.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  frazil new snow > shot.toml")]
 pub struct Args {
-    /// What the scene is about.
+    /// The system that the scene is for.
     #[arg(value_enum)]
     system: System,
-    /// Print a table of all keys in Markdown instead: what they hold, defaults, meaning.
+    /// Print a table of all keys in Markdown instead: values, defaults, meaning.
     #[arg(long)]
     keys: bool,
 }

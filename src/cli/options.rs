@@ -1,4 +1,4 @@
-//! Options that several commands share, and how their values are written.
+//! Options that several commands share, and the syntax of their values.
 
 use frazil::Result;
 use frazil::geometry::mesh::weld::Weld;
@@ -8,7 +8,7 @@ use frazil::motion::{Space, Up};
 use frazil::render::Size;
 use std::path::Path;
 
-/// How a file's space becomes metres with Y up.
+/// Conversion of a file's space to metres with Y up.
 #[derive(clap::Args)]
 pub struct MeshSpace {
     /// Factor from the file's unit to metres.
@@ -21,7 +21,7 @@ pub struct MeshSpace {
     pub origin: Origin,
 }
 
-/// What coordinates of a file are read less.
+/// The origin that is subtracted from a file's coordinates.
 #[derive(clap::Args)]
 pub struct Origin {
     /// A position in the file's unit and axes that becomes the origin; it is subtracted in 64 bits.
@@ -39,7 +39,7 @@ pub enum Axis {
 }
 
 impl MeshSpace {
-    /// As the library wants it.
+    /// The library's type for it.
     pub fn space(&self) -> Space {
         let up = match self.up {
             Axis::Y => Up::Y,
@@ -48,14 +48,14 @@ impl MeshSpace {
         Space { scale: self.scale, up, origin: self.origin.at }
     }
 
-    /// Reads a mesh into metres, Y up.
+    /// Reads a mesh and converts it to metres, Y up.
     pub fn read(&self, path: &Path) -> Result<TriMesh> {
         let mut mesh = self.origin.read(path)?.into_triangles();
         self.bring(&mut mesh);
         Ok(mesh)
     }
 
-    /// Brings a mesh that was read less the origin into metres, Y up.
+    /// Converts a mesh that was read relative to the origin to metres, Y up.
     pub fn bring(&self, mesh: &mut TriMesh) {
         let space = self.space();
         if space.scale != 1.0 {
@@ -66,13 +66,13 @@ impl MeshSpace {
 }
 
 impl Origin {
-    /// Reads the polygons of a mesh less the origin.
+    /// Reads the polygons of a mesh relative to the origin.
     pub fn read(&self, path: &Path) -> Result<PolygonMesh> {
         frazil::io::mesh::read_polygons_from(path, self.at)
     }
 }
 
-/// Warns of a mesh, as it was read, whose coordinates are too large for 32 bits.
+/// Warns about a mesh, as it was read, whose coordinates are too large for 32 bits.
 pub fn warn_if_far(path: &Path, mesh: &TriMesh) {
     if mesh.positions.is_empty() {
         return;
@@ -82,13 +82,13 @@ pub fn warn_if_far(path: &Path, mesh: &TriMesh) {
     }
 }
 
-/// Brings vertices that are one corner to one position: once they are scaled, nothing says what rounding they have.
+/// Moves vertices at the same corner to one position: after scaling, their rounding error is no longer known.
 pub fn join_corners(mesh: &mut TriMesh) {
     let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
     Weld::of(&positions, &mesh.triangles).unify(&mut mesh.positions);
 }
 
-/// Warns of corners of a file's mesh that rounding does not decide.
+/// Warns about ambiguous corners of a file's mesh.
 #[cfg(feature = "vdb")]
 pub fn warn_of_corners(path: &Path, mesh: &TriMesh) {
     let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
@@ -105,7 +105,7 @@ pub fn size(text: &str) -> std::result::Result<Size, String> {
     Ok(Size { width: pixels(width)?, height: pixels(height)? })
 }
 
-/// Number of a positive length or factor.
+/// A positive length or factor.
 pub fn positive(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number > 0.0 && number.is_finite() => Ok(number),

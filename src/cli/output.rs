@@ -1,13 +1,13 @@
-//! Output of the program: lines on stdout, files.
+//! Output of the program: stdout lines and files.
 
 use frazil::{Error, Result};
 use std::io::Write;
 use std::path::Path;
 
-/// Prints text on stdout; a reader that closed the pipe has seen enough.
+/// Prints text on stdout; a closed pipe is not an error.
 pub fn print(text: &str) -> Result<()> {
     let mut stdout = std::io::stdout().lock();
-    // Names out of files must not command a terminal.
+    // Names from files must not send control sequences to a terminal.
     match stdout.write_all(frazil::error::visible(text).as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         Err(error) => Err(Error::io("stdout", "write", error)),
@@ -15,8 +15,8 @@ pub fn print(text: &str) -> Result<()> {
     }
 }
 
-/// Whether a file can be written at a path, found out before any work: its folder takes a new file.
-/// A device or a pipe is looked at when it is written.
+/// Checks before any work whether a file can be written at a path: its folder accepts new files.
+/// A device or a pipe is checked when it is written.
 pub fn check_writable(path: &Path) -> Result<()> {
     if path.is_dir() {
         return Err(Error::file(path, "is a folder, not a file to write"));
@@ -34,7 +34,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
     })
 }
 
-/// Refuses to write over one of the files that are read.
+/// Refuses to overwrite one of the input files.
 pub fn refuse_input<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> Result<()> {
     // A file that does not exist yet is not an input; a device is not overwritten.
     let Ok(output) = std::fs::canonicalize(path) else { return Ok(()) };
@@ -47,7 +47,7 @@ pub fn refuse_input<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a Path>)
     }
 }
 
-/// Refuses to write a report over something else than a report.
+/// Refuses to overwrite a file that is not a report with a report.
 pub fn check_report(path: &Path) -> Result<()> {
     check_writable(path)?;
     if !path.is_file() || frazil::io::files::atomic::is_stream(path) {
@@ -63,7 +63,7 @@ pub fn check_report(path: &Path) -> Result<()> {
     Err(Error::file(path, "exists and is not the report of a run: choose another name for --report"))
 }
 
-/// Whether a folder takes new files.
+/// Whether new files can be created in a folder.
 pub fn check_folder(folder: &Path) -> Result<()> {
     let probe = folder.join(format!(".frazil-probe-{}", std::process::id()));
     let made = std::fs::File::create_new(&probe);

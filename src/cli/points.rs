@@ -20,7 +20,7 @@ use super::output;
 use super::session::Session;
 use super::session::exit::{Failure, Phase};
 
-/// What `frazil info` says of points, without the name of their grid.
+/// The description of points in `frazil info`, without the name of their grid.
 pub fn described(points: &Points) -> Map<String, Value> {
     let mut out = Map::new();
     out.insert("points".into(), json!(points.count()));
@@ -44,11 +44,11 @@ pub fn described(points: &Points) -> Map<String, Value> {
     out
 }
 
-/// Points of a file that is not .vdb, for `frazil info`.
+/// Describes the points of a file other than .vdb for `frazil info`.
 pub fn info(path: &Path, origin: DVec3) -> Result<Vec<Value>> {
     let mut cloud = particles::read(path)?;
     Space { origin, ..Space::OWN }.bring(&mut cloud);
-    // Its voxels are of no use where the file has none.
+    // Voxels are irrelevant if the file gives no size.
     let size = cloud.voxel_size.unwrap_or(1.0);
     let known = cloud.voxel_size.is_some();
     let points = cloud.into_points(Some(size)).map_err(|error| Error::file(path, error.to_string()))?;
@@ -60,13 +60,13 @@ pub fn info(path: &Path, origin: DVec3) -> Result<Vec<Value>> {
     Ok(vec![Value::Object(entry)])
 }
 
-/// Whether a file's name is one of points, which .ply need not be.
+/// Whether a file's extension is one of points; .ply does not count, as it may hold a mesh.
 pub fn is_named(path: &Path) -> bool {
     let extension = extension(path);
     extension == "vdb" || extension != "ply" && particles::is_named(path)
 }
 
-/// Whether `frazil convert` has points to convert: a file of points in or out, or a .ply without faces.
+/// Whether `frazil convert` converts points: a file of points in or out, or a .ply without faces.
 pub fn is_one(input: &Path, output: &Path, frames: Option<&FrameChoice>) -> Result<bool> {
     if [input, output].into_iter().any(is_named) {
         return Ok(true);
@@ -75,7 +75,7 @@ pub fn is_one(input: &Path, output: &Path, frames: Option<&FrameChoice>) -> Resu
         return Ok(false);
     }
     let one = match (Pattern::parse(input), frames) {
-        // The first frame that is there tells.
+        // The first existing frame decides.
         (Some(pattern), Some(frames)) => {
             frames.iter().map(|frame| pattern.path(frame)).find(|path| path.is_file())
         }
@@ -84,13 +84,13 @@ pub fn is_one(input: &Path, output: &Path, frames: Option<&FrameChoice>) -> Resu
     one.map_or(Ok(false), |one| ply::holds_points(&one))
 }
 
-/// Points of a file, and whether their voxels are more than a way to hold them.
+/// Points of a file, and whether their voxels are the file's own rather than just a container.
 struct Read {
     points: Points,
     has_voxels: bool,
 }
 
-/// What `frazil convert` does with points.
+/// Conversion of points by `frazil convert`.
 pub struct Conversion<'a> {
     /// File or pattern.
     pub input: &'a Path,
@@ -102,7 +102,7 @@ pub struct Conversion<'a> {
     pub fps: f64,
     /// Edge of a voxel (m).
     pub voxel: Option<f64>,
-    /// How the input's space becomes metres with Y up.
+    /// Conversion of the input's space to metres with Y up.
     pub space: Space,
 }
 
@@ -162,7 +162,7 @@ impl Conversion<'_> {
             "vdb" => {
                 let points = points_of_vdb(path)?;
                 if self.space == Space::OWN {
-                    // Bit by bit, which another split into voxels need not be.
+                    // Bit for bit, which regrouping into voxels need not be.
                     return Ok(Read { points, has_voxels: true });
                 }
                 Cloud::from(points)
@@ -203,14 +203,14 @@ impl Conversion<'_> {
     }
 }
 
-/// Name of the grid of points in files that we write.
+/// Name of the grid of points in the files we write.
 #[cfg(feature = "vdb")]
 const NAME: &str = "grains";
 
 /// Points of a .vdb file.
 ///
 /// # Errors
-/// A file that holds only what changed since another frame.
+/// A file that holds only changes since another frame.
 #[cfg(feature = "vdb")]
 pub fn points_of_vdb(path: &Path) -> Result<Points> {
     use frazil::scene::{changes_since, partial};

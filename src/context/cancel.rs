@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 pub(super) struct Cancel {
     /// Sticky until it is cleared.
     requested: Arc<AtomicBool>,
-    /// The running call's: never cleared before the call has ended.
+    /// The flag of the running call: never cleared before the call has ended.
     latched: Arc<AtomicBool>,
     /// Number of running calls, one within another.
     running: AtomicUsize,
@@ -28,7 +28,7 @@ impl Cancel {
     /// Begins a call; the outermost one latches a cancel that is still requested.
     pub(super) fn begin(self: &Arc<Self>) -> Running {
         if self.running.fetch_add(1, Ordering::SeqCst) == 0 {
-            // In this order a concurrent cancel is seen through its own store to the latch, or by this load.
+            // In this order a concurrent cancel is seen either through its own store to the latch, or by this load.
             self.latched.store(false, Ordering::SeqCst);
             if self.requested.load(Ordering::SeqCst) {
                 self.latched.store(true, Ordering::SeqCst);

@@ -35,9 +35,9 @@ pub struct Context {
     pool: Arc<Pool>,
     cancel: Arc<Cancel>,
     state: Mutex<State>,
-    /// Whether the next call counts phases from 0.
+    /// Whether the next call restarts the count of phases at 0.
     recount: AtomicBool,
-    /// Pieces of work of the running phase that are done, and their total; 0 where that is not known.
+    /// Finished pieces of work of the running phase, and their total; 0 if unknown.
     pieces: [AtomicUsize; 2],
     collectors: Collectors,
     poll: Mutex<Option<Watch>>,
@@ -73,8 +73,8 @@ impl Context {
         &self.pool
     }
 
-    /// Begins a call; everything that runs with this context is part of it until the returned value is dropped. Phases and
-    /// tools begin one themselves; work of several phases that is to be cancelled as a whole holds one around them.
+    /// Begins a call; everything that runs with this context is part of it until the returned value is dropped. Phases and tools begin one
+    /// themselves; hold one around work of several phases that is to be cancelled as a whole.
     pub fn begin(&self) -> Running {
         let outermost = !self.cancel.is_running();
         if outermost && self.recount.swap(false, Ordering::SeqCst) {
@@ -93,8 +93,7 @@ impl Context {
         self.cancel.request();
     }
 
-    /// Clears a cancel and restarts the count of phases, for the calls that follow. A running call keeps its cancel and
-    /// its count.
+    /// Clears a cancel and restarts the count of phases, for the calls that follow. A running call keeps its cancel and its count.
     pub fn reset(&self) {
         self.cancel.clear();
         self.recount.store(true, Ordering::SeqCst);
@@ -110,8 +109,8 @@ impl Context {
         self.cancel.flags().map(Arc::clone)
     }
 
-    /// Sets the function that is called while phases run, on the thread that called them: at the beginning of each, then
-    /// every 10 ms while the pool's workers are busy; in a pool without workers, from [`Context::check`].
+    /// Sets the function that is called while phases run, on the thread that called them: at the start of each, then every 10 ms while the
+    /// pool's workers are busy; in a pool without workers, from [`Context::check`].
     pub fn set_poll(&self, poll: Option<Poll>) {
         *lock(&self.poll) = poll.map(|poll| Watch { poll, called: Instant::now() });
     }
@@ -164,7 +163,7 @@ impl Context {
         if self.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
     }
 
-    /// Runs one step, a sequence of `phases` phases, of which it returns the times besides the result.
+    /// Runs one step, a sequence of `phases` phases, and returns its result and the times of its phases.
     ///
     /// # Errors
     /// What `work` returns.
@@ -191,8 +190,7 @@ impl Context {
         Ok(value)
     }
 
-    /// As [`Context::phase`], for work that puts its result in place itself at its end: a cancel that comes after that is
-    /// too late.
+    /// As [`Context::phase`], for work that puts its result in place itself at its end: a cancel after that comes too late.
     ///
     /// # Errors
     /// `Cancelled` when the context was cancelled before the phase, else what `work` returns.
@@ -210,7 +208,7 @@ impl Context {
         result
     }
 
-    /// Runs the last phase of a step, which a cancel does not stop: changes are put in place completely.
+    /// Runs the last phase of a step, which a cancel does not stop: changes are applied completely.
     ///
     /// # Errors
     /// What `work` returns.
@@ -229,7 +227,7 @@ impl Context {
         self.expect(0);
     }
 
-    /// Ends a phase; its last pieces give way to the count of phases at once, so that no fraction decreases.
+    /// Ends a phase; its last pieces are replaced by the count of phases at once, so that no fraction decreases.
     fn leave(&self, done: bool) {
         let mut state = lock(&self.state);
         state.phase = "";
@@ -320,7 +318,7 @@ impl Context {
             let signal = Signal(&done);
             let slot = &mut value;
             scope.spawn(move |_| {
-                // Dropped after the value is there, or when the work panics.
+                // Dropped once the value is there, or when the work panics.
                 let _signal = signal;
                 *slot = Some(work());
             });
@@ -332,7 +330,7 @@ impl Context {
     }
 }
 
-/// Locks a mutex whose holder may have panicked: what these guard is consistent at every moment.
+/// Locks a mutex whose holder may have panicked: the data of these mutexes is consistent at every moment.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -437,7 +435,7 @@ mod tests {
             ctx.reset();
             Ok(())
         };
-        // Work that does not check itself: the phase does when it is done.
+        // The work does not check for a cancel itself: the phase does so at its end.
         assert!(matches!(ctx.phase("forget", forgetful), Err(Error::Cancelled)));
         assert!(ctx.phase("next", || Ok(())).is_ok());
         let call = ctx.begin();

@@ -1,4 +1,4 @@
-//! Times of the phases that run with a context, each collected by whoever is in charge of the work around it.
+//! Times of the phases that run with a context, collected by the callers of the work around them.
 
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
@@ -28,7 +28,7 @@ impl Phases {
     }
 }
 
-/// The collectors of a context; one may be made while others collect, and each gets every phase.
+/// The collectors of a context. A new one may start while others collect, and each gets every phase.
 #[derive(Default)]
 pub(super) struct Collectors(Mutex<Vec<Weak<Mutex<Vec<PhaseTime>>>>>);
 
@@ -40,7 +40,7 @@ impl Collectors {
         phases
     }
 
-    /// Adds a run of a phase to all of them, and forgets those that were dropped.
+    /// Adds a run of a phase to all of them, and drops those that are gone.
     pub(super) fn add(&self, name: &'static str, time: Duration) {
         lock(&self.0).retain(|phases| {
             let Some(phases) = phases.upgrade() else { return false };

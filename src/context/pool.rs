@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 use crate::error::{Error, Result};
 use crate::numeric::cpu::FlushDenormals;
 
-/// Most threads of a pool.
+/// Maximum number of threads in a pool.
 pub const MOST_THREADS: usize = 1024;
 
 /// Worker threads, shared by any number of contexts; joined when dropped.
@@ -75,7 +75,7 @@ impl Pool {
         }
     }
 
-    /// The workers, if the calling thread is none of them and can look on while they work.
+    /// The workers, if the calling thread is not one of them and can watch while they work.
     pub(super) fn workers(&self) -> Option<&rayon::ThreadPool> {
         self.rayon.as_ref().filter(|pool| pool.current_thread_index().is_none())
     }
@@ -97,8 +97,8 @@ impl Drop for Pool {
     }
 }
 
-/// Runs `work` while this thread is the one worker of a pool that ends with it: without a pool around them rayon's loops
-/// would start one of the whole process. On a thread that is some pool's worker already they run there.
+/// Runs `work` with this thread as the only worker of a temporary pool: rayon's loops, without a pool around them, would start a
+/// process-wide one. On a thread that is already some pool's worker they run there.
 fn on_this_thread<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     if rayon::current_thread_index().is_some() {
         return work();
@@ -116,11 +116,11 @@ fn on_this_thread<R: Send>(work: impl FnOnce() -> R + Send) -> R {
         let (slot, owned) = (&mut result, owner.clone());
         let job: Box<dyn FnOnce() + Send + '_> = Box::new(move || {
             *slot = Some(catch_unwind(AssertUnwindSafe(work)));
-            // The worker goes home when its pool is dropped and this job is done.
+            // The worker returns when its pool is dropped and this job is done.
             drop(owned.lock().unwrap_or_else(PoisonError::into_inner).take());
         });
-        // SAFETY: the job is run and gone before `run` returns below: the worker ends only when its pool was dropped,
-        // which nobody but the job does, and when no job is left. Until then all that it borrows is there.
+        // SAFETY: the job has run and is gone before `run` returns below: the worker ends only when its pool was dropped, which only the
+        // job does, and when no job is left. Until then everything that the job borrows is alive.
         let job =
             unsafe { std::mem::transmute::<Box<dyn FnOnce() + Send + '_>, Box<dyn FnOnce() + Send>>(job) };
         if let Some(pool) = &*owner.lock().unwrap_or_else(PoisonError::into_inner) {

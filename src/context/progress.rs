@@ -18,12 +18,12 @@ pub struct Progress {
     pub fraction: Option<f32>,
 }
 
-/// What the progress is computed from.
+/// The state that progress is computed from.
 #[derive(Default)]
 pub(super) struct State {
     pub(super) phase: &'static str,
     pub(super) phases_done: usize,
-    /// The running step: the phases done before it, and the phases that it has.
+    /// The running step: the phases done before it, and the number of its phases.
     step: Option<(usize, usize)>,
 }
 
@@ -38,14 +38,14 @@ impl State {
     }
 }
 
-/// A running step; the one around it continues when this is dropped.
+/// A running step; when this is dropped, the one around it continues.
 pub(super) struct Planned<'a> {
     state: &'a Mutex<State>,
     outer: Option<(usize, usize)>,
 }
 
 impl<'a> Planned<'a> {
-    /// Begins a step of so many phases.
+    /// Begins a step of this many phases.
     pub(super) fn new(state: &'a Mutex<State>, phases: usize) -> Self {
         let mut own = lock(state);
         let step = Some((own.phases_done, phases));

@@ -1,22 +1,22 @@
-//! Fixed-point coordinates: exact predicates on the voxel lattice need integers.
+//! Fixed-point coordinates: exact predicates on the voxel lattice require integers.
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::numeric::blocks::Origin;
 
-/// Fixed-point units in a cell; rounding to them moves a vertex by at most 1/8192 cell an axis.
+/// Fixed-point units in a cell; rounding to them moves a vertex by at most 1/8192 cell on each axis.
 pub const UNITS: i32 = 4096;
 
 /// A position in units of 1/4096 cell from the lattice's origin voxel.
 pub type Fixed = [i32; 3];
 
-/// Farthest coordinate, in units: products of two differences then fit 64 bits.
+/// Maximum coordinate, in units: products of two differences then fit in 64 bits.
 const LIMIT: f64 = (1 << 29) as f64;
-/// Farthest coordinate, in cells from the lattice's origin voxel.
+/// Maximum coordinate, in cells from the lattice's origin voxel.
 pub const REACH: f64 = LIMIT / UNITS as f64;
 
-/// World-fixed voxel lattice (voxel (i, j, k) has its centre at (i, j, k) x cell) with an origin
-/// voxel near the work, so that coordinates are small.
+/// World-fixed voxel lattice (the centre of voxel (i, j, k) is at (i, j, k) x cell) with an origin voxel near the work region, so that
+/// coordinates are small.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lattice {
     /// Cell size (m).
@@ -25,14 +25,14 @@ pub struct Lattice {
     pub origin: [i32; 3],
 }
 
-/// `value.floor()` as an integer: the baseline instruction set has no rounding instruction, and `floor` is a call there.
+/// `value.floor()` as an integer: the baseline instruction set has no rounding instruction, so `floor` would be a function call.
 pub fn floor(value: f64) -> i32 {
     let cut = value as i32;
     cut.saturating_sub(i32::from(value < f64::from(cut)))
 }
 
 impl Lattice {
-    /// A lattice whose origin lies at the block nearest to a world position (m).
+    /// A lattice whose origin is the block nearest to a world position (m).
     ///
     /// # Errors
     /// When the position is so far from the world's origin that voxel indices overflow.
@@ -51,7 +51,7 @@ impl Lattice {
         Ok(Self { voxel, origin })
     }
 
-    /// The origin (in voxels of the grid) of a block counted from the lattice's origin voxel.
+    /// The origin (in voxels of the grid) of a block given in blocks from the lattice's origin voxel.
     pub fn block_origin(&self, block: [i32; 3]) -> Origin {
         [0, 1, 2].map(|axis| self.origin[axis] + block[axis] * 8)
     }
@@ -79,8 +79,7 @@ impl Lattice {
     }
 }
 
-/// The message for something (`what`, such as "a vertex lies") that is `far` m from `from`, out of reach of cells of
-/// `voxel` m.
+/// The message for something (`what`, such as "a vertex lies") that is `far` m from `from`, out of range for cells of `voxel` m.
 pub fn too_far(what: &str, far: f64, from: &str, voxel: f64) -> String {
     let reach = REACH * voxel;
     format!("{what} {far:.0} m from {from}, farther than {reach:.0} m, the reach of cells of {voxel} m")

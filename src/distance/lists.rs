@@ -1,4 +1,4 @@
-//! Many lists in one array.
+//! Many lists stored in one array.
 
 use rayon::prelude::*;
 
@@ -13,7 +13,7 @@ pub struct Lists<T> {
 }
 
 impl<T: Copy + Default + Send + Sync> Lists<T> {
-    /// Sorts items into `count` lists by the index given with each; within a list they keep their order.
+    /// Sorts items into `count` lists by the index given with each; the order within a list is preserved.
     pub fn new(count: usize, parts: &[Vec<(u32, T)>]) -> Self {
         let mut start = vec![0u32; count + 1];
         parts.iter().flatten().for_each(|&(list, _)| start[list as usize + 1] += 1);
@@ -65,7 +65,7 @@ impl<T: Copy + Default + Send + Sync> Lists<T> {
         });
     }
 
-    /// Makes a new list from each non-empty one, in parallel: `make` takes its index and items and appends the new ones.
+    /// Makes a new list from each non-empty one, in parallel: `make` receives its index and items and appends the new ones.
     pub fn map<U: Copy + Send>(&self, make: impl Fn(usize, &[T], &mut Vec<U>) + Sync) -> Lists<U> {
         let part = |first: usize| {
             let last = (first + GRAIN).min(self.count());

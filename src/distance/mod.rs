@@ -1,7 +1,7 @@
-//! Exact signs and distances from triangles, on the lattice of voxels.
+//! Exact signs and distances from triangles, on the voxel lattice.
 //!
-//! Coordinates are integers ([`lattice`]), so that how often a line passes through a surface is decided without rounding
-//! ([`winding`]); distances are found block by block, eight voxels at a time ([`nearest`], [`triangle`]).
+//! Coordinates are integers ([`lattice`]), so that the number of times that a line passes through a surface is found without rounding
+//! ([`winding`]); distances are computed block by block, eight voxels at a time ([`nearest`], [`triangle`]).
 
 pub mod lattice;
 pub mod lists;

@@ -1,16 +1,16 @@
-//! Nearest triangle of every voxel of a block, by subdivision: bounds at the centres of 4^3 and 2^3
-//! sub-blocks leave few triangles for the exact distances.
+//! Nearest triangle of every voxel of a block, by subdivision: bounds at the centres of 4^3 and 2^3 sub-blocks leave few triangles for the
+//! exact distances.
 
 use super::triangle::{Offsets, Points, Triangle, near_lanes, nearest, prune, to_each};
 use crate::numeric::blocks::{Mask, offset};
 use crate::numeric::lanes::LANES;
 
-/// Working memory of [`search`].
+/// Scratch memory of [`search`].
 #[derive(Default)]
 pub struct Search {
     lists: [Vec<u32>; 4],
     offsets: [Vec<Offsets>; 2],
-    /// For each triangle a mask of the sub-blocks in which it can be nearest to a voxel.
+    /// For each triangle, a mask of the sub-blocks in which it can be nearest to a voxel.
     lanes: [Vec<u8>; 2],
     centre: Vec<[f32; 4]>,
 }
@@ -28,7 +28,7 @@ pub struct Group<'a> {
     pub squared: [f32; LANES],
     /// Index of the nearest triangle of each.
     pub nearest: [u32; LANES],
-    /// All triangles within `complete` cells of one of the voxels, and some farther away.
+    /// All triangles within `complete` cells of one of the voxels, and some that are farther away.
     pub near: &'a [u32],
     /// See `near`.
     pub complete: f32,
@@ -42,7 +42,7 @@ impl Group<'_> {
         self.first + offset(lane >> 2, lane >> 1 & 1, lane & 1)
     }
 
-    /// All triangles within this distance (cells) of one of the voxels, and some farther away.
+    /// All triangles within this distance (cells) of one of the voxels, and some that are farther away.
     pub fn within(&self, cells: f32) -> Vec<u32> {
         let (far, sub_block) = self.far;
         let most = (cells + RADII[0]).powi(2);
@@ -106,8 +106,7 @@ pub fn search(
     }
 }
 
-/// Calls `see` with the index of each byte in which the bit of a sub-block is set. Most have none: eight are tested at
-/// once.
+/// Calls `see` with the index of each byte in which the bit of a sub-block is set. Most bytes have no such bit: eight are tested at once.
 fn each_near(bits: &[u8], sub_block: usize, mut see: impl FnMut(usize)) {
     for (eight, begin) in bits.chunks(8).zip((0..).step_by(8)) {
         let mut bytes = [0; 8];

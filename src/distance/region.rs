@@ -4,14 +4,14 @@ use super::Face;
 use super::lattice::{Fixed, UNITS, floor};
 use crate::error::{Error, Result};
 
-/// Most blocks of a region: a `u32` for each then takes 1 GiB.
+/// Maximum number of blocks of a region: a `u32` for each then takes 1 GiB.
 const MOST_BLOCKS: u64 = 1 << 28;
 
 /// A box of blocks of 8^3 voxels; coordinates count blocks from the lattice's origin voxel.
 pub struct Region {
-    /// Least block.
+    /// Minimum block.
     pub low: [i32; 3],
-    /// Greatest block.
+    /// Maximum block.
     pub high: [i32; 3],
 }
 
@@ -72,7 +72,7 @@ impl Region {
         [0, 1, 2].map(|axis| self.low[axis] + at[axis] as i32)
     }
 
-    /// The region's blocks that a box (cells) touches when grown by `margin` cells: least and greatest.
+    /// The region's blocks that a box (cells) touches when grown by `margin` cells: minimum and maximum.
     pub fn touched(&self, (low, high): ([f32; 3], [f32; 3]), margin: f32) -> ([i32; 3], [i32; 3]) {
         (
             [0, 1, 2].map(|a| block_of(low[a] - margin).max(self.low[a])),

@@ -2,12 +2,12 @@
 
 /// Lines in a column.
 const LINES: usize = 64;
-/// No column.
+/// Sentinel: no column.
 const NONE: u32 = u32::MAX;
 
 /// A sparse set of columns of lines; lines and columns have two coordinates.
 pub struct Columns {
-    /// Least and greatest column.
+    /// Minimum and maximum column.
     low: [i32; 2],
     high: [i32; 2],
     /// The index of each column between them, or [`NONE`].
@@ -23,7 +23,7 @@ impl Columns {
         Self { low, high, indices: vec![NONE; size[0] * size[1]], positions: Vec::new() }
     }
 
-    /// Adds a column between `low` and `high`, unless it is in the set.
+    /// Adds a column between `low` and `high`, unless the set contains it.
     pub fn add(&mut self, column: [i32; 2]) {
         let position = self.position(column).expect("between the least and the greatest");
         if self.indices[position] == NONE {
@@ -43,7 +43,7 @@ impl Columns {
         (index != NONE).then(|| index as usize * LINES + ((p & 7) << 3 | (q & 7)) as usize)
     }
 
-    /// The indices of the lines whose coordinates (voxels) lie from `first` to `last`.
+    /// The indices of the lines with coordinates (voxels) from `first` to `last`.
     pub fn between(&self, first: [i32; 2], last: [i32; 2]) -> impl Iterator<Item = usize> + '_ {
         let range =
             move |axis: usize| first[axis].max(self.low[axis] * 8)..=last[axis].min(self.high[axis] * 8 + 7);

@@ -5,14 +5,14 @@ use crate::numeric::blocks::{Mask, offset};
 
 /// The bits of a line's ten voxels.
 const LINE: u16 = (1 << 10) - 1;
-/// The bits of the eight in the block.
+/// The bits of the eight voxels in the block.
 const OWN: u16 = LINE >> 1 & !1;
 
-/// The voxels inside the volume, of a block and one more on each side: bit z + 1 of `[x + 1][y + 1]`.
+/// The voxels inside the volume, for a block and one voxel more on each side: bit z + 1 of `[x + 1][y + 1]`.
 pub struct Signs([[u16; 10]; 10]);
 
 impl Signs {
-    /// Which voxels of the block at `corner`, and around it, are inside.
+    /// Which voxels of the block at `corner` and around it are inside.
     pub fn new(lines: &Lines, corner: [i32; 3]) -> Self {
         let mut columns = [[0; 10]; 10];
         for (x, row) in (-1..).zip(&mut columns) {
@@ -29,7 +29,7 @@ impl Signs {
         std::array::from_fn(|x| (0..8).fold(0, |bits, y| bits | row(x, y)))
     }
 
-    /// Calls `see` with each voxel of the block that has a neighbour of the other sign along an axis.
+    /// Calls `see` with each voxel of the block that has a neighbour of opposite sign along an axis.
     pub fn each_change(&self, mut see: impl FnMut(usize)) {
         for (x, y) in (1..9).flat_map(|x| (1..9).map(move |y| (x, y))) {
             let own = self.0[x][y];
@@ -44,7 +44,7 @@ impl Signs {
     }
 }
 
-/// Which of ten voxels of a line are inside: a bit each, from height `first` upward.
+/// Which of the ten voxels of a line are inside: one bit each, from height `first` upward.
 fn inside(line: &[(f64, i32)], first: i32) -> u16 {
     let first = f64::from(first);
     let above = line.partition_point(|(height, _)| *height < first);

@@ -23,12 +23,12 @@ pub struct Points {
 #[derive(Debug, Clone, Copy)]
 pub struct Triangle {
     corner: [[f32; 3]; 3],
-    /// Edges from each corner to the next, and 1 / length^2 (0 for a point).
+    /// Edges from each corner to the next, and 1 / length^2 (0 for a zero-length edge).
     edge: [[f32; 3]; 3],
     inverse: [f32; 3],
     /// Unit normal (0 when the triangle has no area).
     pub normal: [f32; 3],
-    /// For each edge the vector in the plane that is perpendicular to it and points inward.
+    /// For each edge, the in-plane vector that is perpendicular to it and points inward.
     inward: [[f32; 3]; 3],
 }
 
@@ -37,7 +37,7 @@ impl Triangle {
     pub fn new(v: &[Fixed; 3], corner: [i32; 3]) -> Self {
         let position =
             |p: &Fixed| [0, 1, 2].map(|axis| (p[axis] - corner[axis] * UNITS) as f32 / UNITS as f32);
-        // Integer differences are exact: the normal of a sliver keeps its direction.
+        // Integer differences are exact: even a sliver keeps the direction of its normal.
         let n = cross(difference(v[1], v[0]), difference(v[2], v[0]));
         Self::with_normal([position(&v[0]), position(&v[1]), position(&v[2])], n)
     }
@@ -76,7 +76,7 @@ impl Triangle {
         best.0
     }
 
-    /// Offsets from the nearest points to eight points: the kernel, inlined into each instruction set's copy.
+    /// Offsets from the nearest points to eight points: the kernel, inlined for each instruction set.
     #[inline(always)]
     fn offsets(&self, points: &Points) -> Offsets {
         let p = [Lanes(points.x), Lanes(points.y), Lanes(points.z)];
@@ -170,7 +170,7 @@ fn prune_body(list: &mut Vec<u32>, offsets: &mut Vec<[f32; 4]>) {
 pub fn to_each(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut Vec<Offsets>) {
     #[inline(always)]
     fn body(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut Vec<Offsets>) {
-        // A plain loop: an iterator's closure would be compiled without the wider instructions.
+        // A plain loop: the closure of an iterator would be compiled without the wider instructions.
         out.clear();
         out.resize(list.len(), Offsets::default());
         for at in 0..list.len() {
@@ -180,8 +180,8 @@ pub fn to_each(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut 
     dispatch!(body(triangles: &[Triangle], list: &[u32], points: &Points, out: &mut Vec<Offsets>));
 }
 
-/// For each triangle a mask of the eight sub-blocks in which it can be nearest to a voxel, from the offsets
-/// of the sub-blocks' centres and their radius (cells); returns which sub-blocks are within `reach` cells of a triangle.
+/// For each triangle, a mask of the eight sub-blocks in which it can be nearest to a voxel, from the offsets of the sub-blocks' centres and
+/// their radius (cells); returns which sub-blocks are within `reach` cells of a triangle.
 pub fn near_lanes(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8>) -> [bool; LANES] {
     #[inline(always)]
     fn body(offsets: &[Offsets], radius: f32, reach: f32, out: &mut Vec<u8>) -> [bool; LANES] {
@@ -223,11 +223,11 @@ pub fn nearest(triangles: &[Triangle], list: &[u32], points: &Points) -> ([f32; 
     dispatch!(body(triangles: &[Triangle], list: &[u32], points: &Points) -> ([f32; LANES], [u32; LANES]))
 }
 
-/// Keeps in `list` the triangles that can be nearest to one of the eight voxels around a centre;
-/// `offsets` holds the centre's offset from each listed triangle (x, y, z, squared length) and is emptied.
+/// Keeps in `list` the triangles that can be nearest to one of the eight voxels around a centre; `offsets` holds the centre's offset from
+/// each listed triangle (x, y, z, squared length) and is cleared.
 ///
-/// The distance to a convex set is a convex function: at a voxel it is at least its first-order estimate
-/// from the centre, and at most the distance to the centre's nearest point.
+/// The distance to a convex set is a convex function: at a voxel it is at least its first-order estimate from the centre, and at most the
+/// distance to the point nearest to the centre.
 pub fn prune(list: &mut Vec<u32>, offsets: &mut Vec<[f32; 4]>) {
     dispatch!(prune_body(list: &mut Vec<u32>, offsets: &mut Vec<[f32; 4]>));
 }

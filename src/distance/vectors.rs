@@ -1,5 +1,4 @@
-//! Vectors as arrays, of `f64`, `f32` or eight `f32` side by side; always inlined, so that each instruction set's kernels
-//! get their own copy.
+//! Vectors as arrays of `f64`, `f32` or eight-lane `f32`; always inlined, so that the kernels of each instruction set get their own copy.
 
 use std::ops::{Add, Mul, Sub};
 
@@ -23,7 +22,7 @@ pub fn cross<T: Copy + Sub<Output = T> + Mul<Output = T>>(a: [T; 3], b: [T; 3]) 
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Distance of two points.
+/// Distance between two points.
 #[inline(always)]
 pub fn gap(p: [f32; 3], q: [f32; 3]) -> f32 {
     let d = sub(p, q);

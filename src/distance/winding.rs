@@ -1,9 +1,9 @@
-//! Winding number of a surface at every voxel, by counting signed crossings along lines parallel to z; and crossings
-//! along the lines through voxels parallel to any axis.
+//! Winding number of a surface at every voxel, by counting signed crossings along lines parallel to z; also crossings along the lines
+//! through voxels parallel to any axis.
 //!
-//! Crossings are decided in exact integers, under one symbolic shift of all voxels: mostly -z, then +x, then +y, each
-//! infinitesimal against the last. A line therefore meets each closed surface a consistent number of times, and
-//! lines of different axes agree about the voxels that they share.
+//! Crossings are decided in exact integers, under one symbolic shift of all voxels: mostly -z, then +x, then +y, each infinitesimal
+//! relative to the one before. A line therefore crosses each closed surface a consistent number of times, and lines of different axes agree
+//! about the voxels that they share.
 
 use rayon::prelude::*;
 
@@ -13,7 +13,7 @@ use super::lists::Lists;
 use super::region::{Region, each_block, extent};
 use super::scanlines::Columns;
 
-/// The lines along z through the voxels of a region, each with its sorted crossings; only where faces are above or below.
+/// The lines along z through the voxels of a region, each with its sorted crossings; only lines with faces above or below.
 pub struct Lines {
     columns: Columns,
     /// The height of each crossing (cells), and the winding number above it.
@@ -22,9 +22,9 @@ pub struct Lines {
 
 /// Faces per task: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 2048;
-/// Whether crossings nearer than this to a voxel (cells) are above or below it is decided in exact integers.
+/// Crossings closer than this to a voxel (cells) are classified as above or below it in exact integers.
 const NEAR: f64 = 1e-6;
-/// Distance from the voxel (cells) that they are then given.
+/// Distance from the voxel (cells) that these crossings are then given.
 const BESIDE: f64 = 1e-7;
 
 impl Lines {
@@ -72,7 +72,7 @@ impl Lines {
         self.columns.line([x, y]).map_or(&[], |line| self.crossings.get(line))
     }
 
-    /// The least winding number on any line, or 0.
+    /// The minimum winding number on any line, or 0.
     pub fn least_winding(&self) -> i32 {
         self.crossings.items().iter().fold(0, |least, (_, winding)| least.min(*winding))
     }
@@ -97,7 +97,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// All of them.
+    /// All axes.
     pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
 
     /// 0, 1 or 2.
@@ -105,8 +105,8 @@ impl Axis {
         self as usize
     }
 
-    /// A position in right-handed coordinates whose third axis runs along the lines (downward for y), and in which the
-    /// symbolic shift of the first two is positive and larger in the first.
+    /// A position in right-handed coordinates whose third axis runs along the lines (downward for y), and in which the symbolic shift of
+    /// the first two is positive, with the first one larger.
     pub fn turned(self, [x, y, z]: Fixed) -> [i64; 3] {
         let [x, y, z] = [x, y, z].map(i64::from);
         match self {
@@ -116,7 +116,7 @@ impl Axis {
         }
     }
 
-    /// Whether a plane with this normal (turned) passes below a voxel that lies in it, after the symbolic shift.
+    /// Whether a plane with this normal (turned) passes below a voxel that lies in the plane, after the symbolic shift.
     fn is_below(self, [p, q, along]: [i64; 3]) -> bool {
         let shifts = match self {
             Self::X => [p, along, q],
@@ -145,7 +145,7 @@ impl Axis {
         }
     }
 
-    /// The offset to a line whose coordinates differ by this much.
+    /// The offset to a line whose coordinates differ by this amount.
     pub fn beside(self, [p, q]: [f64; 2]) -> [f64; 3] {
         match self {
             Self::X => [0.0, q, p],
@@ -165,9 +165,9 @@ impl Axis {
     }
 }
 
-/// Whether the line through voxels with these coordinates passes left of the way from `a` to `b`, as one sees them with the first
-/// turned coordinate ([`Axis::turned`]) to the right and the second upward; exact, under the symbolic shift. Swapping `a` and
-/// `b` negates it; it is undefined where they are one point.
+/// Whether the line through voxels with these coordinates passes left of the path from `a` to `b`, seen with the first turned coordinate
+/// ([`Axis::turned`]) to the right and the second upward; exact, under the symbolic shift. Swapping `a` and `b` negates it; it is undefined
+/// if they are the same point.
 pub fn passes_left(axis: Axis, a: Fixed, b: Fixed, [p, q]: [i32; 2]) -> bool {
     let [a, b] = [a, b].map(|end| axis.turned(end)).map(|[p, q, _]| [p, q]);
     let p = if axis == Axis::Z { p } else { -p };
@@ -239,7 +239,7 @@ fn range(values: [i64; 3]) -> (i64, i64) {
     (values[0].min(values[1]).min(values[2]), values[0].max(values[1]).max(values[2]))
 }
 
-/// Where a triangle meets the row at height y: bounds of x, with rounding error below one unit.
+/// The range of x in which a triangle meets the row at height y, with rounding error below one unit.
 fn row_extent(v: [[i64; 2]; 3], y: i64) -> Option<(f64, f64)> {
     let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
     for (p, q) in [(v[0], v[1]), (v[1], v[2]), (v[2], v[0])] {

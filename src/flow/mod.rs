@@ -1,16 +1,16 @@
-//! Incompressible flow on a sparse set of tiles of 8 x 8 x 8 cells: what is the same for mist and for any other gas or liquid.
+//! Incompressible flow on a sparse set of tiles of 8 x 8 x 8 cells: the part that mist shares with any other gas or liquid.
 //!
-//! A step is: forces (the caller's), [`Flow::project`], [`Flow::advect`]. Solids come in as open shares and speeds of faces
-//! ([`Solids`]); which tiles there are is the caller's choice ([`Flow::resize`]).
+//! A step is: forces (applied by the caller), [`Flow::project`], [`Flow::advect`]. Solids are given as open fractions and speeds of faces
+//! ([`Solids`]); the caller chooses the tiles ([`Flow::resize`]).
 //!
 //! | word | meaning |
 //! |---|---|
 //! | tile | 8 x 8 x 8 cells |
 //! | active | a tile that holds cells of the flow |
-//! | rim | the tiles next to these: upper faces of their cells, and what the air around is like |
+//! | rim | the tiles adjacent to the active ones: upper faces of their cells, and the state of the surrounding air |
 //! | slot | index of a tile; the rim comes after the active ones |
-//! | around | a flow in cells twice as wide, which goes on where the active tiles end, and has one around it too |
-//! | ambient | velocity of the air outside all of them, where the pressure is 0: sides are open |
+//! | around | a coarser flow with cells twice as wide, which continues beyond the active tiles and may have one around it too |
+//! | ambient | velocity of the air outside all flows, where the pressure is 0: the sides are open |
 //!
 //! Velocities are at the cells' *lower faces* (staggered grid: Harlow and Welch 1965), everything else at their centres.
 
@@ -57,18 +57,18 @@ pub struct Flow {
     density: Field,
     /// Pressure at the centres, of active tiles and the rim: see [`pressure`].
     pressure: Field,
-    /// The air around; none: the flow is the widest one.
+    /// The surrounding air; none: this is the outermost flow.
     around: Option<Box<Flow>>,
     /// The operator of the last projection and its preconditioner.
     multigrid: Multigrid,
     room: Room,
 }
 
-/// Open shares and speeds of faces for tiles with cells of an edge (m).
+/// Open fractions and speeds of faces, for tiles and an edge (m) of their cells.
 pub type Boundary<'a> = dyn Fn(&Tiles, f32) -> Result<Solids> + Sync + 'a;
 
 impl Flow {
-    /// No tiles yet; cells have an edge (m), and the air outside all tiles a velocity (m/s).
+    /// No tiles yet; given the edge (m) of a cell and the velocity (m/s) of the air outside all tiles.
     ///
     /// # Errors
     /// A cell that is not positive; a velocity that is not finite.
@@ -104,7 +104,7 @@ impl Flow {
         &self.velocity
     }
 
-    /// Tiles, velocity and density, to change.
+    /// Tiles, velocity and density, for modification.
     pub fn fields(&mut self) -> (&Tiles, &mut [Field; 3], &mut Field) {
         (&self.tiles, &mut self.velocity, &mut self.density)
     }
@@ -114,18 +114,18 @@ impl Flow {
         &self.density
     }
 
-    /// Greatest speed (m/s) on any axis.
+    /// Largest speed (m/s) on any axis.
     pub fn fastest(&self) -> f32 {
         pressure::fastest(&self.velocity)
     }
 
-    /// The speed (m/s, rounded up by less than 1 %) on any axis that all faces but a share 0..=1 of them keep within.
+    /// The speed (m/s, rounded up by less than 1 %) on any axis that all but a share 0..=1 of the faces do not exceed.
     pub fn fastest_but(&self, share: f64) -> f32 {
         pressure::fastest_but(&self.velocity, share)
     }
 
-    /// Makes these (sorted, each once) the active tiles: values are kept where they were; new tiles hold air that moves as it did
-    /// there before, with no density.
+    /// Makes these tiles (sorted, without duplicates) the active ones: existing values are kept; new tiles hold air that moves as the
+    /// surrounding air did there, with no density.
     pub fn resize(&mut self, active: &[Coord]) {
         if &self.tiles.coords()[..self.tiles.active()] == active {
             return;
@@ -147,7 +147,7 @@ impl Flow {
         self.tiles = tiles;
     }
 
-    /// Takes the velocity at faces of its tiles from the air around, but for those that bound an active cell of a set.
+    /// Takes the velocity at faces of its tiles from the surrounding air, except for faces that bound an active cell of a set.
     fn read_around(&mut self, tiles: &Tiles, set: &Tiles) {
         let Some(around) = &self.around else { return };
         for axis in 0..3 {
@@ -169,20 +169,20 @@ impl Flow {
         }
     }
 
-    /// Carries velocity and density along for a time (s). Paths longer than [`FARTHEST`] cells are cut off.
+    /// Advects velocity and density for a time (s). Paths longer than [`FARTHEST`] cells are clamped.
     ///
     /// # Errors
-    /// Cancel; the fields are then of no use.
+    /// Cancel; the fields are then invalid.
     pub fn advect(&mut self, ctx: &Context, dt: f64, scheme: Scheme) -> Result<()> {
         self.carry(ctx, dt, scheme, None)
     }
 
-    /// The same with [`Scheme::Bounded`], by which a density that is not negative keeps the share of its mass that is asked for,
-    /// to rounding: what the scheme loses or gains is put back within two tiles of where it did. Only of density that grows by
-    /// more than a tenth there some is lost: of the last mist that is thinner than the least one.
+    /// The same with [`Scheme::Bounded`], with mass conservation: a density that is not negative keeps the requested share of its mass, to
+    /// rounding, and what the scheme loses or gains is restored within two tiles. Some is lost only where density would have to grow by
+    /// more than a tenth: of the last mist that is thinner than `least`.
     ///
     /// # Errors
-    /// Cancel; the fields are then of no use.
+    /// Cancel; the fields are then invalid.
     pub fn advect_keeping(&mut self, ctx: &Context, dt: f64, keeping: Keeping) -> Result<()> {
         self.carry(ctx, dt, Scheme::Bounded, Some(keeping))
     }
@@ -200,7 +200,7 @@ impl Flow {
         advection::advect::advect(ctx, tiles, (velocity, density), &way, room)
     }
 
-    /// Makes the velocity free of divergence: what is left, times the cell, is at most `tolerance` times the greatest speed.
+    /// Makes the velocity divergence-free: the remaining divergence, times the cell, is at most `tolerance` times the largest speed.
     ///
     /// # Errors
     /// Cancel; errors of the boundary.
@@ -225,7 +225,7 @@ impl Flow {
         Ok(solved)
     }
 
-    /// Its velocity at lower faces on an axis, for finer tiles.
+    /// Reads its velocity at lower faces on an axis for finer tiles.
     fn faces(&self, axis: usize) -> outer_grid::Reader<'_> {
         outer_grid::Reader {
             tiles: &self.tiles,
@@ -235,7 +235,7 @@ impl Flow {
         }
     }
 
-    /// Takes the pressure in the rim from the air around.
+    /// Takes the pressure in the rim from the surrounding air.
     fn press(&mut self, around: &Self) {
         let wide = outer_grid::continued(&around.multigrid.finest, &around.pressure);
         let reader = outer_grid::Reader { tiles: &around.tiles, field: &wide, axis: None, outside: 0.0 };
@@ -247,12 +247,12 @@ impl Flow {
         });
     }
 
-    /// Takes the density out of cells that the solids of the last projection cover.
+    /// Clears the density of cells that the solids of the last projection cover.
     pub fn clear_covered(&mut self) {
         self.multigrid.finest.clear_covered(&mut self.density);
     }
 
-    /// Divergence of each cell times its edge (m/s), negative.
+    /// Minus the divergence of each cell, times its edge (m/s).
     pub fn divergence(&self, solids: &Solids) -> Field {
         let mut out = vec![[0.0; 512]; self.tiles.active()];
         pressure::divergence(&self.tiles, solids, &self.velocity, &mut out);

@@ -1,8 +1,8 @@
-//! The air around the tiles: a flow whose cells are twice as wide, over the same position and some way around it, with another one
-//! around it, and so on. It gives the tiles the pressure and the velocity at their border, as if the air went on: one tile of
-//! padding does.
+//! The air around the tiles: a flow with cells twice as wide, which covers the same region and a margin around it, with another one around
+//! it, and so on. It provides the pressure and the velocity at the border of the tiles, as if the air continued: one tile of padding is
+//! enough.
 //!
-//! Where both are, the fine velocity counts: its mean goes into the wide cells before their projection.
+//! Where both exist, the fine velocity takes precedence: its mean is written into the wide cells before their projection.
 
 use rayon::prelude::*;
 
@@ -12,9 +12,9 @@ use super::tiles::{Coord, FACES, Field, Tile, Tiles, padded};
 use super::window::{Span, Window};
 use crate::numeric::cpu::dispatch;
 
-/// How many times wider the cells around are.
+/// Ratio of the cell width of a surrounding flow to that of the flow inside it.
 pub const WIDER: i32 = 2;
-/// How many flows lie around a flow, each around the one before.
+/// How many flows surround a flow, each around the one before.
 pub const LEVELS: u32 = 3;
 /// Tiles of wide cells around those that hold fine ones.
 const PADDING: i32 = 1;
@@ -32,7 +32,7 @@ const PART: usize = 8 / WIDER as usize;
 /// Wide cells in a fine tile.
 const PARTS: usize = PART * PART * PART;
 
-/// The mean fine velocity, in the wide faces that fine faces of active cells cover.
+/// Writes the mean fine velocity into the wide faces that fine faces of active cells cover.
 pub fn restrict(fine: &Flow, wide: &mut Flow) {
     let (tiles, velocity) = (&fine.tiles, &fine.velocity);
     for axis in 0..3 {
@@ -50,7 +50,7 @@ pub fn restrict(fine: &Flow, wide: &mut Flow) {
             let tile = &mut wide.velocity[axis][parent as usize];
             for (index, mean) in means.into_iter().enumerate() {
                 let at = part(index);
-                // Of the rim, only the first faces bound active cells.
+                // In the rim only the first faces bound active cells.
                 if is_active || at[axis] == 0 {
                     tile[(corner[0] + at[0]) << 6 | (corner[1] + at[1]) << 3 | (corner[2] + at[2])] = mean;
                 }
@@ -76,7 +76,7 @@ fn means_of(tile: &Tile, axis: usize) -> [f32; PARTS] {
             };
             tile[(at[0] + x) << 6 | (at[1] + y) << 3 | (at[2] + z)]
         };
-        // In an order that mirrored fields share.
+        // In an order that is the same for mirrored fields.
         0.25 * ((face(0, 0) + face(1, 1)) + (face(0, 1) + face(1, 0)))
     })
 }
@@ -89,15 +89,15 @@ pub struct Reader<'a> {
     pub field: &'a [Tile],
     /// The axis of the faces; none: centres.
     pub axis: Option<usize>,
-    /// Its value outside all tiles.
+    /// Value outside all tiles.
     pub outside: f32,
 }
 
-/// Wide cells on an axis that the interpolation of a fine tile reads: those that it covers and one on each side.
+/// Wide cells on an axis that the interpolation of a fine tile reads: those that the tile covers and one on each side.
 const READ: usize = PART + 2;
 
-/// For each of eight fine positions on an axis: the first of the two wide cells read, counted from the first of [`READ`], and the
-/// weight of the second.
+/// For each of eight fine positions on an axis: the first of the two wide cells that are read, as an index into [`READ`], and the weight of
+/// the second.
 type Weights = [(usize, f32); 8];
 
 /// Weights of linear interpolation; `is_centre`: values are at the centres on this axis.
@@ -156,7 +156,7 @@ fn interpolate_rows(window: &Window, corner: [i32; 3], weights: &[Weights; 3], o
     }
 }
 
-/// The wide pressure, with the mean of their neighbours in cells that take no part.
+/// The wide pressure; cells that take no part get the mean of their neighbours.
 pub fn continued(operator: &Operator, pressure: &Field) -> Field {
     let takes_part =
         |slot: usize, cell: usize| operator.stencil(slot).is_none_or(|stencil| stencil.inverse[cell] > 0.0);

@@ -1,5 +1,5 @@
-//! Scratch fields, reused between calls: paths while values are carried, residuals while the pressure is solved, tiles
-//! on their way to other slots. It stays between calls and only grows, so that a step of as many tiles allocates nothing.
+//! Scratch fields, reused between calls: paths during advection, residuals during the pressure solve, tiles that move to other slots. The
+//! memory only grows, so that a step with no more tiles than before allocates nothing.
 
 use rayon::prelude::*;
 
@@ -15,7 +15,7 @@ pub struct Room {
 }
 
 impl Room {
-    /// For the paths back and ahead of active tiles, and three fields that hold the rim too.
+    /// For the paths back and ahead of active tiles, and three fields that include the rim.
     #[allow(clippy::type_complexity)]
     pub fn paths(&mut self, tiles: &Tiles) -> ([&mut [Tile]; 3], [&mut [Tile]; 3], [&mut [Tile]; 3]) {
         let Self { wide, fields } = self;
@@ -28,7 +28,7 @@ impl Room {
         self.fields.each_mut().map(|field| first(field, tiles.active()))
     }
 
-    /// Moves a field of active tiles and the rim to other slots: each new one's old slot, or none, where it gets `fill`.
+    /// Moves a field of active tiles and the rim to new slots: `from` has each new slot's old slot, or none, in which case it gets `fill`.
     pub fn move_wide(&mut self, field: &mut Field, from: &[u32], fill: f32) {
         move_tiles(&mut self.wide[0], field, from, fill);
     }
@@ -39,7 +39,7 @@ impl Room {
     }
 }
 
-/// Moves a field through room of its size, which it is exchanged with.
+/// Moves a field through a scratch field of its size, then swaps the two.
 fn move_tiles(room: &mut Field, field: &mut Field, from: &[u32], fill: f32) {
     let to = first(room, from.len());
     to.par_iter_mut().zip(from).with_min_len(16).for_each(|(to, from)| {
@@ -52,7 +52,7 @@ fn move_tiles(room: &mut Field, field: &mut Field, from: &[u32], fill: f32) {
 /// The first tiles of a field, which grows to hold them.
 pub fn first(field: &mut Field, count: usize) -> &mut [Tile] {
     if field.len() < count {
-        // A little more than now, not twice as much: fields are large, and the flow grows slowly.
+        // Slightly more than now, not twice as much: fields are large, and the flow grows slowly.
         field.reserve_exact(count + count / 16 - field.len());
         field.resize(count, [0.0; 512]);
     }

@@ -1,5 +1,5 @@
-//! Velocities inside solids. A wall stops what flows through it, not what flows along it: faces just inside continue the flow
-//! outside, so that values carried along a wall are not mixed with the solid's velocity (free slip).
+//! Velocities inside solids. A wall stops flow through it, not along it: faces just inside continue the outside flow, so that values
+//! carried along a wall are not mixed with the solid's velocity (free slip).
 
 use rayon::prelude::*;
 
@@ -7,15 +7,15 @@ use super::pressure::operator::Operator;
 use super::solids::Solids;
 use super::tiles::{FACES, Field, NONE, Tile, Tiles};
 
-/// Layers of faces that continue the flow.
+/// Layers of faces into which the flow is extrapolated.
 const LAYERS: usize = 2;
 
-/// The faces of a tile whose velocity is known, on each axis: bit `y << 3 | z` of word `x`.
+/// The faces of a tile with known velocity, on each axis: bit `y << 3 | z` of word `x`.
 type Known = [[u64; 8]; 3];
 /// All faces.
 const ALL: Known = [[u64::MAX; 8]; 3];
 
-/// Continues the velocity into solids.
+/// Extrapolates the velocity into solids.
 pub fn extend(tiles: &Tiles, operator: &Operator, solids: &Solids, velocity: &mut [Field; 3]) {
     if solids.is_empty() {
         return;
@@ -94,7 +94,7 @@ const FIRST: u64 = 0x0101_0101_0101_0101;
 /// The first row of a layer.
 const ROW: u64 = 0xff;
 
-/// The positions next to those of a mask, with the masks of the six tiles around.
+/// The positions adjacent to those of a mask, given the masks of the six adjacent tiles.
 fn beside(own: &[u64; 8], [low_x, high_x, low_y, high_y, low_z, high_z]: &[[u64; 8]; 6]) -> [u64; 8] {
     std::array::from_fn(|x| {
         let left = if x > 0 { own[x - 1] } else { low_x[7] };
@@ -116,7 +116,7 @@ fn flows(tiles: &Tiles, operator: &Operator, slot: usize) -> [u64; 8] {
     mask(&stencil.inverse)
 }
 
-/// The cells of a tile whose value is over 0.
+/// The cells of a tile with a value above 0.
 fn mask(tile: &Tile) -> [u64; 8] {
     std::array::from_fn(|x| {
         let layer = tile[64 * x..][..64].iter().enumerate();
@@ -124,7 +124,7 @@ fn mask(tile: &Tile) -> [u64; 8] {
     })
 }
 
-/// The faces of a tile that bound a cell of the flow, or are open.
+/// The faces of a tile that bound a cell of the flow or are open.
 fn known_of(tiles: &Tiles, flows: &[[u64; 8]], solids: &Solids, slot: usize) -> Known {
     let Some(faces) = solids.faces(slot) else { return ALL };
     let own = &flows[slot];
@@ -153,7 +153,7 @@ mod tests {
         let tiles = Tiles::new(&[[0, 0, 0]]);
         let near = tiles.neighbours()[0];
         let mut state = 1u64;
-        // A bit of sixteen is set.
+        // One bit in sixteen is set.
         let mut word = || {
             (0..4).fold(u64::MAX, |word, _| {
                 state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);

@@ -1,24 +1,24 @@
-//! Solids that the flow goes around: how much of each face is open, and how fast the rest of it moves.
+//! Solids in the flow: how much of each face is open, and how fast the covered part moves.
 
 use super::tiles::{NONE, Tile, Tiles};
 
-/// Faces of a tile that solids touch.
+/// Faces of a tile that touches solids.
 #[derive(Debug, Clone)]
 pub struct Faces {
-    /// Open share (0..=1) of the lower faces of each cell, on each axis.
+    /// Open fraction (0..=1) of the lower faces of each cell, on each axis.
     pub open: [Tile; 3],
-    /// Speed (m/s) along the axis of the solid that covers the rest.
+    /// Speed (m/s) along the axis of the solid that covers the rest of the face.
     pub speed: [Tile; 3],
 }
 
 impl Faces {
-    /// Faces that nothing covers.
+    /// Uncovered faces.
     pub fn open() -> Self {
         Self { open: [[1.0; 512]; 3], speed: [[0.0; 512]; 3] }
     }
 }
 
-/// Open shares and speeds for tiles near solids; all faces of other tiles are open.
+/// Open fractions and speeds for tiles near solids; all faces of other tiles are open.
 #[derive(Debug, Clone, Default)]
 pub struct Solids {
     slots: Vec<u32>,
@@ -46,7 +46,7 @@ impl Solids {
         self.faces.get(*self.slots.get(slot)? as usize)
     }
 
-    /// Greatest speed (m/s) of a covered face on any axis.
+    /// Largest speed (m/s) of a covered face on any axis.
     pub fn fastest(&self) -> f32 {
         let covered = self.faces.iter().flat_map(|faces| {
             let pairs = faces.open.iter().flatten().zip(faces.speed.iter().flatten());
@@ -55,7 +55,7 @@ impl Solids {
         covered.fold(0.0, |most, (_, speed)| super::window::max(most, speed.abs()))
     }
 
-    /// Whether there are none.
+    /// Whether there are no solids.
     pub fn is_empty(&self) -> bool {
         self.faces.is_empty()
     }

@@ -1,4 +1,4 @@
-//! The exact state of a flow: what a step that fails puts back, and the bytes from which a run resumes.
+//! The exact state of a flow: what a failed step restores, and the bytes from which a run resumes.
 
 use rayon::prelude::*;
 
@@ -18,13 +18,13 @@ pub struct Kept {
     around: Option<Box<Kept>>,
 }
 
-/// Greatest coordinate of a tile, either way.
+/// Maximum absolute coordinate of a tile.
 const OUTERMOST: i32 = 1 << 26;
 /// Bytes of a tile of one field.
 const TILE: usize = 4 * 512;
 
 impl Kept {
-    /// Becomes a copy of what a flow carries from step to step. Memory that it has is used again.
+    /// Copies the persistent state of a flow. Reuses its own memory.
     pub fn become_of(&mut self, flow: &Flow) {
         self.tiles.clone_from(&flow.tiles);
         for (to, from) in self.velocity.iter_mut().zip(&flow.velocity) {
@@ -58,7 +58,7 @@ impl Flow {
         }
     }
 
-    /// Puts back what was kept of this flow; `kept` is of no use then, but for its memory.
+    /// Restores this flow from `kept`, whose contents are then meaningless; only its memory can be reused.
     pub fn put_back(&mut self, kept: &mut Kept) {
         std::mem::swap(&mut self.tiles, &mut kept.tiles);
         std::mem::swap(&mut self.velocity, &mut kept.velocity);
@@ -80,10 +80,10 @@ impl Flow {
         }
     }
 
-    /// Reads a state that [`Flow::save`] wrote of a flow with the same cells.
+    /// Reads a state that [`Flow::save`] wrote for a flow with the same cell size.
     ///
     /// # Errors
-    /// Bytes that are not such a state; the flow is then as it was.
+    /// Bytes that are not such a state; the flow is then unchanged.
     pub fn load(&mut self, from: &mut Reader<'_>) -> Result<()> {
         let mut kept = self.read(from)?;
         self.put_back(&mut kept);
@@ -98,7 +98,7 @@ impl Flow {
         {
             return Err(Error::Bytes("has tiles out of order, or too far from the origin".into()));
         }
-        // All fields of active tiles must be there before memory for them is taken.
+        // All fields of active tiles must be present before memory for them is allocated.
         if from.rest().len() / TILE < 5 * count {
             return Err(Error::Bytes("the state is cut short".into()));
         }

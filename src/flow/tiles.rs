@@ -1,8 +1,8 @@
-//! Which tiles there are, and who is whose neighbour.
+//! The sparse set of tiles and their neighbours.
 
 use crate::numeric::blocks::VOXELS;
 
-/// Coordinate of a tile: that of its least cell, divided by 8.
+/// Coordinate of a tile: that of its lowest cell, divided by 8.
 pub type Coord = [i32; 3];
 /// 512 values of a tile, in the order of [`crate::numeric::blocks`].
 pub type Tile = [f32; VOXELS];
@@ -11,22 +11,22 @@ pub type Field = Vec<Tile>;
 
 /// No tile.
 pub const NONE: u32 = u32::MAX;
-/// Position of a tile itself among its 27 neighbours.
+/// Index of a tile itself among its 27 neighbours.
 pub const SELF: usize = 13;
-/// A tile without values.
+/// A tile of zeros.
 pub static ZEROS: Tile = [0.0; VOXELS];
 
-/// Position among the 27 neighbours of the one at an offset of -1, 0 or 1 on each axis.
+/// Index among the 27 neighbours of the one at an offset of -1, 0 or 1 on each axis.
 #[inline]
 pub const fn neighbour_at(offset: [i32; 3]) -> usize {
     ((offset[0] + 1) * 9 + (offset[1] + 1) * 3 + offset[2] + 1) as usize
 }
 
-/// Positions among the 27 neighbours of the six that share a face: -x, +x, -y, +y, -z, +z.
+/// Indices among the 27 neighbours of the six that share a face: -x, +x, -y, +y, -z, +z.
 pub const FACES: [usize; 6] = [4, 22, 10, 16, 12, 14];
 
-/// A sparse set of tiles. The first [`Tiles::active`] slots hold cells. Those behind them, the *rim*, are the tiles next to these
-/// in all 26 directions: they hold the upper faces of cells whose tiles end there, and what the air around is like.
+/// A sparse set of tiles. The first [`Tiles::active`] slots hold cells. The slots after them, the *rim*, are the tiles adjacent to these in
+/// all 26 directions: they hold the upper faces of cells at the border of the active tiles, and the state of the surrounding air.
 #[derive(Debug, Default)]
 pub struct Tiles {
     coords: Vec<Coord>,
@@ -47,7 +47,7 @@ impl Clone for Tiles {
 }
 
 impl Tiles {
-    /// The set whose active tiles are these, sorted and each once.
+    /// A set with these active tiles, sorted and without duplicates.
     pub fn new(active: &[Coord]) -> Self {
         debug_assert!(active.is_sorted_by(|a, b| a < b));
         // All tiles in their order, with their slots.
@@ -74,7 +74,7 @@ impl Tiles {
         found.ok().map(|slot| slot as u32)
     }
 
-    /// Whether these are the same tiles as others.
+    /// Whether both are the same set of tiles.
     pub fn is_of(&self, other: &Self) -> bool {
         self.active == other.active && self.coords == other.coords
     }
@@ -99,7 +99,7 @@ impl Tiles {
         &self.neighbours
     }
 
-    /// The cell next to one on an axis, and its tile.
+    /// The cell adjacent to a cell on an axis, and its tile.
     pub fn beside(&self, slot: usize, cell: usize, axis: usize, upper: bool) -> (u32, usize) {
         let step = 64 >> (3 * axis);
         match (upper, cell / step % 8) {
@@ -117,12 +117,12 @@ impl Tiles {
     }
 }
 
-/// Slots of the 27 tiles around each of sorted ones, by slot.
+/// Slots of the 27 tiles around each of these sorted tiles, by slot.
 fn neighbours(all: &[(Coord, u32)]) -> Vec<[u32; 27]> {
     let mut out = vec![[NONE; 27]; all.len()];
     for column in 0..9 {
         let [x, y] = [column / 3, column % 3].map(|at| at - 1);
-        // The tiles sought come in the same order as those that seek them.
+        // The neighbours that are looked up come in the same order as the tiles.
         let mut next = 0;
         for (coord, slot) in all {
             let sought = [coord[0] + x, coord[1] + y, coord[2] - 1];
@@ -163,11 +163,11 @@ pub fn padded(tiles: &[Coord], padding: i32) -> Vec<Coord> {
     out
 }
 
-/// Sorted coordinates of the tiles that are reached from these in so many steps over a face or an edge.
+/// Sorted coordinates of the tiles within this many steps over a face or an edge.
 pub fn bordered(tiles: &[Coord], steps: usize) -> Vec<Coord> {
     let mut out = tiles.to_vec();
     for _ in 0..steps {
-        // Pairs of axes: what is within one tile on both of a pair.
+        // Pairs of axes: the tiles within one tile on both axes of a pair.
         let pairs = [[0, 1], [0, 2], [1, 2]].into_iter().flat_map(|[a, b]| {
             let ways = (-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j)));
             let out = &out;

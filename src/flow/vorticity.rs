@@ -1,5 +1,5 @@
-//! Vorticity confinement: what advection damps of small eddies is given back to them (Steinhoff and Underhill 1994; Fedkiw, Stam
-//! and Jensen 2001, section 3): an acceleration gain h (N x w), where w is the vorticity and N points to where it is greatest.
+//! Vorticity confinement: restores the small eddies that advection damps (Steinhoff and Underhill 1994; Fedkiw, Stam and Jensen 2001,
+//! section 3): an acceleration gain h (N x w), where w is the vorticity and N points to its maximum.
 
 use rayon::prelude::*;
 
@@ -9,10 +9,10 @@ use super::window::{Span, Window};
 use crate::context::Context;
 use crate::error::Result;
 
-/// Cells around a tile of which velocities at centres, and vorticities, are computed.
+/// Margin (cells) around a tile in which velocities at centres, and vorticities, are computed.
 const CENTRES: usize = 3;
 const CURLS: usize = 2;
-/// Vorticity times a cell (m/s) under which it has no direction.
+/// Below this vorticity times a cell (m/s) its direction is undefined.
 const LEAST: f32 = 1.0e-6;
 
 /// Vectors in a cube of cells: a tile and a margin.
@@ -28,7 +28,7 @@ impl Cube {
         Self { margin, values: (0..size.pow(3)).map(|index| of(at(index))).collect() }
     }
 
-    /// The vector of a cell that is counted in a cube with another margin, `by` cells on along an axis.
+    /// The vector at a cell given in the coordinates of a cube with another margin, `by` cells further along an axis.
     fn at(&self, cell: [usize; 3], margin: usize, axis: usize, by: isize) -> [f32; 3] {
         let size = 8 + 2 * self.margin;
         let mut at = cell.map(|x| x + self.margin - margin);
@@ -79,7 +79,7 @@ impl Flow {
     }
 }
 
-/// What each cell of a tile gains (m/s).
+/// Change of velocity (m/s) of each cell of a tile.
 fn pushes(windows: &[Window; 3], gain: f32) -> [Tile; 3] {
     let centre = |cell: [usize; 3]| {
         std::array::from_fn(|axis| {
@@ -91,7 +91,7 @@ fn pushes(windows: &[Window; 3], gain: f32) -> [Tile; 3] {
         })
     };
     let centres = Cube::new(CENTRES, centre);
-    // Times the edge of a cell.
+    // Curl times the edge of a cell.
     let curls = Cube::new(CURLS, |cell| {
         let slope = |component: usize, axis: usize| {
             let [ahead, back] = [1, -1].map(|by| centres.at(cell, CURLS, axis, by)[component]);
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
     use crate::flow::tiles::{Coord, padded};
 
-    /// Speed (m/s) of a column of turning air around the z axis, by the distance from it.
+    /// Speed (m/s) of a column of rotating air around the z axis, as a function of the distance from it.
     fn column() -> Flow {
         let mut flow = Flow::new(0.1, [0.0; 3]).unwrap();
         flow.resize(&padded(&[[0, 0, 0]], 2));

@@ -1,26 +1,26 @@
-//! Values of a tile and of cells around it, copied together so that kernels read them without asking for neighbours.
+//! Values of a tile and of the cells around it, copied together so that kernels read them without neighbour lookups.
 
 use super::tiles::Tile;
 use crate::numeric::lanes::Lanes;
 
-/// Most cells around a tile: a displacement of five cells, and two for cubic interpolation.
+/// Maximum number of cells around a tile: a displacement of five cells, and two for cubic interpolation.
 pub const MOST: i32 = 7;
 /// Layers, and rows of a layer: 8 + 2 x 7.
 const SIDE: usize = 22;
-/// Values of a row: whole rows of the tile and of the tiles before and behind it, which copies fastest.
+/// Values of a row: whole rows of the tile and of the tiles before and behind it, which is the fastest to copy.
 const ROW: usize = 24;
 /// Values of a layer.
 const LAYER: usize = SIDE * ROW;
 /// Index of the tile's first cell.
 const FIRST: usize = MOST as usize * (LAYER + ROW) + 8;
-/// Masks indices, which are in bounds then.
+/// Mask that keeps an index in bounds.
 const MASK: usize = 16383;
-/// Room for the values: those that cubic interpolation reads lie up to three layers, rows and values behind the first one.
+/// Length of the buffer: cubic interpolation reads up to three layers, rows and values beyond the first one.
 const ROOM: usize = MASK + 1 + 3 * (LAYER + ROW) + 8;
-/// Room for rounding (cells) in the sum of a cell's position and a displacement.
+/// Tolerance (cells) for rounding in the sum of a cell's position and a displacement.
 const ROUNDING: f32 = 1.0e-4;
 
-/// Cells that a window covers on each axis, counted from the tile's first one: `low` and those up to `high`, without it.
+/// Cells that a window covers on each axis, relative to the tile's first cell: from `low` up to `high`, exclusive.
 #[derive(Debug, Clone, Copy)]
 pub struct Span {
     low: [i32; 3],
@@ -34,13 +34,13 @@ impl Span {
         Self { low: [-margin; 3], high: [8 + margin; 3] }
     }
 
-    /// Those from `low` up to `high`, without it.
+    /// Cells from `low` up to `high`, exclusive.
     pub fn new(low: [i32; 3], high: [i32; 3]) -> Self {
         Self { low, high }
     }
 
-    /// What interpolation reads for the first `cells` cells of a tile on each axis, moved by `ways` (cells): the least and the
-    /// greatest displacement on each axis.
+    /// Cells that interpolation reads for the first `cells` cells of a tile on each axis, displaced by `ways` (cells): the minimum and
+    /// maximum displacement on each axis.
     pub fn moved(cells: [i32; 3], ways: &[[f32; 2]; 3]) -> Self {
         let low = ways.map(|[least, _]| ((least - ROUNDING).floor() as i32).max(-MOST));
         let high = [0, 1, 2].map(|axis| {
@@ -50,7 +50,7 @@ impl Span {
         Self { low, high }
     }
 
-    /// What cubic interpolation reads where linear interpolation reads this.
+    /// Cells that cubic interpolation reads where linear interpolation reads these.
     pub fn for_cubic(self) -> Self {
         Self {
             low: self.low.map(|low| (low - 1).max(-MOST)),
@@ -71,11 +71,11 @@ impl Default for Window {
 }
 
 impl Window {
-    /// Copies a tile's surroundings; `outside` where there are no tiles.
+    /// Copies a tile and its surroundings; `outside` is the value where there are no tiles.
     pub fn fill(&mut self, field: &[Tile], neighbours: &[u32; 27], span: &Span, outside: f32) {
         for part in 0..27 {
             let tile = [part / 9, part / 3 % 3, part % 3];
-            // On each axis, those cells of this tile that the window covers.
+            // On each axis, the cells of this tile that the window covers.
             let low = [0, 1, 2].map(|axis| span.low[axis].max(8 * tile[axis] as i32 - 8));
             let high = [0, 1, 2].map(|axis| span.high[axis].min(8 * tile[axis] as i32));
             if (0..3).any(|axis| low[axis] >= high[axis]) {
@@ -96,14 +96,14 @@ impl Window {
         }
     }
 
-    /// The value of a cell, counted from the tile's first one; each coordinate is at least -7.
+    /// The value of a cell, relative to the tile's first cell; each coordinate is at least -7.
     #[inline(always)]
     pub fn at(&self, x: i32, y: i32, z: i32) -> f32 {
         let index = (x + MOST) as usize * LAYER + (y + MOST) as usize * ROW + (z + 8) as usize;
         self.values[index & MASK]
     }
 
-    /// The values of eight cells along z, from one on that is counted from the tile's first one.
+    /// The values of eight cells along z, from a cell relative to the tile's first cell.
     #[inline(always)]
     pub fn row(&self, x: usize, y: usize, z: usize) -> Lanes {
         self.lanes((FIRST + x * LAYER + y * ROW + z) & MASK)
@@ -119,21 +119,21 @@ impl Window {
         self.values[index..].first_chunk().unwrap_or(&[0.0; 2])
     }
 
-    /// Trilinear interpolation at the positions of a row's cells, moved by displacements (cells).
+    /// Trilinear interpolation at the positions of a row's cells, displaced (cells).
     #[inline(always)]
     pub fn sample(&self, row: usize, ways: &[Lanes; 3]) -> Lanes {
         let (corners, weights) = self.corners(row, ways, None);
         interpolate(&corners, &weights)
     }
 
-    /// The same at half a cell further on an axis.
+    /// The same, half a cell further on an axis.
     #[inline(always)]
     pub fn sample_between(&self, row: usize, ways: &[Lanes; 3], axis: usize) -> Lanes {
         let (corners, weights) = self.corners(row, ways, Some(axis));
         interpolate(&corners, &weights)
     }
 
-    /// Trilinear interpolation, with the least and the greatest of the eight values around each position.
+    /// Trilinear interpolation, with the minimum and maximum of the eight values around each position.
     #[inline(always)]
     pub fn sample_bounded(&self, row: usize, ways: &[Lanes; 3]) -> [Lanes; 3] {
         let (corners, weights) = self.corners(row, ways, None);
@@ -143,8 +143,8 @@ impl Window {
         [interpolate(&corners, &weights), least, most]
     }
 
-    /// Cubic interpolation (Lagrange's, of the 4 x 4 x 4 values around) at the positions of a row's cells, moved by displacements
-    /// (cells), with the least and the greatest of the eight values around each position.
+    /// Cubic interpolation (Lagrange, of the 4 x 4 x 4 values around) at the positions of a row's cells, displaced (cells), with the
+    /// minimum and maximum of the eight values around each position.
     #[inline(always)]
     pub fn sample_cubic(&self, row: usize, ways: &[Lanes; 3]) -> [Lanes; 3] {
         let (base, weights) = cell(row, ways, None, LAYER + ROW + 1);
@@ -167,7 +167,7 @@ impl Window {
         [combined(layers, &x), least, most]
     }
 
-    /// The values at the eight corners of the cells of positions, and the corners' weights.
+    /// The values at the eight corners of the cells that contain the positions, and the corners' weights.
     #[inline(always)]
     fn corners(&self, row: usize, ways: &[Lanes; 3], between: Option<usize>) -> ([Lanes; 8], Weights) {
         let (base, weights) = cell(row, ways, between, 0);
@@ -179,7 +179,7 @@ impl Window {
         (corners, weights)
     }
 
-    /// For each lane the value at an index, and the one behind it.
+    /// For each lane the value at an index, and the next one.
     #[inline(always)]
     fn pairs(&self, base: &[usize; 8], shift: usize) -> [Lanes; 2] {
         let at = |lane: usize| self.pair(base[lane] + shift);
@@ -187,8 +187,8 @@ impl Window {
     }
 }
 
-/// The indices of the first corners of the cells of positions, less `before`, and the weights of the lower and the upper corners. Mirrored
-/// positions have mirrored weights to the last bit.
+/// The indices of the first corners of the cells that contain the positions, minus `before`, and the weights of the lower and upper
+/// corners. Mirrored positions have bitwise mirrored weights.
 #[inline(always)]
 fn cell(row: usize, ways: &[Lanes; 3], between: Option<usize>, before: usize) -> ([usize; 8], Weights) {
     let (zero, one, half) = (Lanes::all(0.0), Lanes::all(1.0), Lanes::all(0.5));
@@ -206,12 +206,12 @@ fn cell(row: usize, ways: &[Lanes; 3], between: Option<usize>, before: usize) ->
         }
     }
     let first = WHOLE + (FIRST + (row >> 3) * LAYER + (row & 7) * ROW - before) as f32;
-    // Whole numbers: the sum is exact, and its low bits are the index.
+    // Integers: the sum is exact, and its low bits are the index.
     let index = whole[0] * Lanes::all(LAYER as f32) + whole[1] * Lanes::all(ROW as f32) + whole[2];
     ((index + (Lanes::all(first) + STEPS)).0.map(|index| index.to_bits() as usize & MASK), weights)
 }
 
-/// Weights of four values in a row for a position between the middle two, from the linear weights of these.
+/// Weights of four consecutive values for a position between the middle two, from the linear weights of the middle two.
 #[inline(always)]
 fn lagrange([low, high]: [Lanes; 2]) -> [Lanes; 4] {
     let one = Lanes::all(1.0);
@@ -220,15 +220,15 @@ fn lagrange([low, high]: [Lanes; 2]) -> [Lanes; 4] {
     [outer * (one + low), inner * low, inner * high, outer * (one + high)]
 }
 
-/// Mirrored values with mirrored weights have the same result to the last bit.
+/// Mirrored values with mirrored weights have bitwise the same result.
 #[inline(always)]
 fn combined([a, b, c, d]: [Lanes; 4], weights: &[Lanes; 4]) -> Lanes {
     (a * weights[0] + d * weights[3]) + (b * weights[1] + c * weights[2])
 }
 
-/// 1.5 x 2^23: the sum with a small number is rounded to whole numbers.
+/// 1.5 x 2^23: adding it to a small number rounds to an integer.
 const WHOLE: f32 = 12_582_912.0;
-/// The lanes' numbers.
+/// The indices of the lanes.
 const STEPS: Lanes = Lanes([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
 
 #[inline(always)]
@@ -244,7 +244,7 @@ pub fn max(a: f32, b: f32) -> f32 {
 /// Weights of the lower and the upper corners on each axis.
 type Weights = [[Lanes; 2]; 3];
 
-/// Mirrored corners with mirrored weights have the same result to the last bit.
+/// Mirrored corners with mirrored weights have bitwise the same result.
 #[inline(always)]
 fn interpolate(corners: &[Lanes; 8], [x, y, z]: &Weights) -> Lanes {
     let mix = |a: Lanes, b: Lanes, [low, high]: &[Lanes; 2]| a * *low + b * *high;
@@ -275,7 +275,7 @@ mod tests {
             .collect();
         let middle = tiles.find([0, 0, 0]).unwrap() as usize;
         let fill = |span: Span| {
-            // What a window does not cover must not be read.
+            // Values that a window does not cover must not be read.
             let mut window = Window::default();
             window.values.fill(f32::NAN);
             window.fill(&field, &tiles.neighbours()[middle], &span, 0.0);
@@ -295,7 +295,7 @@ mod tests {
             let [_, low, high] = window.sample_bounded(42, &ways).map(|values| values.0[3]);
             assert_eq!((low, high), (0.0, 6.0));
         }
-        // Cubic functions are interpolated exactly by the cubic one, up to five cells away.
+        // Cubic interpolation is exact for cubic functions, up to five cells away.
         let cube = |x: f32, y: f32, z: f32| 0.01 * x * x * x + 0.1 * x * y - 0.2 * y * y * z + z;
         let cubic: Vec<Tile> = tiles
             .coords()
@@ -322,7 +322,7 @@ mod tests {
                 assert!(low <= high && low.is_finite());
             }
         }
-        // Only what paths reach is covered, to the last cell.
+        // Only the cells that paths reach are covered, up to the last cell.
         let extent = [[-4.3, -3.7], [1.0, 1.0], [-0.2, 4.9]];
         let window = fill(Span::moved([8; 3], &extent));
         for (row, lane, ways) in [(0, 0, [-4.3, 1.0, -0.2]), (63, 7, [-3.7, 1.0, 4.9])] {

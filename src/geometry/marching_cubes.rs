@@ -1,13 +1,12 @@
-//! The surface in a cube whose corners are inside or outside, as triangles: marching cubes (Lorensen and Cline 1987). A face of a
-//! cube on which two corners across are inside keeps these apart (Montani, Scateni and Scopigno 1994), so that what two cubes make
-//! of it fits.
+//! Marching cubes (Lorensen and Cline 1987): the surface, as triangles, in a cube whose corners are inside or outside. If two diagonal
+//! corners of a face are inside, the surface separates them (Montani, Scateni and Scopigno 1994), so that neighbouring cubes match.
 //!
-//! The cases are made by code: on each face of a cube the surface runs from where one goes inside to where one leaves again;
-//! these lines join to loops, which triangles fill.
+//! The cases are generated: on each face the surface is a line from where its outline enters the inside to where it leaves again; these
+//! lines form loops, which are filled with triangles.
 
 use std::sync::OnceLock;
 
-/// An edge of a cube: its lesser corner (bits x, y, z) and its axis.
+/// An edge of a cube: its lower corner (bits x, y, z) and its axis.
 pub type Edge = (usize, usize);
 
 /// The triangles of each case; bit n of a case is set if corner n is inside.
@@ -37,7 +36,7 @@ pub fn edge_between(a: usize, b: usize) -> Edge {
     (a.min(b), axis)
 }
 
-/// The lines in which the surface meets a face of a cube: from where one goes inside on it to where one comes out again.
+/// The lines in which the surface crosses a face of a cube: from where the outline enters the inside to where it leaves.
 pub fn lines(case: usize, face: &[usize; 4]) -> impl Iterator<Item = [Edge; 2]> {
     let is_inside = move |corner: usize| case >> corner & 1 == 1;
     (0..4).filter_map(move |start| {
@@ -51,7 +50,7 @@ pub fn lines(case: usize, face: &[usize; 4]) -> impl Iterator<Item = [Edge; 2]> 
     })
 }
 
-/// The closed lines in which the surface meets the faces of a cube.
+/// The closed lines in which the surface crosses the faces of a cube.
 fn loops(case: usize) -> Vec<Vec<Edge>> {
     let mut lines: Vec<[Edge; 2]> = FACES.iter().flat_map(|face| lines(case, face)).collect();
     let mut rings = Vec::new();
@@ -73,8 +72,8 @@ fn share_face(a: Edge, b: Edge) -> bool {
     FACES.iter().any(|face| [ends(a), ends(b)].as_flattened().iter().all(|corner| face.contains(corner)))
 }
 
-/// Triangles that fill a ring, if it can be filled so that no diagonal lies on a face of the cube, where the next cube may have
-/// one too. Those of [`cases`] can.
+/// Triangles that fill a ring, if possible without a diagonal on a face of the cube, where the next cube may have one too. The rings of
+/// [`cases`] allow this.
 pub fn filled(ring: &[Edge]) -> Option<Vec<[Edge; 3]>> {
     let count = ring.len();
     if count == 3 {

@@ -1,4 +1,4 @@
-//! Plain data that every room shares; knows no file format and no OpenVDB.
+//! Plain data shared by all modules; independent of file formats and of OpenVDB.
 
 pub mod check;
 pub mod marching_cubes;

@@ -7,13 +7,13 @@ use crate::error::{Error, Result};
 /// resolution however far they lie from the origin, and pass through a file bit by bit.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Points {
-    /// Edge of a voxel (m), over 0.
+    /// Edge of a voxel (m), above 0.
     pub voxel_size: f64,
     /// The voxel of each point; voxel (i, j, k) has its centre at (i, j, k) x `voxel_size`.
     pub cells: Vec<[i32; 3]>,
     /// The position of each point relative to the centre of its voxel (voxels), from -0.5 to 0.5.
     pub offsets: Vec<[f32; 3]>,
-    /// What else is known of each point; no two attributes have the same name.
+    /// Other data of the points; no two attributes have the same name.
     pub attributes: Vec<Attribute>,
 }
 
@@ -35,7 +35,7 @@ pub enum Values {
     Int(Column<i32>),
     /// 64-bit integers.
     Long(Column<i64>),
-    /// Yes or no.
+    /// Booleans.
     Bool(Column<bool>),
     /// Vectors of three 32-bit floats.
     Vector(Column<[f32; 3]>),
@@ -46,12 +46,12 @@ pub enum Values {
 pub enum Column<T> {
     /// One value for each point.
     Each(Vec<T>),
-    /// One value that all points share; it takes no room in a file.
+    /// One value shared by all points; it takes no space in a file.
     Uniform(T),
 }
 
 impl<T: Copy> Column<T> {
-    /// The value of the point with this index.
+    /// The value of a point.
     ///
     /// # Panics
     /// When there is no such point.
@@ -62,7 +62,7 @@ impl<T: Copy> Column<T> {
         }
     }
 
-    /// The values that are stored: one for each point, or one.
+    /// The stored values: one for each point, or one.
     pub fn stored(&self) -> &[T] {
         match self {
             Self::Each(values) => values,
@@ -70,7 +70,7 @@ impl<T: Copy> Column<T> {
         }
     }
 
-    /// As [`Self::stored`], to be changed.
+    /// As [`Self::stored`], mutable.
     pub fn stored_mut(&mut self) -> &mut [T] {
         match self {
             Self::Each(values) => values,
@@ -93,7 +93,7 @@ impl<T: Copy> Column<T> {
 }
 
 impl<T: Copy + PartialEq> Column<T> {
-    /// Adds the values of other points; both have so many points.
+    /// Adds the values of other points, given the numbers of both.
     fn append(&mut self, other: &Self, [own, others]: [usize; 2]) {
         if self == other && matches!(self, Self::Uniform(_)) {
             return;
@@ -117,7 +117,7 @@ macro_rules! each_type {
 }
 
 impl Values {
-    /// Name of the type, as OpenVDB has it: `float`, `int32`, `int64`, `bool` or `vec3s`.
+    /// The type's name in OpenVDB: `float`, `int32`, `int64`, `bool` or `vec3s`.
     pub fn type_name(&self) -> &'static str {
         match self {
             Self::Float(_) => "float",
@@ -128,10 +128,10 @@ impl Values {
         }
     }
 
-    /// Puts the values of points into another order, or leaves some out.
+    /// Reorders the values of points, or drops some.
     ///
     /// # Panics
-    /// When `order` names a point that is not there.
+    /// If `order` names a point that does not exist.
     pub fn reorder(&mut self, order: &[u32]) {
         each_type!(self, column => column.reorder(order));
     }
@@ -141,7 +141,7 @@ impl Values {
         each_type!(self, column => column.count().is_none())
     }
 
-    /// Least and greatest value, component by component; `bool` counts as 0 and 1. None without values.
+    /// Minimum and maximum, component by component; `bool` counts as 0 and 1. `None` without values.
     pub fn range(&self) -> Option<(Vec<f64>, Vec<f64>)> {
         fn of<T: Copy, const N: usize>(
             column: &Column<T>,
@@ -167,7 +167,7 @@ impl Values {
         }
     }
 
-    /// The value of the point with this index as a number: the length of a vector, 0 or 1 for `bool`.
+    /// The value of a point as a number: the length of a vector, 0 or 1 for `bool`.
     ///
     /// # Panics
     /// When there is no such point.
@@ -205,7 +205,7 @@ impl Points {
         let split = |(point, position): (usize, &DVec3)| -> Result<([i32; 3], [f32; 3])> {
             let index = position / voxel_size;
             let cell = index.map(f64::round);
-            // Not a number is no less than the limit either.
+            // Negated so that NaN is refused too.
             if !cell.iter().all(|part| part.abs() < limit) {
                 let what = format!("point {} is not finite, or too far from the origin", point + 1);
                 return Err(Error::argument(what));
@@ -222,7 +222,7 @@ impl Points {
         self.cells.len()
     }
 
-    /// World position (m) of the point with this index.
+    /// World position (m) of a point.
     ///
     /// # Panics
     /// When there is no such point.
@@ -231,7 +231,7 @@ impl Points {
         DVec3::from([0, 1, 2].map(|axis| f64::from(cell[axis]) + f64::from(offset[axis]))) * self.voxel_size
     }
 
-    /// Least and greatest corner of the box around the points' positions (m); none without points.
+    /// Minimum and maximum corner (m) of the points' positions; `None` without points.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let positions = (0..self.count()).map(|point| self.position(point));
         positions.map(|position| (position, position)).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
@@ -242,7 +242,7 @@ impl Points {
         self.attributes.iter().find(|attribute| attribute.name == name).map(|attribute| &attribute.values)
     }
 
-    /// Adds an attribute, or replaces the values of the one that has this name.
+    /// Adds an attribute, or replaces the values of the one with this name.
     pub fn set(&mut self, name: &str, values: Values) {
         match self.attributes.iter_mut().find(|attribute| attribute.name == name) {
             Some(attribute) => attribute.values = values,
@@ -250,10 +250,10 @@ impl Points {
         }
     }
 
-    /// Puts the points into another order: point `order[n]` becomes point `n`.
+    /// Reorders the points: point `order[n]` becomes point `n`.
     ///
     /// # Panics
-    /// When `order` names a point that is not there.
+    /// If `order` names a point that does not exist.
     pub fn reorder(&mut self, order: &[u32]) {
         self.cells = picked(&self.cells, order);
         self.offsets = picked(&self.offsets, order);
@@ -262,11 +262,11 @@ impl Points {
         }
     }
 
-    /// Adds other points behind these, which have the same attributes and voxels; without any points they take the others' position.
-    /// A value that all of both share stays one.
+    /// Appends other points with the same attributes and voxel size; if these are empty, the others replace them. A value that all points
+    /// share stays uniform.
     ///
     /// # Errors
-    /// Other attributes or voxels; the points are then as they were.
+    /// Different attributes or voxels; the points are then unchanged.
     pub fn append(&mut self, other: Self) -> Result<()> {
         if other.count() == 0 {
             return Ok(());
@@ -299,11 +299,11 @@ impl Points {
         Ok(())
     }
 
-    /// Checks that all arrays have one value for each point, that numbers are finite, that offsets lie within their voxel,
-    /// and that names are there and differ.
+    /// Checks that all arrays have one value for each point, that numbers are finite, that offsets lie within their voxel, and that names
+    /// are not empty and differ.
     ///
     /// # Errors
-    /// Names the attribute or the first point at fault, counted from 1.
+    /// Names the attribute or the first invalid point, counted from 1.
     pub fn validate(&self) -> Result<()> {
         check_voxel(self.voxel_size)?;
         let count = self.count();
@@ -311,7 +311,7 @@ impl Points {
             let what = format!("there are {count} voxels of points, but {} offsets", self.offsets.len());
             return Err(Error::argument(what));
         }
-        // Not a number is outside too.
+        // NaN is outside too.
         let is_outside = |offset: &[f32; 3]| !offset.iter().all(|part| (-0.5..=0.5).contains(part));
         if let Some(point) = self.offsets.iter().position(is_outside) {
             let what = format!("the offset of point {} is not within -0.5 to 0.5", point + 1);

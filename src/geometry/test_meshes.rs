@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::DVec3;
 
-/// Positions and triangles of a unit sphere: an octahedron whose triangles were divided in four so many times.
+/// Positions and triangles of a unit sphere: an octahedron, its triangles divided into four `levels` times.
 pub fn sphere(levels: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let mut positions = vec![DVec3::x(), -DVec3::x(), DVec3::y(), -DVec3::y(), DVec3::z(), -DVec3::z()];
     let mut triangles: Vec<[u32; 3]> =

@@ -1,4 +1,4 @@
-//! Grey images in PNG files: heights, masks.
+//! Greyscale images in PNG files: heights, masks.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -8,24 +8,24 @@ use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 use super::files::caught::caught;
 use crate::error::{Error, Result};
 
-/// Most bytes of an image as it is unpacked: 16,384 x 16,384 pixels with four channels of 16 bits.
+/// Maximum size (bytes) of an image when unpacked: 16,384 x 16,384 pixels with four channels of 16 bits.
 const MOST_BYTES: usize = 1 << 31;
 
-/// A grey image.
+/// A greyscale image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grey {
     /// Count of pixels across and down.
     pub size: [usize; 2],
     /// Values row by row from the top: 0 is black and 1 is white.
     pub values: Vec<f32>,
-    /// How many levels of grey its file can hold.
+    /// Number of grey levels that its file can hold.
     pub levels: u32,
 }
 
-/// Reads a grey image from the bytes of a .png file: of 1 to 16 bits, or a coloured one whose pixels are all grey; opacity does not count.
+/// Reads a greyscale image from the bytes of a .png file: of 1 to 16 bits, or in colour if all pixels are grey; opacity is ignored.
 ///
 /// # Errors
-/// A file that is not a PNG, is cut short or damaged, over 2 GB when unpacked, or has colours.
+/// A file that is not a PNG, is cut short or damaged, is over 2 GB when unpacked, or has colours.
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<Grey> {
     if bytes.is_empty() {
         return Err(Error::file(path, "the file is empty"));
@@ -36,7 +36,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Grey> {
 fn decode(bytes: &[u8]) -> std::result::Result<Grey, String> {
     let wrong = |error: png::DecodingError| format!("is not an image that can be read: {error}");
     let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: MOST_BYTES });
-    // Palettes and fewer than 8 bits become 8 bits.
+    // Palettes and depths below 8 bits are expanded to 8 bits.
     decoder.set_transformations(Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(wrong)?;
     let levels = 1 << (reader.info().bit_depth as u32).min(16);
@@ -62,7 +62,7 @@ fn decode(bytes: &[u8]) -> std::result::Result<Grey, String> {
     Ok(Grey { size, values, levels })
 }
 
-/// The greys of pixels with so many channels each.
+/// The grey values of pixels with this many channels.
 fn greys<T: Copy + PartialEq>(
     numbers: &[T],
     channels: usize,

@@ -1,4 +1,4 @@
-//! Files that are not .vdb.
+//! File formats other than .vdb.
 
 pub mod files;
 #[cfg(feature = "cli")]

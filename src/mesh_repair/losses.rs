@@ -1,32 +1,33 @@
-//! What a repair has lost of a mesh, by its area, its volume and its bounds.
+//! How much of a mesh a repair has lost, by area, volume and bounds.
 
 use super::prepare::Closed;
 use crate::geometry::check::faults::counted_area;
 use crate::geometry::{DVec3, TriMesh};
 
-/// Of the area and of the volume, if less is left, something is missing.
+/// Share of the area or of the volume below which something is missing.
 const HALF: f64 = 0.5;
-/// If less is left, nearly all is missing.
+/// Share below which nearly all is missing.
 const NEARLY_NONE: f64 = 0.1;
-/// Bounds may shrink by so much of the longest side, or by so many cells.
+/// Bounds may shrink by this share of the longest side, or by this many cells.
 const SHRUNK: f64 = 0.05;
 const CELLS: f64 = 2.0;
 
 /// A mesh before and after a repair.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Losses {
-    /// Areas (m2) before and after; before without triangles that lie on others.
+    /// Areas (m2) before and after; the area before excludes triangles that lie on others.
     pub areas: [f64; 2],
-    /// Volumes (m3) before and after; before once it was closed and each part turned outward, so that parts that overlap count twice.
+    /// Volumes (m3) before and after; the volume before is that of the closed mesh with each part turned outward, so that overlapping parts
+    /// count twice.
     pub volumes: [f64; 2],
-    /// Longest sides of the boxes around it (m) before and after.
+    /// Longest sides of the bounding boxes (m) before and after.
     pub sides: [f64; 2],
-    /// By how much the box has shrunk, at most, on a side (m).
+    /// Largest shrinkage of the box on any side (m).
     pub shrunk: f64,
 }
 
 impl Losses {
-    /// Of a mesh, what closed it, and what has come out.
+    /// Compares a mesh, its closed version and the result.
     pub(super) fn of(before: &TriMesh, closed: &Closed, after: &TriMesh) -> Self {
         let volume =
             TriMesh { positions: closed.positions.clone(), triangles: closed.triangles.clone() }.volume();
@@ -41,14 +42,14 @@ impl Losses {
         }
     }
 
-    /// Whether nearly all of the mesh is lost: most of its area, and its extent or volume with it. Parts that lie within others have an
-    /// area, too, but neither of these.
+    /// Whether nearly all of the mesh is lost: most of its area, and with it most of its extent or volume. Parts that lie within others have
+    /// area, but contribute neither extent nor volume.
     pub fn is_nearly_all(&self) -> bool {
         let is_flat = self.volumes[1] < NEARLY_NONE * self.volumes[0];
         self.areas[1] < NEARLY_NONE * self.areas[0] && (is_flat || self.shrunk > HALF * self.sides[0])
     }
 
-    /// What to say where much is lost, in cells of an edge (m); none where all is there.
+    /// A warning if much is lost, with cells of an edge (m); none if nothing is missing.
     pub fn warning(&self, cell: f64) -> Option<String> {
         let [area, area_now] = self.areas;
         let [volume, volume_now] = self.volumes;
@@ -59,7 +60,7 @@ impl Losses {
         if volume_now < HALF * volume {
             lost.push(format!("of {volume:.6} m3 {volume_now:.6} are left"));
         }
-        // The area of what overlaps goes with its volume.
+        // Overlapping parts lose area together with volume.
         if area_now < HALF * area && (volume_now < HALF * volume || !lost.is_empty()) {
             lost.push(format!("of {area:.6} m2 {area_now:.6} are left"));
         }
@@ -72,7 +73,7 @@ impl Losses {
         })
     }
 
-    /// The error where nearly all is lost.
+    /// The error text if nearly all is lost.
     pub(super) fn refusal(&self, cell: f64) -> String {
         let [area, area_now] = self.areas;
         format!(
@@ -82,7 +83,7 @@ impl Losses {
     }
 }
 
-/// Least and greatest corner (m) of the vertices that triangles name.
+/// Minimum and maximum corner (m) of the vertices that triangles use.
 fn named_bounds(mesh: &TriMesh) -> [DVec3; 2] {
     let nowhere = [DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY)];
     let corners =

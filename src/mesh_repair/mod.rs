@@ -1,15 +1,15 @@
-//! A closed mesh of one with faults: where it is broken it is cut along the cells of a grid and rebuilt in them; elsewhere it stays
-//! as it is, triangle by triangle (thesis 2.5).
+//! Makes a closed mesh from one with faults: broken parts are cut along the cells of a grid and rebuilt in them; the rest stays as it is,
+//! triangle by triangle (thesis 2.5).
 //!
-//! After Wojtan et al. 2009, but that the cells to rebuild are settled before anything is cut (as Heiss-Synak et al. 2024 do), and that
-//! the mesh is cut exactly along their outer faces: no triangles are searched that might fit between the old and the new surface, since
-//! both have the cut in common.
+//! After Wojtan et al. 2009, except that the cells to rebuild are chosen before anything is cut (as Heiss-Synak et al. 2024 do), and that
+//! the mesh is cut exactly along their outer faces: no search for triangles that fit between the old and the new surface is needed, since
+//! both share the cut.
 //!
 //! 1. `prepare.rs`: holes are closed, and parts turned outward: the solid is where the winding number is over 0.
 //! 2. `cut/pierces.rs`, `cut/exact.rs`: where the mesh passes through the grid, decided without rounding.
-//! 3. `region/faulty_cells.rs`: cells in which the mesh is at fault; `region.rs`: with what has to be rebuilt with them.
-//! 4. `cut.rs`, `cut/polygon.rs`: the mesh outside of these cells; `fill.rs`: marching cubes inside, sewn to it point by point.
-//! 5. `tidy.rs`: slivers among the triangles that were made are taken out.
+//! 3. `region/faulty_cells.rs`: cells in which the mesh is at fault; `region.rs`: the cells that must be rebuilt with them.
+//! 4. `cut.rs`, `cut/polygon.rs`: the mesh outside these cells; `fill.rs`: marching cubes inside, sewn to it point by point.
+//! 5. `tidy.rs`: slivers among the new triangles are removed.
 //!
 //! # Glossary
 //!
@@ -19,8 +19,8 @@
 //! | passage, segment | where an edge of the mesh passes through a face of the grid; where a triangle does |
 //! | outer | of a face or an edge of the grid: some of the cells around it are rebuilt, and some are not |
 //! | rim | where the mesh passes through outer faces: the cut |
-//! | sound | of an outer edge: the mesh passes it once where its ends differ, else not at all |
-//! | rung | a step of the ladder of fall-backs: how much is rebuilt when less could not be |
+//! | sound | of an outer edge: the mesh crosses it once if its ends differ, else not at all |
+//! | rung | rebuild level, a step of the fall-backs: how much is rebuilt when less did not work |
 
 mod attributes;
 mod cut;
@@ -55,16 +55,16 @@ pub(super) use self::region::{CellSet, Inside};
 /// Where a triangle of a repaired mesh comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Source {
-    /// It is a triangle of the mesh that came in, as it was.
+    /// An unchanged triangle of the input mesh.
     Whole(u32),
-    /// It is a part of one.
+    /// A part of one.
     Part(u32),
-    /// It closes a hole, or was rebuilt.
+    /// Closes a hole, or was rebuilt.
     New,
 }
 
 impl Source {
-    /// Of a triangle after two changes, the first of which left triangles with these sources.
+    /// The source after two changes, of which `first` has the sources of the triangles after the first.
     pub(super) fn after(self, first: &[Self]) -> Self {
         match self {
             Self::Whole(triangle) => first[triangle as usize],
@@ -82,9 +82,9 @@ impl Source {
 pub struct Repaired {
     /// Closed, 2-manifold by index, turned outward.
     pub mesh: TriMesh,
-    /// For each vertex the vertex that it was; none: it was made.
+    /// For each vertex, its vertex in the input mesh; none: it is new.
     pub vertices: Vec<Option<u32>>,
-    /// For each triangle where it comes from.
+    /// For each triangle, where it comes from.
     pub sources: Vec<Source>,
     /// What was done.
     pub report: RepairReport,
@@ -95,34 +95,33 @@ pub struct Repaired {
 pub struct RepairReport {
     /// What was done before anything was cut.
     pub prepared: Prepared,
-    /// Edge of the cells (m): that asked for, or a part of it where nothing would have been left.
+    /// Edge of the cells (m): the requested one, or a fraction of it if nothing would have been left.
     pub cell: f64,
     /// Cells in which the mesh was at fault.
     pub flagged_cells: usize,
     /// Cells that were rebuilt.
     pub rebuilt_cells: usize,
-    /// Triangles of the mesh that came in which are still there, whole.
+    /// Triangles of the input mesh that are still there, whole.
     pub kept_triangles: usize,
-    /// How far down the ladder it went: 0 the cells themselves, 1 with a ring around them, 2 the parts of the mesh that they touch, 3
-    /// everything.
+    /// Rebuild level reached: 0 the cells themselves, 1 with a ring around them, 2 the parts of the mesh that they touch, 3 everything.
     pub rung: usize,
-    /// Triangles that were made and have an altitude below 1e-4 of an edge.
+    /// New triangles with an altitude below 1e-4 of an edge.
     pub slivers: usize,
     /// What it has lost.
     pub losses: Losses,
 }
 
-/// How often a set of cells may grow by what cannot be cut.
+/// How often a set of cells may grow by cells that cannot be cut.
 const TRIES: usize = 32;
-/// How often slivers are taken out.
+/// How often slivers are removed.
 const ROUNDS: usize = 4;
-/// Bytes for an area of a cell's face: up to 1.7 edges of the grid, some 150 bytes each while they are sorted.
+/// Bytes for each cell face's area of the mesh: up to 1.7 edges of the grid, some 150 bytes each while they are sorted.
 const FACE: f64 = 256.0;
-/// How many sizes of cells are tried where nothing would be left: the one asked for, then halves of the one before.
+/// Number of cell sizes tried if nothing would be left: the requested one, then half of the previous one each time.
 const HALVINGS: u32 = 6;
 
-/// Repairs a mesh in cells of an edge (m): the solid is where, with each part turned outward, the winding number is over 0. Holes are
-/// closed first. What is broken is rebuilt within a cell of that solid; solids thinner than a cell may go where they are rebuilt.
+/// Repairs a mesh in cells of an edge (m): the solid is where, with each part turned outward, the winding number is over 0. Holes are closed
+/// first. Broken parts are rebuilt within a cell of that solid; solids thinner than a cell may be lost where they are rebuilt.
 ///
 /// # Errors
 /// A mesh that is not valid, or too large for the cell; one that encloses nothing, or of which nearly all would be lost; more memory than
@@ -159,19 +158,19 @@ pub fn repair(ctx: &Context, mesh: &TriMesh, cell: f64) -> Result<Repaired> {
     Err(Error::argument(lost.unwrap_or_else(|| "nothing in the mesh encloses a volume".into())))
 }
 
-/// Refuses cells (m) so small that memory would not do for all of those that a surface of an area (m2) passes through.
+/// Refuses cells (m) so small that there is not enough memory for all of those that a surface of an area (m2) passes through.
 fn allow(ctx: &Context, area: f64, cell: f64) -> Result<()> {
     let needed = (area / (cell * cell) * FACE).min(1e18) as u64;
     ctx.allow(&format!("a repair with cells of {cell} m"), needed)
 }
 
-/// The rungs of the ladder, for a mesh whose first `own` vertices came in. None where nothing is left.
+/// Tries the rebuild levels, for a mesh whose first `own` vertices are those of the input. None if nothing is left.
 fn rebuild(ctx: &Context, closed: &Closed, own: usize, cell: f64) -> Result<Option<Repaired>> {
     let mesh = TriMesh { positions: closed.positions.clone(), triangles: closed.triangles.clone() };
     let Some((low, high)) = mesh.bounds() else { return Ok(None) };
     let lattice = Lattice::near(cell, (low.cast::<f64>() + high.cast::<f64>()) / 2.0)?;
     let mut in_cells = vec![DVec3::zeros(); closed.positions.len()];
-    // Vertices that no triangle names may be anywhere.
+    // Unused vertices may be anywhere.
     for &vertex in closed.triangles.as_flattened() {
         in_cells[vertex as usize] = lattice.to_cells(closed.positions[vertex as usize].cast());
     }
@@ -198,7 +197,7 @@ fn rebuild(ctx: &Context, closed: &Closed, own: usize, cell: f64) -> Result<Opti
 
 /// A mesh that was rebuilt in some cells.
 pub(super) struct Rebuilt {
-    /// Closed, and 2-manifold by index; its vertices begin with the mesh's own, whether they are still named or not.
+    /// Closed, and 2-manifold by index; its vertices begin with the mesh's own, whether they are still used or not.
     pub draft: Draft,
     /// Cells that were rebuilt.
     pub cells: usize,
@@ -208,8 +207,8 @@ pub(super) struct Rebuilt {
     pub slivers: usize,
 }
 
-/// Rebuilds a mesh, whose vertices have these positions (cells of the lattice), in the flagged cells and in as many more as it takes: rung by rung, until
-/// the result is a closed 2-manifold.
+/// Rebuilds a mesh, whose vertices have these positions (cells of the lattice), in the flagged cells and in as many more as it takes: one
+/// rebuild level after the other, until the result is a closed 2-manifold.
 ///
 /// # Errors
 /// Cancel.
@@ -242,7 +241,7 @@ pub(super) fn ladder(
     Err(Error::Internal("a mesh could not be rebuilt".into()))
 }
 
-/// Takes slivers out until none comes back where positions are rounded to the 32 bits that files have. Returns how many are left.
+/// Removes slivers until none reappears when positions are rounded to the 32 bits that files have. Returns how many are left.
 fn tidied(draft: &mut Draft, lattice: &Lattice) -> usize {
     let origin = DVec3::from(lattice.origin.map(f64::from));
     let mut slivers = usize::MAX;
@@ -263,7 +262,7 @@ fn tidied(draft: &mut Draft, lattice: &Lattice) -> usize {
     slivers
 }
 
-/// Cuts the mesh along a set of cells and fills these; the set grows where that does not work. None where that does not end.
+/// Cuts the mesh along a set of cells and fills these; the set grows where that fails. None if it fails however far the set grows.
 fn tried(
     ctx: &Context,
     shape: &Shape,
@@ -279,7 +278,7 @@ fn tried(
             Ok(draft) => return Ok(Some((draft, set.count()))),
             Err(Trouble(cells)) => {
                 added = cells.iter().copied().filter(|cell| set.add(*cell)).collect();
-                // Where growing by these cells changes nothing, those around them are tried.
+                // If adding these cells changes nothing, those around them are added.
                 if added.is_empty() {
                     let mut around = CellSet::default();
                     cells.iter().for_each(|cell| _ = around.add(*cell));
@@ -306,7 +305,7 @@ fn once(
     sewn(shape, in_cells, &cut, &fill)
 }
 
-/// What has come out, in the mesh's own words.
+/// The result, with the indices and positions of the input mesh.
 fn finished(
     draft: Draft,
     closed: &Closed,
@@ -370,7 +369,7 @@ mod tests {
             repaired.report
         );
         assert!(repaired.report.kept_triangles > 2000, "{:?}", repaired.report);
-        // The lens that they had twice.
+        // The lens that both contained.
         let (d, a, b) = (1.205f64, 1.0, 0.8);
         let lens =
             std::f64::consts::PI * (a + b - d).powi(2) * (d * d + 2.0 * d * (a + b) - 3.0 * (a - b).powi(2))

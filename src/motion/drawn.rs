@@ -14,17 +14,17 @@ pub struct Drawn<'a> {
     pub uvs: Option<&'a Uvs>,
 }
 
-/// The faces of a file, and of its vertices those that sweep the snow.
+/// The faces of a file, and those of its vertices that sweep the snow.
 pub(super) struct Faces {
     vertices: usize,
     triangles: Vec<[u32; 3]>,
     uvs: Option<Uvs>,
-    /// The vertices that triangles name, and the triangles over these; none when they name all.
+    /// The vertices that triangles use, and the triangles over these; `None` if they use all.
     moving: Option<(Vec<u32>, Vec<[u32; 3]>)>,
 }
 
 impl Faces {
-    /// Faces and vertices of polygons whose indices are in range.
+    /// Faces and vertices of polygons; indices must be in range.
     pub fn new(polygons: PolygonMesh) -> (Self, Vec<Vec3>) {
         let (mesh, uvs) = polygons.into_textured();
         let (vertices, triangles) = (mesh.positions.len(), mesh.triangles);
@@ -40,20 +40,20 @@ impl Faces {
         Drawn { vertices: self.vertices, triangles: &self.triangles, uvs: self.uvs.as_ref() }
     }
 
-    /// Triangles over the vertices that they name.
+    /// Triangles over the vertices that they use.
     pub fn triangles(&self) -> &[[u32; 3]] {
         self.moving.as_ref().map_or(&self.triangles, |(_, own)| own)
     }
 
-    /// Number of vertices that triangles name.
+    /// Number of vertices that triangles use.
     pub fn count(&self) -> usize {
         self.moving.as_ref().map_or(self.vertices, |(used, _)| used.len())
     }
 
-    /// Keeps the positions of vertices that triangles name.
+    /// Keeps only the positions of vertices that triangles use.
     pub fn keep_moving<T: Copy>(&self, positions: &mut Vec<T>) {
         if let Some((used, _)) = &self.moving {
-            // They ascend: none is overwritten before it is read.
+            // Indices ascend: no position is overwritten before it is read.
             used.iter().enumerate().for_each(|(to, &from)| positions[to] = positions[from as usize]);
             positions.truncate(used.len());
         }

@@ -1,57 +1,57 @@
-//! How a figure stands: its lowest parts, and how they move while they stand on the ground.
+//! How a figure stands: its lowest parts, and how they move while on the ground.
 //!
-//! A walk cycle usually walks in place: its standing foot moves backwards under it. Carried at that speed the other way, the
-//! foot stays where it stands.
+//! Walk cycles usually walk in place: the standing foot moves backwards under the figure. If the figure is carried forwards at that speed,
+//! the foot stays where it stands.
 
 use super::{Motion, Poses, span};
 use crate::error::Result;
 use crate::geometry::DVec3;
 
-/// Sampled poses per second of the motion, and their least and greatest number.
+/// Sampled poses per second of the motion, and their minimum and maximum number.
 const RATE: f64 = 60.0;
 const POSES: (f64, f64) = (24.0, 240.0);
-/// Most vertices that are posed, over all poses: bounds the time of the analysis.
+/// Maximum vertices posed, over all poses: bounds the time of the analysis.
 const MOST_VERTICES: f64 = 5e7;
-/// Part of a figure's height that standing parts may be above the lowest one of their pose, and that one above the level
-/// that so great a part of the poses reach down to: a toe that digs, or a jump, must not hide a walk.
+/// Standing parts may be this fraction of a figure's height above the lowest part of their pose, and that part as far above the level that
+/// the fraction `REACHED` of the poses goes down to: a toe that digs in, or a jump, must not hide a walk.
 const STANDS: f64 = 0.015;
 const REACHED: f64 = 0.4;
-/// What rises or falls more than this part of its way along does not stand, but for this part of the above.
+/// Parts that rise or fall by more than `LEVEL` of their horizontal path do not stand, unless it is within `STILL` of the tolerance above.
 const LEVEL: f64 = 0.25;
 const STILL: f64 = 0.1;
-/// Spread of steady velocities, as a fraction of the speed: walks have up to 0.22, runs 0.45.
+/// Maximum spread of steady velocities, as a fraction of the speed: walks have up to 0.22, runs 0.45.
 const STEADY: f64 = 0.33;
-/// Fraction of the time that something must stand, or the motion is not a gait.
+/// Minimum fraction of the time that something stands; else the motion is not a gait.
 const LEAST_TIME: f64 = 0.2;
 
 /// How a motion's lowest parts move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gait {
-    /// Mean velocity of what stands (m/s, level): the median over the times at which something does.
+    /// Mean velocity of standing parts (m/s, horizontal): the median over the times when something stands.
     pub velocity: DVec3,
-    /// How far the velocity at those times is from that (m/s): the median.
+    /// Median deviation from it at those times (m/s).
     pub spread: f64,
     /// Fraction of the time that something stands, 0..=1.
     pub standing: f64,
     /// y of the lowest position (m).
     pub lowest: f64,
-    /// Greatest height of the figure (m).
+    /// Maximum height of the figure (m).
     pub height: f64,
 }
 
 impl Gait {
-    /// Whether standing parts move steadily enough, all one way, for one speed to carry the figure.
+    /// Whether standing parts move steadily enough, in one direction, for one speed to carry the figure.
     pub fn is_steady(&self) -> bool {
         self.standing >= LEAST_TIME && self.spread <= STEADY * self.velocity.norm()
     }
 
-    /// Velocity (m/s) that the figure must be carried at so that what stands stays where it is.
+    /// Velocity (m/s) at which the figure must be carried so that standing parts stay where they are.
     pub fn carry(&self) -> DVec3 {
         -self.velocity
     }
 }
 
-/// Looks at a motion (m, Y up) from one time to another (s); none where nothing stands for a while.
+/// Analyses a motion (m, Y up) from one time to another (s); `None` if nothing stands for long.
 ///
 /// # Errors
 /// A pose that cannot be computed.
@@ -103,7 +103,7 @@ pub fn gait(motion: &dyn Motion, from: f64, to: f64) -> Result<Option<Gait>> {
     Ok(Some(Gait { velocity, spread, standing, lowest, height }))
 }
 
-/// A quantile of some numbers: the median for a half.
+/// A quantile: the median for 0.5.
 fn part_of(mut values: Vec<f64>, part: f64) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     values.get((values.len() as f64 * part) as usize).copied().unwrap_or(0.0)
@@ -115,7 +115,7 @@ mod tests {
     use crate::geometry::{TriMesh, Vec3};
     use crate::motion::{Key, Keys, Morph, Rigid};
 
-    /// A foot that stands for half a second while it goes back 0.6 m, then swings to where it was.
+    /// A foot that stands for half a second while it moves back 0.6 m, then swings forward again.
     fn walk() -> Rigid {
         let foot = TriMesh {
             positions: vec![Vec3::zeros(), Vec3::new(0.1, 0.0, 0.3), Vec3::new(0.0, 1.7, 0.0)],

@@ -1,4 +1,4 @@
-//! Things that move: a fixed set of triangles whose vertices have a position at every time.
+//! Moving objects: a fixed set of triangles whose vertices have a position at every time.
 
 mod drawn;
 mod gait;
@@ -24,7 +24,7 @@ use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::io::mesh::extension;
 
-/// Whether a file is a glTF character, by its name.
+/// Whether a file is a glTF character, by its extension.
 pub fn is_gltf(path: &Path) -> bool {
     matches!(extension(path).as_str(), "glb" | "gltf")
 }
@@ -40,11 +40,11 @@ pub trait Motion: Send + Sync {
     /// Writes the vertices' world positions (m) at `time` (s) into `out` (cleared first; its memory is kept).
     ///
     /// # Errors
-    /// What a file read on demand reports.
+    /// Errors of a file that is read on demand.
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()>;
 
-    /// As [`Motion::pose`], but in the unit and around the origin in which the vertices were read, before anything turned or moved them:
-    /// the rounding of these coordinates is known ([`crate::geometry::mesh::weld`]).
+    /// As [`Motion::pose`], but in the unit and around the origin in which the vertices were read, before any transform: the rounding of
+    /// these coordinates is known ([`crate::geometry::mesh::weld`]).
     ///
     /// # Errors
     /// As [`Motion::pose`].
@@ -52,8 +52,8 @@ pub trait Motion: Send + Sync {
         self.pose(time, out)
     }
 
-    /// The mesh as its file has it, to write. [`Motion::triangles`], which sweep the snow, may join vertices that always move
-    /// together, and omit vertices without a triangle.
+    /// The mesh as its file has it, for output. [`Motion::triangles`], which sweep the snow, may join vertices that always move together,
+    /// and omit vertices without a triangle.
     fn drawn(&self) -> Drawn<'_> {
         Drawn { vertices: self.vertex_count(), triangles: self.triangles(), uvs: None }
     }
@@ -67,7 +67,7 @@ pub trait Motion: Send + Sync {
     }
 
     /// Writes the mean velocities (m/s) of the drawn vertices from `time` to `time + step` (s) into `out` (cleared first).
-    /// `step` may be negative, not 0.
+    /// `step` may be negative, but not 0.
     ///
     /// # Errors
     /// As [`Motion::pose`].
@@ -79,13 +79,13 @@ pub trait Motion: Send + Sync {
         Ok(())
     }
 
-    /// Whether the motion's own data end before a time (s), so that it rests from then on.
+    /// Whether the motion's data end before a time (s), so that it rests from then on.
     fn ends_before(&self, _time: f64) -> bool {
         false
     }
 
-    /// As [`Motion::velocities`] over the coming `step` (s, above 0) or, where the motion's own data end sooner, over the
-    /// step before, so that velocities do not drop to 0 at the last frame.
+    /// As [`Motion::velocities`] over the coming `step` (s, above 0), or over the step before if the motion's data end sooner, so that
+    /// velocities do not drop to 0 at the last frame.
     ///
     /// # Errors
     /// As [`Motion::pose`].
@@ -94,16 +94,16 @@ pub trait Motion: Send + Sync {
         self.velocities(time, if ends { -step } else { step }, out)
     }
 
-    /// Times inside (from, to) where the direction of motion jumps: keys, frames of a sequence. Ascending.
+    /// Times inside (from, to) where the velocity jumps: keys, frames of a sequence. Ascending.
     fn breaks(&self, from: f64, to: f64) -> Vec<f64>;
 
-    /// Upper bound on the rotation (radians) of any part between two times, where the motion is given by rotations; 0 where
-    /// vertices move straight, or along arcs of less than half a turn between two breaks.
+    /// Upper bound on the rotation (radians) of any part between two times, if the motion is given by rotations; 0 if vertices move
+    /// straight, or along arcs of less than half a turn between two breaks.
     fn turning(&self, _from: f64, _to: f64) -> f64 {
         0.0
     }
 
-    /// Whether vertices that always move together are already one vertex; others that coincide at some time are not welded.
+    /// Whether vertices that always move together are already one vertex; others that merely coincide at some time are not welded.
     fn keeps_its_welds(&self) -> bool {
         false
     }

@@ -1,4 +1,4 @@
-//! One mesh that becomes another.
+//! One mesh that morphs into another.
 
 use super::{Motion, between};
 use crate::error::{Error, Result};
@@ -24,7 +24,7 @@ impl Morph {
                 to.len()
             )));
         }
-        // Vertices that no triangle names sweep nothing.
+        // Vertices that no triangle uses sweep nothing.
         let Some(used) = used(to.len(), &from.triangles) else { return Ok(Self { from, to }) };
         let to = used.iter().map(|&vertex| to[vertex as usize]).collect();
         Ok(Self { from: from.without_unused(), to })

@@ -1,4 +1,4 @@
-//! Poses of a motion one after another, and between two given ones.
+//! Consecutive poses of a motion, and poses between two given ones.
 
 use super::Motion;
 use crate::error::Result;
@@ -22,7 +22,7 @@ impl<'a> Poses<'a> {
         Ok(out)
     }
 
-    /// Moves on to a time (s); returns the previous pose and the one at that time (m).
+    /// Advances to a time (s); returns the previous pose and the one at that time (m).
     ///
     /// # Errors
     /// As [`Poses::start`].
@@ -47,7 +47,7 @@ pub fn between(from: &[Vec3], to: &[Vec3], part: f64, out: &mut Vec<DVec3>) {
     }
 }
 
-/// Bounding box of positions; without any, infinite and with its corners swapped.
+/// Bounding box of positions; infinite with its corners swapped if there are none.
 pub fn span(positions: &[DVec3]) -> (DVec3, DVec3) {
     let none = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
     positions.iter().fold(none, |(low, high), position| (low.inf(position), high.sup(position)))

@@ -1,4 +1,4 @@
-//! Rigid motion by keys, of a mesh or over another motion.
+//! Rigid motion by keys, of a mesh or on top of another motion.
 
 use nalgebra::{Matrix3, Rotation3};
 
@@ -7,18 +7,18 @@ use super::{Drawn, Motion, Space};
 use crate::error::{Error, Result};
 use crate::geometry::{DVec3, PolygonMesh, TriMesh};
 
-/// A pose at a time: turned about x, then y, then z through the object's origin, then moved.
+/// A pose at a time: turned about x, then y, then z through the object's origin, then translated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Key {
-    /// When (s).
+    /// Time (s).
     pub time: f64,
-    /// Where the origin is (m).
+    /// Position of the origin (m).
     pub at: DVec3,
     /// Angles about x, y and z (radians); whole turns count, so that a wheel rolls.
     pub turn: DVec3,
 }
 
-/// Keys in ascending order: position and angles change linearly between them, or with ease, and rest outside.
+/// Keys in ascending order: position and angles change linearly between them, or eased, and are constant outside.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Keys {
     keys: Vec<Key>,
@@ -26,7 +26,7 @@ pub struct Keys {
 }
 
 impl Keys {
-    /// Checks the order of the keys; none at all is the identity.
+    /// Checks the order of the keys; no keys are the identity.
     ///
     /// # Errors
     /// Times that do not increase, or a number that is not finite.
@@ -42,9 +42,8 @@ impl Keys {
         }
     }
 
-    /// The same keys with or without ease. With it the motion starts and ends at rest and passes the keys between
-    /// without a jerk: a cubic in each number, which never leaves the range of the two keys around it. Where a number
-    /// turns back, or is the same at two keys, it rests there.
+    /// The same keys with or without ease. With ease the motion starts and ends at rest and passes the keys smoothly: a cubic in each
+    /// number, which never leaves the range of the two keys around it. Where a number reverses, or is the same at two keys, it rests.
     pub fn with_ease(self, ease: bool) -> Self {
         Self { ease, ..self }
     }
@@ -55,12 +54,12 @@ impl Keys {
         (turned(turn), at)
     }
 
-    /// How far they turn a body between two times (radians), at most: the angles about all three axes, added up.
+    /// Upper bound on the rotation of a body between two times (radians): the sum over the angles about the three axes.
     pub fn turning(&self, from: f64, to: f64) -> f64 {
         let mut times = vec![from];
         times.extend(self.breaks(from, to));
         times.push(to);
-        // Between two keys each angle rises or falls all the way.
+        // Between two keys each angle is monotonic.
         let turns: Vec<DVec3> = times.into_iter().map(|time| self.numbers(time).1).collect();
         turns.windows(2).map(|pair| (pair[1] - pair[0]).abs().sum()).sum()
     }
@@ -87,7 +86,7 @@ impl Keys {
         let (square, cube) = (part * part, part * part * part);
         let number = |of: &dyn Fn(&Key) -> f64| {
             let [begin, end] = [next - 1, next].map(|key| self.slope(key, of) * span);
-            // Hermite's basis.
+            // Hermite basis.
             of(&a)
                 + (of(&b) - of(&a)) * (3.0 * square - 2.0 * cube)
                 + begin * (cube - 2.0 * square + part)
@@ -98,8 +97,8 @@ impl Keys {
         (at.into(), turn.into())
     }
 
-    /// Slope of a number at a key: 0 at the ends, else the weighted harmonic mean of both sides (Fritsch and
-    /// Butland 1984), which keeps the curve between its keys.
+    /// Slope of a number at a key: 0 at the ends, else the weighted harmonic mean of both sides (Fritsch and Butland 1984), which keeps the
+    /// curve between its keys.
     fn slope(&self, key: usize, of: &dyn Fn(&Key) -> f64) -> f64 {
         if key == 0 || key + 1 == self.keys.len() {
             return 0.0;
@@ -120,7 +119,7 @@ impl Keys {
     }
 }
 
-/// Turned about x, then y, then z. The sines are those of crate `libm`: a C library's differ from one to the next.
+/// Turned about x, then y, then z. Sines are from crate `libm`: C libraries differ.
 fn turned(turn: DVec3) -> Rotation3<f64> {
     let [(sx, cx), (sy, cy), (sz, cz)] = [turn.x, turn.y, turn.z].map(libm::sincos);
     Rotation3::from_matrix_unchecked(Matrix3::new(
@@ -145,7 +144,7 @@ pub struct Rigid {
 }
 
 impl Rigid {
-    /// A mesh (m, in its own space) and its keys; without keys it stands still.
+    /// A mesh (m, in its own space) and its keys; without keys it does not move.
     pub fn new(mesh: TriMesh, keys: Keys) -> Self {
         let mut polygons = PolygonMesh { positions: mesh.positions, ..PolygonMesh::default() };
         mesh.triangles.iter().for_each(|triangle| polygons.push(*triangle));
@@ -200,7 +199,7 @@ impl Motion for Rigid {
     }
 }
 
-/// Another motion, brought into metres with Y up and carried along by keys.
+/// Another motion, converted to metres with Y up and moved by keys.
 pub struct Placed {
     inner: Box<dyn Motion>,
     space: Space,
@@ -208,7 +207,7 @@ pub struct Placed {
 }
 
 impl Placed {
-    /// `inner` as it moves in `space`, then turned and moved by the keys.
+    /// `inner` converted from `space`, then turned and moved by the keys.
     pub fn new(inner: Box<dyn Motion>, space: Space, keys: Keys) -> Self {
         Self { inner, space, keys }
     }
@@ -318,7 +317,7 @@ mod tests {
             assert!(speed(rest).abs() < 1e-3, "{rest}: {}", speed(rest));
         }
         assert!((x(0.5) - 0.5).abs() < 0.1 && x(0.1) < 0.05 && speed(1.0) > 0.3);
-        // Neither side of a key is faster than the other, and nothing overshoots.
+        // The speed is continuous at the key, and nothing overshoots.
         assert!((speed(1.0 - 1e-4) - speed(1.0 + 1e-4)).abs() < 1e-3);
         assert!((0..=500).all(|step| (0.0..2.0 + 1e-12).contains(&x(f64::from(step) * 0.01))));
         assert!((300..400).all(|step| x(f64::from(step) * 0.01) == 2.0));

@@ -14,7 +14,7 @@ use crate::io::records::input_hashes::Seen;
 /// Frames kept in memory: the two around the current time.
 const KEPT: usize = 2;
 
-/// A sequence of mesh files with the same faces, read when they are needed.
+/// A sequence of mesh files with the same faces, read on demand.
 pub struct MeshSequence {
     pattern: Pattern,
     first: i32,
@@ -22,21 +22,21 @@ pub struct MeshSequence {
     fps: f64,
     /// Shot frame = file frame + offset.
     offset: f64,
-    /// Polygons of the first frame: those of all frames, with their texture coordinates.
+    /// Polygons of the first frame, with their texture coordinates: all frames have these faces.
     polygons: PolygonMesh,
     faces: Faces,
     first_path: PathBuf,
-    /// The files' contents when they were read.
+    /// Contents of the files when they were read.
     seen: Arc<Seen>,
-    /// What positions are read less (the files' unit).
+    /// Subtracted from positions as they are read (the files' unit).
     origin: DVec3,
-    /// Whether the frame after the last can be used: the velocities ahead at the last frame need it.
+    /// Whether the frame after the last exists and can be read: the velocities ahead at the last frame need it.
     continues: OnceLock<bool>,
     kept: Mutex<Vec<(i32, Arc<Vec<Vec3>>)>>,
 }
 
 impl MeshSequence {
-    /// Frames `first..=last` of a pattern at `fps` frames a second, `offset` frames late; it rests before and after.
+    /// Frames `first..=last` of a pattern at `fps` frames per second, `offset` frames late; constant before and after.
     ///
     /// # Errors
     /// A frame that is missing (named), or a first frame that cannot be read.
@@ -44,8 +44,8 @@ impl MeshSequence {
         Self::open_seen(pattern, first, last, fps, offset, Arc::default(), DVec3::zeros())
     }
 
-    /// As [`MeshSequence::open`]; `seen` records the contents of the files when they were read; positions are read less
-    /// `origin` (the files' unit and axes).
+    /// As [`MeshSequence::open`]; `seen` records the contents of the files when they were read; `origin` (the files' unit and axes) is
+    /// subtracted from positions.
     ///
     /// # Errors
     /// As [`MeshSequence::open`]; later, from a pose, a file that has changed.
@@ -90,7 +90,7 @@ impl MeshSequence {
         if let Some(positions) = known(&self.kept.lock().expect("no panic holds this lock")) {
             return Ok(positions);
         }
-        // Not with the lock held: several frames may be read at once.
+        // Read without holding the lock: several frames may be read at once.
         let positions = Arc::new(self.read(frame)?);
         let mut kept = self.kept.lock().expect("no panic holds this lock");
         if known(&kept).is_none() {
@@ -162,7 +162,7 @@ impl Motion for MeshSequence {
         // The frame after the last is read only when it is needed.
         let last = if frame > f64::from(self.last) + 1e-6 { self.end() } else { self.last };
         let frame = frame.clamp(f64::from(self.first), f64::from(last));
-        // Times come from whole frames divided by fps: rounding must not need a neighbour.
+        // Times come from integer frames divided by fps: rounding must not require a neighbour.
         let frame = if (frame - frame.round()).abs() < 1e-6 { frame.round() } else { frame };
         let (below, part) = (frame.floor() as i32, frame - frame.floor());
         let a = self.frame(below)?;

@@ -7,21 +7,21 @@ use crate::io::particles::Cloud;
 /// The upward axis of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Up {
-    /// As frazil, Houdini, Maya.
+    /// As in frazil, Houdini, Maya.
     Y,
-    /// As Blender, 3ds Max.
+    /// As in Blender, 3ds Max.
     Z,
 }
 
-/// How a file's space becomes metres with Y up.
+/// Conversion of a file's space to metres with Y up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Space {
-    /// Metres in the file's unit.
+    /// Metres per unit of the file.
     pub scale: f64,
     /// The file's upward axis.
     pub up: Up,
-    /// A position in the file's unit and axes that becomes the origin: coordinates of a map projection are so large that 32 bits
-    /// would round them.
+    /// A position in the file's unit and axes that becomes the origin: coordinates of a map projection are so large that 32 bits would
+    /// round them.
     pub origin: DVec3,
 }
 
@@ -29,12 +29,12 @@ impl Space {
     /// Metres, Y up.
     pub const OWN: Self = Self { scale: 1.0, up: Up::Y, origin: DVec3::new(0.0, 0.0, 0.0) };
 
-    /// The space of what was read less the origin, as [`crate::io::mesh::parse_polygons_from`] does.
+    /// The space of positions read minus the origin, as [`crate::io::mesh::parse_polygons_from`] does.
     pub fn without_origin(self) -> Self {
         Self { origin: DVec3::zeros(), ..self }
     }
 
-    /// Whether vectors of the file, such as velocities, are what they are in metres with Y up.
+    /// Whether vectors of the file, such as velocities, are already in metres with Y up.
     pub fn keeps_vectors(&self) -> bool {
         self.without_origin() == Self::OWN
     }
@@ -53,7 +53,7 @@ impl Space {
         }
     }
 
-    /// Brings points of the file into metres, Y up: positions, voxels, the vectors `v`, `vel`, `velocity` and `rest`, and the radius
+    /// Converts points of the file to metres, Y up: positions, voxels, the vectors `v`, `vel`, `velocity` and `rest`, and the radius
     /// `pscale`. Other attributes stay as they are.
     pub fn bring(&self, cloud: &mut Cloud) {
         if *self == Self::OWN {

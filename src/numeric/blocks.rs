@@ -5,7 +5,7 @@ pub const DIM: usize = 8;
 /// Voxels in a block.
 pub const VOXELS: usize = DIM * DIM * DIM;
 
-/// Voxel coordinate of a block's least corner: a multiple of 8 on each axis.
+/// Voxel coordinates of a block's minimum corner: a multiple of 8 on each axis.
 pub type Origin = [i32; 3];
 /// Values of a block; voxel (x, y, z) lies at `x << 6 | y << 3 | z`.
 pub type Values = [f32; VOXELS];
@@ -27,7 +27,7 @@ pub const fn origin_of(voxel: [i32; 3]) -> Origin {
 /// A block of values with its own memory.
 #[derive(Clone, PartialEq)]
 pub struct Block {
-    /// Least corner, in voxels.
+    /// Minimum corner, in voxels.
     pub origin: Origin,
     /// The 512 values.
     pub values: Box<Values>,
@@ -36,7 +36,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// A block of a level set, from distances (m) cut off at `background`: the voxels nearer than that are active.
+    /// A block of a level set, from distances (m) clamped to `background`: the voxels nearer than that are active.
     pub fn of_band(origin: Origin, values: Box<Values>, background: f32) -> Self {
         let mut mask = [0; DIM];
         for (index, value) in values.iter().enumerate() {
@@ -62,7 +62,7 @@ pub enum BlockEdit {
 }
 
 impl BlockEdit {
-    /// Least corner, in voxels.
+    /// Minimum corner, in voxels.
     pub fn origin(&self) -> Origin {
         match self {
             Self::Dense(block) => block.origin,

@@ -1,4 +1,4 @@
-//! Little-endian numbers as bytes: what exact states consist of.
+//! Little-endian numbers as bytes: the contents of exact states.
 
 use crate::error::{Error, Result};
 
@@ -35,11 +35,11 @@ impl Writer {
     }
 }
 
-/// Reads bytes that [`Writer`] wrote. Each function fails where they end too early, and where a float is not finite.
+/// Reads bytes that [`Writer`] wrote. Each function fails if they end too early, or if a float is not finite.
 pub struct Reader<'a>(&'a [u8]);
 
 impl<'a> Reader<'a> {
-    /// From the beginning of some bytes.
+    /// Reads from the start of some bytes.
     pub fn new(bytes: &'a [u8]) -> Self {
         Self(bytes)
     }
@@ -52,7 +52,7 @@ impl<'a> Reader<'a> {
     /// The next bytes, as many as asked for.
     ///
     /// # Errors
-    /// There are fewer.
+    /// Fewer are left.
     pub fn bytes(&mut self, count: usize) -> Result<&'a [u8]> {
         let (first, rest) = self.0.split_at_checked(count).ok_or_else(cut)?;
         self.0 = rest;
@@ -62,7 +62,7 @@ impl<'a> Reader<'a> {
     /// The next bytes.
     ///
     /// # Errors
-    /// There are fewer.
+    /// Fewer are left.
     pub fn take<const N: usize>(&mut self) -> Result<[u8; N]> {
         let (first, rest) = self.0.split_first_chunk().ok_or_else(cut)?;
         self.0 = rest;
@@ -72,7 +72,7 @@ impl<'a> Reader<'a> {
     /// A count of elements of at least `bytes` bytes each.
     ///
     /// # Errors
-    /// There is no room for so many.
+    /// Too few bytes are left for them.
     pub fn count(&mut self, bytes: usize) -> Result<usize> {
         let count = u64::from_le_bytes(self.take()?) as usize;
         if count > self.0.len() / bytes { Err(cut()) } else { Ok(count) }
@@ -122,10 +122,10 @@ impl<'a> Reader<'a> {
         if number.is_finite() { Ok(number) } else { Err(not_finite()) }
     }
 
-    /// Nothing may be left.
+    /// Checks that nothing is left.
     ///
     /// # Errors
-    /// There is.
+    /// Something is left.
     pub fn end(&self) -> Result<()> {
         if self.0.is_empty() { Ok(()) } else { Err(Error::Bytes("has bytes behind its end".into())) }
     }

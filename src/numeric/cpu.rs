@@ -51,7 +51,7 @@ fn detect() -> CpuLevel {
     CpuLevel::Baseline
 }
 
-/// Calls a function's copy for the instruction set in use; `at most avx2` where wider ones only cost.
+/// Calls a function's copy for the instruction set in use; `at most avx2` where wider vectors do not pay.
 macro_rules! dispatch {
     (at most avx2: $body:ident($($name:ident: $kind:ty),*) $(-> $out:ty)?) => {{
         #[cfg(target_arch = "x86_64")]
@@ -92,8 +92,8 @@ macro_rules! dispatch {
 }
 pub(crate) use dispatch;
 
-/// Denormal numbers count as 0 on this thread until this is dropped: some processors take a hundred times longer
-/// for them. The same on every thread, so that results do not depend on which one works.
+/// Denormal numbers count as 0 on this thread until this is dropped: some processors take a hundred times longer for them. The same on
+/// every thread, so that results do not depend on which thread does the work.
 pub struct FlushDenormals {
     #[cfg(target_arch = "x86_64")]
     before: u32,
@@ -104,7 +104,7 @@ pub struct FlushDenormals {
 const FLUSH: u32 = 1 << 15 | 1 << 6;
 
 impl FlushDenormals {
-    /// Begins to flush; other settings (rounding, exceptions) are the usual ones meanwhile.
+    /// Begins to flush; other settings (rounding, exceptions) have their defaults meanwhile.
     pub fn begin() -> Self {
         #[cfg(target_arch = "x86_64")]
         {
@@ -136,7 +136,6 @@ fn control() -> u32 {
 
 #[cfg(target_arch = "x86_64")]
 fn set_control(value: u32) {
-    // SAFETY: reads four bytes; only rounding, flushing and masks of exceptions change, and no exception is unmasked
-    // that was not before.
+    // SAFETY: reads four bytes; only rounding, flushing and exception masks change, and no exception is unmasked that was masked before.
     unsafe { std::arch::asm!("ldmxcsr [{}]", in(reg) &value, options(nostack, preserves_flags, readonly)) };
 }

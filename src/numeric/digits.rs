@@ -1,24 +1,24 @@
 //! Numbers in messages.
 
-/// Significant digits of a number that a user gave: what rounding of a sum or a product has added is left out.
+/// Significant digits of a number that a user gave: they hide the rounding errors of a sum or a product.
 const DIGITS: usize = 12;
-/// Those of an end of a range, which may have been computed.
+/// Significant digits of a bound of a range, which may have been computed.
 const ENDS: usize = 6;
 
-/// A number that a user gave, as it is written.
+/// A number that a user gave, as the user wrote it.
 pub fn given(value: f64) -> String {
     digits(value, DIGITS)
 }
 
-/// An end of a range.
+/// A bound of a range.
 pub fn end(value: f64) -> String {
     digits(value, ENDS)
 }
 
-/// A number with so many significant digits at most, with an exponent where it would be all zeroes.
+/// A number with at most this many significant digits, and with an exponent where it would otherwise be all zeroes.
 fn digits(value: f64, most: usize) -> String {
     let rounded = format!("{value:.*e}", most - 1).parse().unwrap_or(value);
-    // No minus before nothing.
+    // No minus sign on zero.
     let rounded = if rounded == 0.0 { 0.0 } else { rounded };
     if rounded == 0.0 || !rounded.is_finite() || (1e-10..1e15).contains(&rounded.abs()) {
         format!("{rounded}")

@@ -55,27 +55,27 @@ impl Lanes {
         [Self(store([x, z])), Self(store([y, w]))]
     }
 
-    /// Each lane has the number of the one before it, the first one another.
+    /// Each lane gets the number of the previous one, the first lane gets `first`.
     #[inline(always)]
     pub fn behind(self, first: f32) -> Self {
         let [low, high] = load(&self.0);
         Self(store([half::behind(low, half::all(first)), half::behind(high, half::last(low))]))
     }
 
-    /// Each lane has the number of the one behind it, the last one another.
+    /// Each lane gets the number of the next one, the last lane gets `last`.
     #[inline(always)]
     pub fn before(self, last: f32) -> Self {
         let [low, high] = load(&self.0);
         Self(store([half::before(low, high), half::before(high, half::all(last))]))
     }
 
-    /// The lesser in each lane.
+    /// The smaller number in each lane.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
         Self(each(&self.0, &other.0, half::min))
     }
 
-    /// The greater in each lane.
+    /// The larger number in each lane.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         Self(each(&self.0, &other.0, half::max))

@@ -1,11 +1,11 @@
-//! Exact states as packed bytes: magic, checksum, then compressed parts, each after its length.
+//! Exact states as packed bytes: magic, checksum, then compressed parts, each preceded by its length.
 
 use xxhash_rust::xxh3::xxh3_128;
 
 use super::bytes::Reader;
 use crate::error::{Error, Result};
 
-/// Says what a state is of, and its version.
+/// Identifies the kind of a state and its version.
 pub type Magic = [u8; 8];
 
 /// Size of a part before compression (bytes).
@@ -33,10 +33,10 @@ pub fn unpacked(packed: &[u8], magic: &Magic, noun: &str) -> u64 {
     parts(packed, magic, noun).map_or(0, |parts| parts.iter().map(size).sum())
 }
 
-/// Reverses [`pack`]; messages call what the state is of a `noun`.
+/// Reverses [`pack`]; messages name the owner of the state by `noun`.
 ///
 /// # Errors
-/// Bytes that are damaged, cut or of something else.
+/// Bytes that are damaged, truncated or of something else.
 pub fn unpack(packed: &[u8], magic: &Magic, noun: &str) -> Result<Vec<u8>> {
     let whole = |part| lz4_flex::decompress_size_prepended(part).map_err(|error| wrong(error.to_string()));
     let parts: Vec<Vec<u8>> = parts(packed, magic, noun)?.into_iter().map(whole).collect::<Result<_>>()?;

@@ -4,7 +4,7 @@ use super::cut::Plane;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 
-/// Longest edge of a picture (pixels).
+/// Maximum edge of a picture (pixels).
 const LONGEST: u32 = 16_384;
 
 /// Width and height of a picture (pixels), each at least 1.
@@ -41,7 +41,7 @@ pub struct Camera {
     pub fov_deg: f64,
 }
 
-/// Default angle of view: about that of a 50 mm lens in height (degrees).
+/// Default angle of view: about the vertical angle of a 50 mm lens (degrees).
 const FOV_DEG: f64 = 30.0;
 /// Part of the picture left free at each edge by the automatic camera.
 const MARGIN: f64 = 0.04;
@@ -86,7 +86,7 @@ impl Camera {
         let aspect = f64::from(size.width) / f64::from(size.height);
         let tangent = libm::tan(self.fov_deg.to_radians() * 0.5) * (1.0 - 2.0 * MARGIN);
         self.target = (bounds.0 + bounds.1) * 0.5;
-        // Perspective shifts the middle of what is seen: centring and fitting settle in a few rounds.
+        // Perspective shifts the middle of what is seen: centring and fitting converge in a few iterations.
         for _ in 0..8 {
             self.eye = self.target + toward_eye;
             let [right, up, ahead] = self.axes();
@@ -128,7 +128,7 @@ impl Camera {
         self.lens(size).through(x, y)
     }
 
-    /// What all directions through a picture have in common.
+    /// What all directions through a picture share.
     pub(super) fn lens(&self, size: Size) -> Lens {
         let half = libm::tan(self.fov_deg.to_radians() * 0.5);
         Lens { axes: self.axes(), half, size }

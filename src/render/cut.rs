@@ -1,4 +1,4 @@
-//! Cuts: a plane through a field in colours of its values, and the lines in which surfaces meet the plane.
+//! Cuts: a plane through a field, coloured by its values, and the lines in which surfaces meet the plane.
 
 use std::fmt;
 use std::ops::Range;
@@ -13,12 +13,11 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::{DVec3, TriMesh};
 
-/// Rows of the picture that are sampled at once.
+/// Rows of the picture that are sampled together.
 const ROWS: usize = 64;
 /// Width of a line (pixels).
 const LINE: f64 = 1.5;
-/// Parts of lines that lie nearer ahead of the eye than this, of the distance of their farther end, are not drawn: they are seen
-/// far beside any picture.
+/// Minimum depth at which lines are drawn, over the distance of their farther end: nearer to the eye they are seen far outside any picture.
 const NEAREST: f64 = 1.0e-9;
 /// Light where there is no field.
 const EMPTY: [f32; 3] = [0.45, 0.47, 0.5];
@@ -28,12 +27,12 @@ const EMPTY: [f32; 3] = [0.45, 0.47, 0.5];
 pub struct Plane {
     /// The axis: 0, 1 or 2 for x, y or z.
     pub axis: usize,
-    /// Where on it (m).
+    /// Its coordinate on this axis (m).
     pub at: f64,
 }
 
 impl Plane {
-    /// Where a ray meets the plane; none where it never does.
+    /// Where a ray meets the plane; none if it never does.
     fn meets(self, eye: DVec3, toward: DVec3) -> Option<DVec3> {
         let distance = (self.at - eye[self.axis]) / toward[self.axis];
         let mut position = eye + toward * distance;
@@ -50,7 +49,7 @@ impl fmt::Display for Plane {
 
 /// Reads the values at positions (m) into a list, which it clears first.
 type Read = dyn Fn(&Context, &[DVec3], &mut Vec<f32>) -> Result<()> + Send + Sync;
-/// Least and greatest corner (m); none of nothing.
+/// Minimum and maximum corner (m); none for nothing.
 type Bounds = Option<(DVec3, DVec3)>;
 
 /// A number at each position, such as a distance or a density.
@@ -61,9 +60,9 @@ pub struct Field {
 }
 
 impl Field {
-    /// A field that `read` samples: it gets positions (m) and puts their values into a list, which it clears first. Values of `range`
-    /// take the colours from dark blue to pale yellow, those outside the colours of its ends. `bounds` are the least and the
-    /// greatest corner of what is to be seen (m).
+    /// A field that `read` samples: it gets positions (m) and puts their values into a list, which it clears first. Values in `range` take
+    /// the colours from dark blue to pale yellow, values outside those of its ends. `bounds` are the minimum and maximum corner of what is
+    /// to be seen (m).
     pub fn new(
         bounds: Option<(DVec3, DVec3)>,
         range: [f32; 2],
@@ -94,20 +93,19 @@ struct Outline {
 }
 
 impl Cut {
-    /// A plane without anything.
+    /// A plane with nothing on it.
     pub fn new(plane: Plane) -> Self {
         Self { plane, field: None, outlines: Vec::new(), bounds: None }
     }
 
-    /// With a field; of several the first gives the colours.
+    /// Adds a field; the first of several gives the colours.
     pub fn with_field(mut self, field: Field) -> Self {
         self.bounds = around(self.bounds, field.bounds);
         self.field = self.field.or(Some(field));
         self
     }
 
-    /// With the lines in which a mesh meets the plane, over those of meshes before it, in a colour (linear red, green, blue, 0 to
-    /// 1).
+    /// Adds the lines in which a mesh meets the plane, drawn over those of earlier meshes, in a colour (linear red, green, blue, 0 to 1).
     pub fn with_surface(mut self, mesh: &TriMesh, colour: [f32; 3]) -> Self {
         let bounds = mesh.bounds().map(|(low, high)| (low.cast(), high.cast()));
         self.bounds = around(self.bounds, bounds);
@@ -115,18 +113,18 @@ impl Cut {
         self
     }
 
-    /// Least and greatest corner of all that is cut (m); none when it is empty.
+    /// Minimum and maximum corner of everything that is cut (m); none if it is empty.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         self.bounds
     }
 
-    /// The values of its field that the ends of the colours stand for; none without a field.
+    /// The values of its field at the ends of the colours; none without a field.
     pub fn range(&self) -> Option<[f32; 2]> {
         self.field.as_ref().map(|field| field.range)
     }
 
-    /// Draws what a camera sees of the plane, without light or shadow: the same bytes at any number of threads. Nothing is seen
-    /// of a plane that the camera stands in.
+    /// Draws what a camera sees of the plane, without light or shadow: the same bytes with any number of threads. A plane that contains the
+    /// camera is not seen.
     ///
     /// # Errors
     /// A size outside 1 to 16,384 pixels; what the field reports; a cancel.
@@ -172,7 +170,7 @@ impl Cut {
 }
 
 impl Outline {
-    /// Draws the lines over a picture.
+    /// Draws the lines onto a picture.
     fn ink(&self, rgb: &mut [u8], eye: DVec3, lens: &Lens, size: Size) {
         let cover = self.cover(eye, lens, size);
         for (pixel, cover) in rgb.chunks_exact_mut(3).zip(cover.into_iter().map(u32::from)) {
@@ -202,7 +200,7 @@ impl Outline {
     }
 }
 
-/// Where the part of a segment that lies ahead is seen (pixels); none where all of it is behind. Its ends are from the eye (m).
+/// Where the part of a segment ahead of the eye is seen (pixels); none if all of it is behind. Its ends are relative to the eye (m).
 fn seen(lens: &Lens, [a, b]: [DVec3; 2]) -> Option<[[f64; 2]; 2]> {
     let [from, to] = [a, b].map(|end| lens.depth(end));
     let nearest = NEAREST * a.norm().max(b.norm());
@@ -216,7 +214,7 @@ fn seen(lens: &Lens, [a, b]: [DVec3; 2]) -> Option<[[f64; 2]; 2]> {
     Some([lens.pixel(a)?, lens.pixel(b)?])
 }
 
-/// The pixels of a row or column of `count` that a line between two of its positions may cover.
+/// The pixels of a row or column of `count` pixels that a line between two of its positions may cover.
 fn near(a: f64, b: f64, count: usize) -> Range<usize> {
     let first = (a.min(b) - LINE).floor().max(0.0) as usize;
     let last = (a.max(b) + LINE).ceil().max(0.0) as usize;
@@ -233,7 +231,7 @@ fn distance(a: [f64; 2], b: [f64; 2], position: [f64; 2]) -> f64 {
     (off[0] * off[0] + off[1] * off[1]).sqrt()
 }
 
-/// The segments in which triangles meet a plane. Corners in the plane count as beyond it, so that none is met twice.
+/// The segments in which triangles meet a plane. Corners in the plane count as beyond it, so that no segment occurs twice.
 fn outline(mesh: &TriMesh, plane: Plane) -> Vec<[DVec3; 2]> {
     let meets = |triangle: usize| {
         let corners = mesh.corners(triangle);
@@ -247,7 +245,7 @@ fn outline(mesh: &TriMesh, plane: Plane) -> Vec<[DVec3; 2]> {
     (0..mesh.triangles.len()).filter_map(meets).collect()
 }
 
-/// The box around two.
+/// The box around two boxes.
 fn around(a: Bounds, b: Bounds) -> Bounds {
     match (a, b) {
         (Some(a), Some(b)) => Some((a.0.inf(&b.0), a.1.sup(&b.1))),
@@ -279,7 +277,7 @@ mod tests {
 
     /// The position that a pixel of a picture of that box shows, by the directions to the right and upward.
     fn position(plane: Plane, [x, y]: [usize; 2], [right, up]: [DVec3; 2]) -> DVec3 {
-        // The box fills the height but for 4 % at each edge.
+        // The box fills the height except for 4 % at each edge.
         let pixel = 2.0 / 0.92 / 90.0;
         let mut position = right * ((x as f64 + 0.5 - 60.0) * pixel) + up * ((45.0 - y as f64 - 0.5) * pixel);
         position[plane.axis] = plane.at;
@@ -331,7 +329,7 @@ mod tests {
             }
         }
         assert!(covered > 50, "{covered}");
-        // Neither a plane beside the box meets it nor that of its lowest face, whose corners count as beyond it.
+        // A plane beside the box does not meet it, nor does that of its lowest face, whose corners count as beyond it.
         assert!(outline(&mesh, Plane { axis: 2, at: 0.6 }).is_empty());
         assert!(outline(&mesh, Plane { axis: 2, at: -0.5 }).is_empty());
     }

@@ -1,17 +1,17 @@
-//! Thin liquids: what lies below shines through as far as they are not opaque, and their surface shines.
+//! Thin liquids: what lies below is visible where they are not opaque, and their surface is glossy.
 
 use super::model::{Hit, Model, smooth_normals};
 use super::shade::{Colour, Light, gloss};
 use crate::geometry::{DVec3, TriMesh};
 
-/// Surfaces of liquid behind each other that a ray passes at most.
+/// Maximum number of liquid surfaces that a ray passes.
 pub(super) const MOST_FILMS: usize = 8;
-/// The sheen of a liquid is whole from this opacity on, and fades towards its dry rim.
+/// Opacity from which the sheen of a liquid is full; it fades towards the dry rim.
 const SHEEN_FROM: f64 = 0.05;
 
 impl Model {
-    /// The surface of a liquid with a colour (linear red, green, blue, 0 to 1) and an opacity of each vertex, 0 to 1. It is smooth, hides
-    /// no light from others, and shines.
+    /// The surface of a liquid with a colour (linear red, green, blue, 0 to 1) and an opacity per vertex, 0 to 1. It is smooth, casts no
+    /// shadow, and is glossy.
     pub fn liquid(mesh: &TriMesh, albedo: [f32; 3], opacities: Vec<f32>) -> Self {
         let mut model = Self::mesh(mesh, albedo);
         model.normals = Some(smooth_normals(mesh));
@@ -20,7 +20,7 @@ impl Model {
     }
 }
 
-/// Light that comes from a liquid's surface: its own, what comes from below as far as it is let through, and what it mirrors.
+/// Light from a liquid's surface: its own, what it transmits from below, and what it mirrors.
 pub(super) fn wet(
     light: &Light,
     hit: &Hit,

@@ -12,7 +12,7 @@ pub struct Model {
     /// Unit normals at the vertices of a smooth surface; without them triangles are flat.
     pub(super) normals: Option<Vec<Vec3>>,
     albedo: Colour,
-    /// Colours of the vertices, in place of the one.
+    /// Colours of the vertices, in place of a single one.
     colours: Option<Vec<[f32; 3]>>,
     /// Opacities of the vertices of a liquid, 0 to 1.
     pub(super) opacities: Option<Vec<f32>>,
@@ -24,15 +24,15 @@ pub struct Model {
 pub(super) struct Hit {
     /// Distance along the ray (m).
     pub distance: f64,
-    /// Unit normal, towards where the ray came from.
+    /// Unit normal, towards the ray's origin.
     pub normal: DVec3,
-    /// Part of the light that the surface sends back.
+    /// Share of the light that the surface reflects.
     pub albedo: Colour,
     /// As [`Model::skin`].
     pub skin: f64,
-    /// How far light reaches round to the side that is turned away from the sun: 0 for a surface, 1 for all around.
+    /// How far light wraps round to the side that faces away from the sun: 0 for a surface, 1 for all around.
     pub wrap: f64,
-    /// Opacity of a liquid, 0 to 1; none: it is no liquid.
+    /// Opacity of a liquid, 0 to 1; none if it is not a liquid.
     pub film: Option<f64>,
 }
 
@@ -49,8 +49,8 @@ impl Model {
         Self { mesh, tree, normals, albedo, colours: None, opacities: None, skin }
     }
 
-    /// With colours for numbers of its vertices, from dark blue at the least to pale yellow at the greatest; numbers that are not
-    /// finite count as the least.
+    /// Colours the vertices by numbers, from dark blue at the minimum to pale yellow at the maximum; numbers that are not finite count as
+    /// the minimum.
     pub fn coloured(self, numbers: &[f64]) -> Self {
         let finite = numbers.iter().filter(|number| number.is_finite());
         let (low, high) =
@@ -59,12 +59,12 @@ impl Model {
         Self { colours: Some(colours.collect()), ..self }
     }
 
-    /// With a colour of each vertex (linear red, green, blue, 0 to 1).
+    /// Gives each vertex a colour (linear red, green, blue, 0 to 1).
     pub fn painted(self, colours: Vec<[f32; 3]>) -> Self {
         Self { colours: Some(colours), ..self }
     }
 
-    /// Its least and greatest corner (m); none when it is empty.
+    /// Its minimum and maximum corner (m); none if it is empty.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         bounds_of(&self.mesh)
     }
@@ -79,7 +79,7 @@ impl Model {
             let [a, b, c] = corners.map(|index| normals[index].cast::<f64>());
             a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v
         });
-        // A triangle seen from behind is turned round; a smooth normal never leaves the side that is seen.
+        // A triangle seen from behind is flipped; a smooth normal always stays on the visible side.
         let normal = if flat.dot(&toward) > 0.0 { -smooth } else { smooth };
         let away = normal.dot(&toward).max(0.0);
         let normal = (normal - toward * away).try_normalize(0.0).unwrap_or(-toward);
@@ -94,7 +94,7 @@ impl Model {
         Some(Hit { distance: hit.distance, normal, albedo, skin: self.skin, wrap: 0.0, film })
     }
 
-    /// Whether the surface hides a direction from a point; a liquid's does not.
+    /// Whether the surface blocks a direction from a point; a liquid's does not.
     pub(super) fn blocks(&self, origin: DVec3, toward: DVec3) -> bool {
         self.opacities.is_none() && self.tree.any_hit(origin, toward, f64::INFINITY)
     }

@@ -1,4 +1,4 @@
-//! Everything that is in the picture, and the drawing of it.
+//! Everything that is in the picture, and how it is drawn.
 
 use super::camera::{Camera, Lens, Size};
 use super::fog::{Fog, LitFogs, Veil};
@@ -18,12 +18,12 @@ const SAMPLES: usize = 3;
 /// Samples of a pixel.
 const RAYS: usize = SAMPLES * SAMPLES;
 
-/// What a picture is drawn from.
+/// Input of a picture.
 struct View<'a> {
     camera: &'a Camera,
     lens: Lens,
     light: &'a Light,
-    /// The points as the camera sees them, and as they are in the way of the light.
+    /// The points as the camera sees them, and as they block the light.
     splats: Splats<'a>,
     shadows: Option<Shadows>,
     fogs: LitFogs<'a>,
@@ -39,23 +39,23 @@ pub struct Models {
 }
 
 impl Models {
-    /// Puts models together.
+    /// Combines models.
     pub fn new(models: Vec<Model>) -> Self {
         Self { models, clouds: Vec::new(), fogs: Vec::new() }
     }
 
-    /// With clouds of points beside them, which get light from the sun and the sky and cast shadows as models do.
+    /// Adds clouds of points, which are lit by the sun and the sky and cast shadows as models do.
     pub fn with_clouds(self, clouds: Vec<Cloud>) -> Self {
         Self { clouds, ..self }
     }
 
-    /// With fogs, through which what is behind them is seen, and which get light from the sun and the sky; they weaken the
-    /// sun that reaches the models.
+    /// Adds fogs, through which things behind them are seen. They are lit by the sun and the sky, and weaken the sun that reaches the
+    /// models.
     pub fn with_fogs(self, fogs: Vec<Fog>) -> Self {
         Self { fogs, ..self }
     }
 
-    /// Least and greatest corner of everything (m); none when all is empty.
+    /// Minimum and maximum corner of everything (m); none if all is empty.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let boxes =
             self.models.iter().filter_map(Model::bounds).chain(self.clouds.iter().filter_map(Cloud::bounds));
@@ -63,7 +63,7 @@ impl Models {
         boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
     }
 
-    /// Draws the picture: rows in parallel, the same bytes at any number of threads.
+    /// Draws the picture: rows in parallel, the same bytes with any number of threads.
     ///
     /// # Errors
     /// A size outside 1 to 16,384 pixels, or a cancel.
@@ -119,13 +119,13 @@ impl Models {
         to_bytes(sum / RAYS as f64)
     }
 
-    /// The nearest point on a ray, which meets a point of a cloud or none.
+    /// The nearest hit on a ray; `splat` is the ray's hit with a point of a cloud, if any.
     fn hit(&self, eye: DVec3, toward: DVec3, splat: Option<Hit>) -> Option<Hit> {
         let hits = self.models.iter().filter_map(|model| model.hit(eye, toward)).chain(splat);
         hits.reduce(|a: Hit, b| if b.distance < a.distance { b } else { a })
     }
 
-    /// What the fogs do to the samples of a pixel.
+    /// Effect of the fogs on the samples of a pixel.
     fn veils(&self, view: &View<'_>, rays: &[(DVec3, Option<Hit>); RAYS]) -> [Veil; RAYS] {
         if self.fogs.is_empty() {
             return [Veil::NONE; RAYS];
@@ -142,14 +142,14 @@ impl Models {
         })
     }
 
-    /// Whether a model or a point of a cloud hides a direction from a point.
+    /// Whether a model or a point of a cloud blocks a direction from a point.
     fn hide(&self, shadows: Option<&Shadows>, point: DVec3, toward: DVec3) -> bool {
         self.models.iter().any(|model| model.blocks(point, toward))
             || shadows.is_some_and(|shadows| shadows.block(point, toward))
     }
 
-    /// Light that comes along a ray, from its origin and in its direction, from what it meets, without the fogs before it; through at most
-    /// so many `films` of liquid.
+    /// Light that arrives along a ray, given by its origin and direction, from what it meets, without the fogs in between; through at most
+    /// `films` liquid surfaces.
     fn seen(
         &self,
         view: &View<'_>,

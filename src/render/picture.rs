@@ -26,7 +26,7 @@ impl Picture {
     /// The bytes of a PNG file.
     ///
     /// # Errors
-    /// A picture of no pixels, or of another number of bytes than its size says.
+    /// No pixels, or a byte count that does not match the size.
     pub fn png(&self) -> Result<Vec<u8>> {
         self.encoded().map_err(|error| Error::argument(format!("a picture cannot be made a PNG: {error}")))
     }

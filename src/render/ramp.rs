@@ -5,9 +5,8 @@ const LOW: [f64; 3] = [0.30, 0.02, -0.13];
 const MIDDLE: [f64; 3] = [0.61, -0.08, -0.02];
 const HIGH: [f64; 3] = [0.92, -0.02, 0.13];
 
-/// The colour (linear red, green, blue, 0 to 1) of a number from 0 to 1: from dark blue over green to pale yellow. Equal steps
-/// of the number are equal steps of lightness, so the order of values is seen in grey too. Numbers outside, and those that are
-/// none, count as 0 or 1.
+/// The colour (linear red, green, blue, 0 to 1) of a number from 0 to 1: from dark blue over green to pale yellow. Equal steps of the
+/// number are equal steps of lightness, so the order of values is visible in grey too. Numbers outside, and NaN, count as 0 or 1.
 pub(super) fn ramp(number: f64) -> [f32; 3] {
     let number = if number.is_nan() { 0.0 } else { number.clamp(0.0, 1.0) };
     let (from, to, part) =

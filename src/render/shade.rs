@@ -1,4 +1,4 @@
-//! Light on a surface: a low sun with a soft shadow, and the sky as far as it is not hidden.
+//! Light on a surface: a low sun with a soft shadow, and the sky where it is not hidden.
 //!
 //! Everything is a function of the pixel alone, so a picture does not depend on the number of threads.
 
@@ -25,18 +25,18 @@ pub(super) const SUN: Colour = Colour::new(1.75, 1.52, 1.22);
 /// Radiance of the zenith and of the horizon.
 const ZENITH: Colour = Colour::new(0.20, 0.30, 0.48);
 const HORIZON: Colour = Colour::new(0.42, 0.50, 0.60);
-/// What a hidden part of the sky still sends: light that snow reflected several times.
+/// What a hidden part of the sky still contributes: light that snow reflected several times.
 const BOUNCED: Colour = Colour::new(0.085, 0.115, 0.165);
 /// Mean radiance around a fog: half of it is sky, the other half snow.
 pub(super) const SURROUNDINGS: Colour = Colour::new(0.50, 0.545, 0.61);
-/// Half the angle of the sun's disc, wider than in nature: the edges of shadows are soft (radians).
+/// Angular radius of the sun's disc (radians), larger than in nature: the edges of shadows are soft.
 const SUN_RADIUS: f64 = 0.02;
-/// Sharpness of the sun's mirror image in a liquid, and its brightness over the sun's on a surface.
+/// Sharpness of the sun's reflection in a liquid, and its brightness relative to the sun's on a surface.
 const GLOSS: f64 = 350.0;
 const SPOT: f64 = 1.0;
 /// Sky rays at each sample of a pixel.
 pub(super) const SKY_RAYS: usize = 4;
-/// Points of the disc that are kept: for the 9 samples of a pixel.
+/// Points of the disc that are stored: for the 9 samples of a pixel.
 const DISC_POINTS: usize = 9 * SKY_RAYS;
 
 impl Light {
@@ -45,14 +45,14 @@ impl Light {
         Self { sun: direction(azimuth, elevation) }
     }
 
-    /// A low sun that comes from the camera's left and a little from ahead: relief shows best so.
+    /// A low sun from the camera's left and slightly from ahead, which shows relief best.
     pub fn beside(camera: &Camera) -> Self {
         let back = camera.eye - camera.target;
         let azimuth = libm::atan2(back.x, back.z).to_degrees();
         Self::from_degrees(azimuth - 112.0, 27.0)
     }
 
-    /// What is seen where nothing is.
+    /// The light seen where there is nothing.
     pub(super) fn background(&self, toward: DVec3) -> Colour {
         let height = toward.y.clamp(-0.3, 1.0);
         // Below the horizon the haze darkens a little, so that a floating layer stands out.
@@ -66,9 +66,9 @@ fn sky(height: f64) -> Colour {
 
 /// Light that leaves a point towards the camera.
 ///
-/// `blocked(direction)` returns whether something hides that direction from the point, `clear(direction)` how much of the
-/// sun's light fog lets through, 0 to 1; `sample` numbers the samples of this pixel; `wrap` is how far light reaches round
-/// to the side that is turned away, 0 to 1.
+/// `blocked(direction)` returns whether something blocks that direction from the point, `clear(direction)` how much of the sun's light the
+/// fog transmits, 0 to 1; `sample` numbers the samples of this pixel; `wrap` is how far light wraps round to the side that faces away, 0 to
+/// 1.
 pub(super) fn shade(
     light: &Light,
     normal: DVec3,
@@ -96,7 +96,7 @@ pub(super) fn shade(
     albedo.component_mul(&(sun + fill / SKY_RAYS as f64))
 }
 
-/// How much of the light a wet surface mirrors (Schlick 1994, of water), and the light that it so sends towards the camera: that of the
+/// Share of the light that a wet surface reflects (Schlick 1994, for water), and the light that it reflects towards the camera: that of the
 /// sky, and of the sun in a spot that ripples blur.
 ///
 /// `toward` is the unit vector from the camera; `blocked(direction)` as in [`shade`].
@@ -117,7 +117,7 @@ pub(super) fn gloss(
     (share, sky * share + sun)
 }
 
-/// A point of the unit disc: the plastic sequence (Roberts 2018), the same at each pixel: flat walls stay flat.
+/// A point of the unit disc: the plastic sequence (Roberts 2018), the same at each pixel, so that flat walls stay flat.
 fn disc(index: usize) -> (f64, f64) {
     const PLASTIC: f64 = 1.324_717_957_244_746;
     static POINTS: LazyLock<[(f64, f64); DISC_POINTS]> = LazyLock::new(|| {
@@ -142,7 +142,7 @@ fn tangents(normal: DVec3) -> (DVec3, DVec3) {
 pub(super) fn to_bytes(light: Colour) -> [u8; 3] {
     let byte = |value: f64| {
         let value = value * 0.92;
-        // Linear up to the shoulder, then towards 1 with the same slope.
+        // Linear up to the shoulder, then towards 1, starting with the same slope.
         let shoulder = 0.6;
         let value = if value < shoulder {
             value

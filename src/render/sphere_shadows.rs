@@ -1,14 +1,14 @@
-//! Shadows of points: their spheres in the cells of a box, through which rays towards the light go.
+//! Shadows of points: their spheres are listed in the cells of a box, which rays towards the light traverse.
 
 use super::spheres::Cloud;
 use crate::geometry::DVec3;
 
-/// Edge of a cell, in mean diameters: some dozen spheres of a heap lie in one.
+/// Edge of a cell, in mean diameters: within a heap, a cell holds some dozen spheres.
 const CELL: f64 = 2.5;
-/// Most cells: 64 MB of their lists' starts.
+/// Maximum number of cells: the starts of their lists take 64 MB.
 const MOST: f64 = 16.0e6;
-/// Spheres nearer than so many of their radii cast no shadow: light that enters snow comes out again about as far away, so
-/// that grains of a smooth heap do not shade each other.
+/// Spheres nearer than this many of their radii cast no shadow: light that enters snow comes out again about that far away, so the grains
+/// of a smooth heap do not shade each other.
 const LIT: f64 = 1.5;
 
 /// Spheres that hide the light from what is behind them.
@@ -23,7 +23,7 @@ pub(super) struct Shadows {
 }
 
 impl Shadows {
-    /// Those of clouds; none where they are empty.
+    /// Shadows of clouds; none if they are empty.
     pub fn new(clouds: &[Cloud]) -> Option<Self> {
         let spheres = || clouds.iter().flat_map(Cloud::spheres).filter(|(_, radius)| *radius > 0.0);
         let (low, high) =
@@ -71,7 +71,7 @@ impl Shadows {
         })
     }
 
-    /// Whether a sphere hides a direction (a unit vector) from a point; cell by cell along the ray (Amanatides and Woo 1987).
+    /// Whether a sphere blocks a direction (a unit vector) from a point; cell by cell along the ray (Amanatides and Woo 1987).
     pub fn block(&self, origin: DVec3, toward: DVec3) -> bool {
         let size = [0, 1, 2].map(|axis| self.counts[axis] as f64 * self.edge);
         let (mut enter, mut leave) = (0.0f64, f64::INFINITY);

@@ -1,5 +1,5 @@
-//! Points drawn as spheres: each is put where the camera sees it, into a buffer with the nearest sphere of each sample of the
-//! picture. Nothing is traced: a million points take about as long as the rest of the picture.
+//! Points drawn as spheres: each is projected into a buffer that holds the nearest sphere at each sample of the picture. No rays are
+//! traced: a million points take about as long as the rest of the picture.
 
 use rayon::prelude::*;
 
@@ -12,15 +12,15 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::geometry::points::{Column, Points, Values};
 
-/// Samples along an edge of a tile, which a task draws.
+/// Samples along an edge of a tile; a task draws one tile.
 const TILE: usize = 32;
 /// Samples of a tile.
 const AREA: usize = TILE * TILE;
-/// Spheres between two looks at whether a tile is full.
+/// Spheres between two checks whether a tile is full.
 const LOOK: usize = 64;
 /// As [`Hit::wrap`]: grains of snow let light through.
 const WRAP: f64 = 0.5;
-/// Least radius of a sphere on the picture (samples): a smaller one could slip between samples.
+/// Minimum radius of a sphere in the picture (samples): a smaller one could fall between samples.
 const LEAST_SEEN: f64 = 0.75;
 
 /// Points, ready to be drawn.
@@ -37,12 +37,11 @@ struct Sphere {
 }
 
 impl Cloud {
-    /// Points as spheres with the radius `pscale` (m), or of half a voxel where they have none. They have the colour of
-    /// snow, or one for the values of an attribute: from dark blue at the least to pale yellow at the greatest; vectors by
-    /// their lengths.
+    /// Points as spheres with the radius `pscale` (m), or of half a voxel if they have none. They have the colour of snow, or colours for
+    /// the values of an attribute: from dark blue at the minimum to pale yellow at the maximum; vectors by their lengths.
     ///
     /// # Errors
-    /// No such attribute (those that are there are named).
+    /// No such attribute (the error names those that exist).
     pub fn new(points: &Points, colour: Option<&str>) -> Result<Self> {
         let unknown = |name: &str| {
             let names: Vec<&str> =
@@ -88,7 +87,7 @@ impl Cloud {
         self.spheres.iter().map(|sphere| (sphere.centre, sphere.radius))
     }
 
-    /// Its least and greatest corner (m); none when it is empty.
+    /// Its minimum and maximum corner (m); none if it is empty.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         self.bounds
     }
@@ -99,7 +98,7 @@ pub(super) struct Splats<'a> {
     clouds: &'a [Cloud],
     /// Tiles in a row.
     across: usize,
-    /// For each sample, tile by tile, the distance along its ray (m), and cloud and sphere; infinity where there is none.
+    /// For each sample, tile by tile, the distance along its ray (m), and cloud and sphere; infinity if there is none.
     nearest: Vec<Nearest>,
 }
 
@@ -108,19 +107,19 @@ type Nearest = (f32, u32, u32);
 
 /// A sphere on the picture: the samples that it may cover.
 struct Seen {
-    /// No point of it is nearer to the eye (m).
+    /// Lower bound of its distance from the eye (m).
     least: f32,
     cloud: u32,
     sphere: u32,
-    /// Radius (m) after it is made large enough to be seen.
+    /// Radius (m), enlarged if necessary to be seen.
     radius: f64,
     columns: [u32; 2],
     rows: [u32; 2],
 }
 
 impl<'a> Splats<'a> {
-    /// Draws clouds with `samples` samples along each edge of a pixel: the same at any number of threads, as each tile
-    /// takes the spheres in the same order.
+    /// Draws clouds with `samples` samples along each edge of a pixel: the same with any number of threads, as each tile processes the
+    /// spheres in the same order.
     pub fn new(
         ctx: &Context,
         clouds: &'a [Cloud],
@@ -140,7 +139,7 @@ impl<'a> Splats<'a> {
             let spheres = cloud.spheres.par_iter().enumerate();
             seen.par_extend(spheres.filter_map(|(n, sphere)| view.see(sphere, number, n as u32)));
         }
-        // From front to back: what is hidden then costs one comparison a sample. Equal distances keep the order of the points.
+        // Front to back: a hidden sphere then costs one comparison per sample. Equal distances keep the order of the points.
         seen.par_sort_unstable_by(|a, b| {
             a.least.total_cmp(&b.least).then((a.cloud, a.sphere).cmp(&(b.cloud, b.sphere)))
         });
@@ -171,7 +170,7 @@ impl<'a> Splats<'a> {
         }
         let Sphere { centre, radius, albedo } = self.clouds[cloud as usize].spheres[sphere as usize];
         let distance = f64::from(distance);
-        // Spheres that were made larger have the same normals as others.
+        // Enlarged spheres have the same normals as others.
         let normal = (eye + toward * distance - centre).try_normalize(0.0).unwrap_or(-toward);
         let skin = 0.01 * radius.max(1e-9);
         let albedo = Colour::from(albedo.map(f64::from));
@@ -179,7 +178,7 @@ impl<'a> Splats<'a> {
     }
 }
 
-/// Draws the spheres of a tile, from front to back; it ends when nothing that comes can be seen.
+/// Draws the spheres of a tile from front to back; stops when no further one can be seen.
 fn draw_tile<'s>(
     view: &View,
     clouds: &[Cloud],
@@ -187,7 +186,7 @@ fn draw_tile<'s>(
     corner: [usize; 2],
     tile: &mut [Nearest],
 ) {
-    // Samples of the last tiles that lie outside the picture never fill.
+    // Samples of the last tiles outside the picture never fill.
     let [right, bottom] = [(view.width - corner[0]).min(TILE), (view.height - corner[1]).min(TILE)];
     for (n, seen) in list.enumerate() {
         if n.is_multiple_of(LOOK) {
@@ -223,7 +222,7 @@ struct View {
     axes: [DVec3; 3],
     width: usize,
     height: usize,
-    /// Samples in a length of 1 at a distance of 1.
+    /// Samples per length of 1 at a distance of 1.
     scale: f64,
 }
 
@@ -237,11 +236,11 @@ impl View {
     fn see(&self, sphere: &Sphere, cloud: u32, index: u32) -> Option<Seen> {
         let [x, y, z] = self.axes.map(|axis| axis.dot(&(sphere.centre - self.eye)));
         let radius = sphere.radius.max(LEAST_SEEN * z / self.scale);
-        // A sphere that the camera is in, or beside, is left out: it would hide everything.
+        // A sphere that contains the camera, or is beside it, is left out: it would hide everything.
         if z <= radius {
             return None;
         }
-        // Tangents from the eye to the circle of the sphere in the plane of an axis and the view.
+        // Tangents from the eye to the sphere's circle in the plane of an axis and the view.
         let range = |side: f64| {
             let root = radius * (side * side + z * z - radius * radius).sqrt();
             let below = z * z - radius * radius;
@@ -255,7 +254,7 @@ impl View {
         let columns = clip(range(x), 0.5 * self.width as f64, self.width)?;
         // Rows count downward.
         let rows = clip(range(-y), 0.5 * self.height as f64, self.height)?;
-        // Rounded down, so that it is a bound of distances that are rounded too.
+        // Rounded down, so that it bounds distances that are rounded too.
         let least = ((sphere.centre - self.eye).norm() - radius) as f32 * (1.0 - 1e-6);
         Some(Seen { least, cloud, sphere: index, radius, columns, rows })
     }

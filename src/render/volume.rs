@@ -23,12 +23,12 @@ impl Model {
 }
 
 impl Fog {
-    /// A fog volume. A value of 1 loses as much light per metre as its metadata `frazil:density_scale` says, `extinction`
-    /// without that (1/m, for short ways, over 0). Voxels that are not active, and values below 0, count as empty.
+    /// A fog volume. A value of 1 attenuates light per metre as its metadata `frazil:density_scale` says, or by `extinction` without that
+    /// (1/m, over short paths, over 0). Inactive voxels, and values below 0, count as empty.
     ///
     /// # Errors
-    /// A transform that is not linear; a scale that is no number of 0 or more; densities too far apart to be drawn, or
-    /// too many for the memory limit; a cancel.
+    /// A transform that is not linear; a scale that is not a number of 0 or more; densities too far apart to be drawn, or too many for the
+    /// memory limit; a cancel.
     pub fn grid(ctx: &Context, grid: &FloatGrid, extinction: f64) -> Result<Self> {
         let wrong = |what: String| Error::argument(format!("grid \"{}\" {what}", grid.name()));
         let placement = placement(grid).ok_or_else(|| wrong("has a transform that is not linear".into()))?;
@@ -55,11 +55,11 @@ impl Fog {
 }
 
 impl Field {
-    /// The values of a grid, linear between its voxels. Colours go from one end of the narrow band to the other for a level set,
-    /// for any other grid from the least of its values and 0 to the greatest of these.
+    /// The values of a grid, linear between its voxels. For a level set the colours span the narrow band, for any other grid the range of
+    /// its values and 0.
     ///
     /// # Errors
-    /// More leaves than the memory limit has room to list; when memory runs out; a cancel.
+    /// More leaves than the memory limit allows to list; out of memory; a cancel.
     pub fn grid(ctx: &Context, grid: FloatGrid) -> Result<Self> {
         let bounds = bounds_of(&grid);
         let range = match grid.class() {
@@ -73,12 +73,12 @@ impl Field {
     }
 }
 
-/// Memory (bytes) of a leaf in a list of leaves, and while that list is made; its values stay where they are.
+/// Memory (bytes) of a leaf in a list of leaves, including while that list is made; its values are not copied.
 const LISTED: u64 = 80;
-/// Leaves that are looked at between two looks for a cancel.
+/// Leaves between two checks for a cancel.
 const LEAVES: usize = 4096;
 
-/// The least and the greatest of 0 and a grid's finite values.
+/// Minimum and maximum of 0 and a grid's finite values.
 fn range(ctx: &Context, grid: &FloatGrid) -> Result<[f32; 2]> {
     ctx.allow("a list of a grid's leaves", grid.leaf_count() as u64 * LISTED)?;
     let wider = |[low, high]: [f32; 2], value: f32| match value {
@@ -95,7 +95,7 @@ fn range(ctx: &Context, grid: &FloatGrid) -> Result<[f32; 2]> {
     Ok(range)
 }
 
-/// Least and greatest corner of the active voxels of a grid (m); none without any.
+/// Minimum and maximum corner of the active voxels of a grid (m); none without any.
 fn bounds_of(grid: &FloatGrid) -> Option<(DVec3, DVec3)> {
     let (low, high) = grid.active_bbox()?;
     let corner = |n: usize| {
@@ -111,7 +111,7 @@ fn bounds_of(grid: &FloatGrid) -> Option<(DVec3, DVec3)> {
 /// Memory (bytes) of a block of a tile while it is prepared.
 const TILE_BYTES: u64 = 64;
 
-/// What a fog's file says of its densities.
+/// The density scale in a fog's metadata.
 fn density_scale(grid: &FloatGrid) -> Result<Option<f64>> {
     let metadata = grid.metadata()?;
     let Some((_, value)) = metadata.iter().find(|(key, _)| key == DENSITY_SCALE_KEY) else { return Ok(None) };
@@ -128,12 +128,12 @@ fn density_scale(grid: &FloatGrid) -> Result<Option<f64>> {
     })
 }
 
-/// Where a grid's voxels are; none where its transform is not linear.
+/// Positions of a grid's voxels; none if its transform is not linear.
 fn placement(grid: &FloatGrid) -> Option<Placement> {
     let origin = grid.index_to_world(DVec3::zeros());
     let axes = [DVec3::x(), DVec3::y(), DVec3::z()].map(|axis| grid.index_to_world(axis) - origin);
     let placement = Placement::new(origin, axes)?;
-    // Perspective shows at the corners of what is there.
+    // Perspective shows at the corners of the active voxels.
     let (low, high) = grid.active_bbox().unwrap_or_default();
     let is_linear = (0..8).all(|n| {
         let corner = [0, 1, 2].map(|axis| f64::from(if n >> axis & 1 == 0 { low[axis] } else { high[axis] }));

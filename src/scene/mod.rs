@@ -1,21 +1,21 @@
-//! Scene files (TOML): what a shot is made of, read with every default filled in ([`Scene::read`], `schema/`), checked
-//! against its inputs and run frame by frame.
+//! Scene files (TOML): they describe a shot, are read with every default filled in ([`Scene::read`], `schema/`), checked against their
+//! inputs and run frame by frame.
 //!
 //! [`run`] runs any stage; [`snow`], [`surface`] and [`shallow`] have the inputs, the check and the stages of a system; the stage `objects`
-//! writes the objects as they move. A new stage is a type with the traits [`run::Stage`] and [`run::Stepping`] beside its
-//! system, named in the system's plan ([`snow::plan`]) and in the scopes of the keys that it depends on.
+//! writes the objects as they move. A new stage is a type with the traits [`run::Stage`] and [`run::Stepping`] beside its system, listed in
+//! the system's plan ([`snow::plan`]) and in the scopes of the keys that it depends on.
 //!
 //! # Glossary
 //!
 //! | word | meaning |
 //! |---|---|
-//! | shot | a scene's frames and the folder that they go to |
-//! | stage | a part of a shot with files of its own: objects, base, grains, mist, volumes, surface, liquid |
-//! | upstream | stages whose frames another one reads |
-//! | pass | the loop of a stage over the frames that it has to make |
-//! | record | the manifest of a frame's files, written last: the frame is done when it is there |
-//! | settings | the values that a stage depends on; another value makes its frames again |
-//! | state | from what a pass resumes exactly: a stage's own files, or bytes in `state/` |
+//! | shot | the frames of a scene and their output folder |
+//! | stage | a part of a shot with its own files: objects, base, grains, mist, volumes, surface, liquid |
+//! | upstream | the stages whose frames a stage reads |
+//! | pass | a stage's loop over the frames to be made |
+//! | record | the manifest of a frame's files, written last: a frame is done when it exists |
+//! | settings | the values that a stage depends on; if one changes, its frames are made again |
+//! | state | what a pass resumes from exactly: a stage's own files, or bytes in `state/` |
 
 mod moving;
 mod objects;
@@ -41,8 +41,8 @@ use crate::motion::Space;
 use crate::snow::NoiseParams;
 use std::path::{Path, PathBuf};
 
-/// A scene with every default filled in and every path absolute. Immutable after parsing: what a stage
-/// reads, and the settings by which its frames are recognised, follow from its text alone.
+/// A scene with every default filled in and every path absolute. Immutable after parsing: what a stage reads, and the settings that
+/// identify its frames, follow from its text alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     pub(crate) path: PathBuf,
@@ -53,11 +53,11 @@ pub struct Scene {
     pub(crate) shallow: Option<Shallow>,
     pub(crate) objects: Vec<Object>,
     pub(crate) output: Output,
-    /// The value of every key, from which the others are made.
+    /// The value of every key; the other fields are derived from them.
     pub(crate) values: Values,
 }
 
-/// What a scene is about: the system that makes it, whose table it has.
+/// The subject of a scene: the system that makes it, named by the scene's table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum System {
     /// `[snow]`: objects move through a deep layer of snow.
@@ -72,7 +72,7 @@ impl System {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Snow, Self::Surface, Self::Shallow];
 
-    /// Its table in a scene, and its command.
+    /// The name of its table in a scene, and of its command.
     pub fn name(self) -> &'static str {
         match self {
             Self::Snow => "snow",
@@ -81,7 +81,7 @@ impl System {
         }
     }
 
-    /// What its scenes are about, in a few words.
+    /// What its scenes show, in a few words.
     pub(crate) fn title(self) -> &'static str {
         match self {
             Self::Snow => "Snow that objects press into",
@@ -91,29 +91,29 @@ impl System {
     }
 }
 
-/// Which frames are made, how fast.
+/// The frames of a shot, and their rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shot {
     /// First and last frame.
     pub frames: Frames,
-    /// Frames per second, over 0, up to 100,000.
+    /// Frames per second, above 0, up to 100,000.
     pub fps: f64,
 }
 
 /// The layer of snow before the first frame, and how it is edited.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snow {
-    /// What the snow lies on; may be absent when `layer` is a .vdb, where only grains lie on it.
+    /// What the snow lies on; optional if `layer` is a .vdb, where only grains lie on it.
     pub ground: Option<Ground>,
     /// How the layer is given.
     pub layer: Layer,
     /// A position in the meshes of ground and top (m) that becomes the origin.
     pub origin: DVec3,
-    /// Edge of a voxel (m), over 0, up to 10.
+    /// Edge of a voxel (m), above 0, up to 10.
     pub cell: f64,
     /// Raggedness of the edges; an amplitude of 0 switches it off.
     pub noise: NoiseParams,
-    /// Islands of fewer voxels are taken away, 0..=10,000; 0: all stay.
+    /// Islands of fewer voxels are removed, 0..=10,000; 0: none are.
     pub min_crumb: usize,
 }
 
@@ -124,7 +124,7 @@ pub enum Ground {
     Plane {
         /// Its y (m).
         height: f64,
-        /// The layer's least and greatest x and z: `[x0, z0, x1, z1]` (m); none beside a .vdb layer.
+        /// Minimum and maximum x and z of the layer: `[x0, z0, x1, z1]` (m); `None` beside a .vdb layer.
         area: Option<[f64; 4]>,
     },
     /// A mesh file.
@@ -147,13 +147,13 @@ pub enum Layer {
 pub struct Object {
     /// A glTF character, a mesh file, or the pattern of a sequence of them (`body.%04d.obj`).
     pub file: PathBuf,
-    /// Of a character only the nodes of this name (`*` stands for any letters) and what hangs on them.
+    /// For a character: only the nodes of this name (`*` matches any letters) and their descendants.
     pub node: Option<String>,
-    /// The character's clip; none: its only one.
+    /// The character's clip; `None`: its only one.
     pub clip: Option<String>,
     /// Whether the clip starts again when it ends.
     pub repeat: bool,
-    /// Its sequence, or its clip, starts this many frames later; a clip starts at the shot's first frame.
+    /// Its sequence, or its clip, starts this many frames later; without offset a clip starts at the shot's first frame.
     pub offset: f64,
     /// The file's unit and upward axis.
     pub space: Space,
@@ -161,18 +161,18 @@ pub struct Object {
     pub role: Role,
     /// Whether its cuts have ragged edges.
     pub noise: bool,
-    /// Rigid motion composed over the file's own; ascending frames; may be empty.
+    /// Rigid motion on top of the file's own; ascending frames; may be empty.
     pub keys: Vec<KeyPose>,
-    /// Whether the keys are joined smoothly: see [`crate::motion::Keys::with_ease`].
+    /// Whether the motion between keys is eased: see [`crate::motion::Keys::with_ease`].
     pub ease: bool,
 }
 
-/// A rigid pose at a frame; linear in between (or with ease), constant before the first and after the last.
+/// A rigid pose at a frame; linear in between (or eased), constant before the first and after the last.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct KeyPose {
     /// Frame of the shot.
     pub frame: f64,
-    /// Where the object's origin is (m).
+    /// Position of the object's origin (m).
     pub at: [f64; 3],
     /// Turns about the x, then the y, then the z axis (degrees).
     pub turn_deg: [f64; 3],
@@ -181,11 +181,11 @@ pub struct KeyPose {
 /// What an object does to the snow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// It moves through the snow, takes away what it touches, and pushes grains.
+    /// It moves through the snow, removes what it touches, and pushes grains.
     Collide,
-    /// It takes snow away, and pushes no grains.
+    /// It removes snow, but pushes no grains.
     Base,
-    /// It pushes grains, and takes no snow away.
+    /// It pushes grains, but removes no snow.
     Grains,
     /// The snow lies on it from the start.
     Static,
@@ -194,25 +194,25 @@ pub enum Role {
 }
 
 impl Role {
-    /// Those of objects that move.
+    /// The roles of objects that move.
     pub const MOVING: [Self; 3] = [Self::Collide, Self::Base, Self::Grains];
 
-    /// Whether its object moves.
+    /// Whether an object with this role moves.
     pub fn moves(self) -> bool {
         Self::MOVING.contains(&self)
     }
 
-    /// Whether its object takes snow away.
+    /// Whether an object with this role removes snow.
     pub fn removes(self) -> bool {
         matches!(self, Self::Collide | Self::Base)
     }
 
-    /// Whether its object pushes grains.
+    /// Whether an object with this role pushes grains.
     pub fn pushes(self) -> bool {
         matches!(self, Self::Collide | Self::Grains)
     }
 
-    /// As a scene writes it.
+    /// Its name in a scene.
     pub fn name(self) -> &'static str {
         match self {
             Self::Collide => "collide",
@@ -224,14 +224,14 @@ impl Role {
     }
 }
 
-/// What is written.
+/// Which files are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Output {
     /// `base/base.%04d.vdb`.
     pub base: bool,
     /// How much of the base each frame's file holds.
     pub base_mode: BaseMode,
-    /// 16-bit values in `base` and `removed`: for rendering only; `state/` then keeps what continuing needs.
+    /// 16-bit values in `base` and `removed`: for rendering only; `state/` then keeps what resuming needs.
     pub half: bool,
     /// `removed/removed.%04d.vdb`.
     pub removed: bool,
@@ -241,7 +241,7 @@ pub struct Output {
     pub grains_ply: bool,
     /// `grains/grains.%04d.usda`.
     pub grains_usd: bool,
-    /// Whether most of the grains' .vdb files hold only what changed since the frame before.
+    /// Whether most of the grains' .vdb files hold only the changes since the previous frame.
     pub grains_delta: bool,
     /// `mist/mist.%04d.vdb`.
     pub mist: bool,
@@ -255,7 +255,7 @@ pub struct Output {
     pub usd: bool,
 }
 
-/// Which volumes to render, and meshes, are written.
+/// Which volumes for rendering, and which meshes, are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct VolumesOutput {
     /// In `fog/fog.%04d.vdb`: the density of the base.
@@ -273,12 +273,12 @@ pub struct VolumesOutput {
 }
 
 impl VolumesOutput {
-    /// Whether there is a fog.
+    /// Whether any fog is written.
     pub fn fog(self) -> bool {
         self.fog_base || self.fog_grains || self.fog_mist
     }
 
-    /// Whether there is a mesh.
+    /// Whether any mesh is written.
     pub fn mesh(self) -> bool {
         self.mesh_ply || self.mesh_usd
     }
@@ -294,17 +294,17 @@ pub enum BaseMode {
 }
 
 impl Scene {
-    /// The file it came from.
+    /// The file that it was read from.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What it is about.
+    /// Its system.
     pub fn system(&self) -> System {
         self.system
     }
 
-    /// Which frames, how fast.
+    /// Its frames and frame rate.
     pub fn shot(&self) -> Shot {
         self.shot
     }
@@ -314,7 +314,7 @@ impl Scene {
         &self.objects
     }
 
-    /// What is written.
+    /// Which files are written.
     pub fn output(&self) -> Output {
         self.output
     }
@@ -327,7 +327,7 @@ impl Scene {
     /// Its layer of snow.
     ///
     /// # Errors
-    /// It has none.
+    /// A scene without snow.
     pub fn snow(&self) -> Result<&Snow> {
         self.snow
             .as_ref()
@@ -337,7 +337,7 @@ impl Scene {
     /// How its mesh follows a liquid.
     ///
     /// # Errors
-    /// It has no such mesh.
+    /// A scene without such a mesh.
     pub fn surface(&self) -> Result<&Surface> {
         self.surface
             .as_ref()
@@ -347,14 +347,14 @@ impl Scene {
     /// How its liquid flows over a terrain.
     ///
     /// # Errors
-    /// It has no such liquid.
+    /// A scene without such a liquid.
     pub fn shallow(&self) -> Result<&Shallow> {
         self.shallow
             .as_ref()
             .ok_or_else(|| Error::argument(format!("{}: `shallow` is missing", self.path.display())))
     }
 
-    /// The files that it reads; of sequences those of its own first frame.
+    /// The files that it reads; for sequences those of its own first frame.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         let mut out = Vec::new();
         if let Some(shallow) = &self.shallow {
@@ -386,7 +386,7 @@ impl Scene {
 }
 
 impl Snow {
-    /// The files that make it, by their keys.
+    /// The files that describe it, with their keys.
     pub(crate) fn files(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
         let ground = match &self.ground {
             Some(Ground::Mesh(path)) => Some(("snow.ground", path)),
@@ -401,7 +401,7 @@ impl Snow {
 }
 
 impl Output {
-    /// Whether a run can resume from the base's own files.
+    /// Whether a run can resume from the files of the base alone.
     pub fn base_restarts(&self) -> bool {
         self.base && !self.half
     }

@@ -1,4 +1,4 @@
-//! Objects that move: the files of their sequences, and their names.
+//! Moving objects: the files of their sequences, and their names.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ fn sequences(scene: &Scene) -> impl Iterator<Item = (Pattern, f64)> + '_ {
     moving.filter_map(|object| Some((Pattern::parse(&object.file)?, object.offset)))
 }
 
-/// The files of sequences that a frame's step reads: all it needs for its interval of time.
+/// The files of sequences that a frame's step reads: all that cover its time interval.
 pub(super) fn files(scene: &Scene, frame: i32) -> Vec<PathBuf> {
     let mut out = Vec::new();
     for (pattern, offset) in sequences(scene) {
@@ -23,13 +23,13 @@ pub(super) fn files(scene: &Scene, frame: i32) -> Vec<PathBuf> {
     out
 }
 
-/// The files of sequences that only a frame's velocities over the coming frame read.
+/// The files of sequences that are read only for a frame's velocities over the coming frame.
 pub(super) fn files_ahead(scene: &Scene, frame: i32) -> Vec<PathBuf> {
     let number = |offset: f64| (f64::from(frame) + 1.0 - offset).ceil() as i32;
     sequences(scene).map(|(pattern, offset)| pattern.path(number(offset))).collect()
 }
 
-/// Names of the moving objects' prims, each once.
+/// Names of the moving objects' prims, each unique.
 pub(super) fn prim_names(scene: &Scene) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for object in scene.objects.iter().filter(|object| object.role.moves()) {
@@ -39,7 +39,7 @@ pub(super) fn prim_names(scene: &Scene) -> Vec<String> {
         let count =
             names.iter().filter(|name| **name == stem || name.starts_with(&format!("{stem}_"))).count();
         let numbered = |number: usize| if number == 1 { stem.clone() } else { format!("{stem}_{number}") };
-        // Another file may bear the name that the number gives.
+        // The numbered name may already belong to another file.
         let name = (count + 1..).map(numbered).find(|name| !names.contains(name)).unwrap_or_default();
         names.push(name);
     }

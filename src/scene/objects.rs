@@ -25,14 +25,14 @@ pub struct Objects<'a> {
     names: Vec<String>,
 }
 
-/// The objects at a frame: positions (m) and velocities (m/s) of each one's vertices.
+/// The objects at a frame: positions (m) and velocities (m/s) of their vertices.
 pub struct Poses {
     frame: i32,
     meshes: Vec<(Vec<Vec3>, Vec<Vec3>)>,
 }
 
 impl<'a> Objects<'a> {
-    /// Those of a scene; `bodies` are in its order.
+    /// The objects of a scene; `bodies` are in its order.
     pub fn new(scene: &'a Scene, bodies: &'a [Body], seen: &'a Arc<Seen>) -> Self {
         Self { scene, bodies, seen, names: moving::prim_names(scene) }
     }
@@ -112,7 +112,7 @@ impl Stage for Objects<'_> {
     }
 }
 
-/// What the clips of `objects/` share.
+/// Manifest shared by the clips in `objects/`.
 const MANIFEST: &str = "objects/objects.manifest.usda";
 
 impl Stepping for Objects<'_> {

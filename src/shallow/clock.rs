@@ -1,4 +1,4 @@
-//! The time that a frame's budget is measured in.
+//! The clock that a frame's time budget is measured by.
 
 use std::time::Instant;
 
@@ -6,14 +6,14 @@ use rustix::time::{ClockId, Timespec, clock_gettime};
 
 /// A clock that counts from its start.
 pub enum Clock {
-    /// CPU time of the thread that started it: another process that takes the core does not shorten a frame.
+    /// CPU time of the thread that started it: being pre-empted by another process does not shorten a frame.
     Thread(Timespec),
-    /// Time, where several threads work.
+    /// Wall-clock time, where several threads work.
     Wall(Instant),
 }
 
 impl Clock {
-    /// Starts one.
+    /// Starts a clock.
     pub fn start(are_several: bool) -> Self {
         if are_several {
             Self::Wall(Instant::now())

@@ -1,7 +1,8 @@
-//! Frames: in which steps they are made, and what ends them. One that fails or is cancelled leaves the liquid as it was.
+//! Frames: the choice of their steps, and how they end. A frame that fails or is cancelled leaves the liquid as it was.
 //!
-//! For that a frame that may take long begins with a copy of what it changes, 20 bytes a column where there is liquid, and looks for a cancel between its steps,
-//! and between the rounds in which the heads of full columns are found. All others are over before a cancel would matter: they copy nothing.
+//! To allow this, a frame that may take long first copies what it changes, 20 bytes a column where there is liquid. It checks for
+//! cancellation between its steps, and between the iterations that find the heads of full columns. Other frames end before a cancel would
+//! matter: they copy nothing.
 
 use std::sync::atomic::AtomicBool;
 
@@ -24,14 +25,14 @@ pub(super) struct Kept {
     steps: Vec<f64>,
 }
 
-/// Columns times steps of a frame that may take long: some 20 ms.
+/// Columns times steps from which on a frame may take long: some 20 ms.
 const LONG: f64 = (1 << 21) as f64;
-/// A step of a few columns takes as long as so many.
+/// Fixed cost of a step, in columns.
 const EACH: f64 = 1024.0;
-/// A column that may be full counts as so many: its head is found in rounds.
+/// Cost of a column that may be full, in columns: its head is found iteratively.
 const FULL: f64 = 16.0;
 
-/// Refuses a length of a frame.
+/// Checks the length of a frame.
 pub(super) fn check_length(dt: f64) -> Result<()> {
     if LENGTHS.contains(&dt) {
         return Ok(());
@@ -39,14 +40,14 @@ pub(super) fn check_length(dt: f64) -> Result<()> {
     Err(outside("frame", dt))
 }
 
-/// The failure of a frame or a step of a length (s) out of range.
+/// The error for a length (s) of a frame or a step that is out of range.
 fn outside(noun: &str, length: f64) -> Error {
     let (least, most) = LENGTHS.into_inner();
     let [least, most] = [least, most].map(digits::end);
     Error::argument(format!("a {noun} of {} s is not within {least} to {most} s", digits::given(length)))
 }
 
-/// The failure of a frame that would take too many steps, after some of them.
+/// The error for a frame that would take too many steps; raised after some of them.
 pub(super) fn too_many_steps(dt: f64, done: f64, length: f64) -> Error {
     let [dt, done, length] = [dt, done, length].map(digits::given);
     Error::argument(format!(
@@ -57,20 +58,20 @@ pub(super) fn too_many_steps(dt: f64, done: f64, length: f64) -> Error {
 impl Shallow {
     /// One frame of `dt` (s), 1e-12 to 1e6.
     ///
-    /// The context is asked whether it is cancelled at the start, and where the frame may take long (exact steps; over some two million columns times steps; many
-    /// full columns) in its course, too: within some milliseconds. The caller's thread does all the work, or, where there are many columns,
-    /// the threads of its pool do, which are entered once. Nothing is allocated, locked, logged or polled by a pool without threads, but for
-    /// the list of steps when it grows.
+    /// Cancellation is checked at the start and, if the frame may take long (exact steps; over some two million columns times steps; many
+    /// full columns), every few milliseconds. The caller's thread does all the work; with many columns, the threads of its pool do, and
+    /// they are entered once. With a pool without threads, nothing is allocated, locked, logged or polled, except that the list of steps
+    /// may grow.
     ///
     /// # Errors
-    /// `Argument`: dt out of range, or it needs over a million steps. `Cancelled`. In either case the liquid is as it was.
+    /// `Argument`: dt out of range, or over a million steps needed. `Cancelled`. In either case the liquid is as it was.
     pub fn step(&mut self, ctx: &Context, dt: f64) -> Result<Report> {
         self.frame(ctx, dt, None, |pace| Some(time_step::next(pace)))
     }
 
-    /// As [`Shallow::step`], but when the calling thread has worked for `budget` (s), or, where several do, so long has passed, the frame ends
-    /// early, and the rest of its time is dropped. At least one step is made. Another run drops other times: [`Shallow::replay`] makes the
-    /// same one again.
+    /// As [`Shallow::step`], but the frame ends early, and the rest of its time is dropped, once the calling thread has worked for `budget`
+    /// (s); where several threads work, wall-clock time counts. At least one step is made. Another run may end elsewhere:
+    /// [`Shallow::replay`] repeats a frame exactly.
     ///
     /// # Errors
     /// As [`Shallow::step`]; also when the budget is not positive.
@@ -83,7 +84,7 @@ impl Shallow {
         self.frame(ctx, dt, None, next)
     }
 
-    /// A frame of given steps (s), as [`Shallow::last_steps`] has listed them.
+    /// A frame of given steps (s), as listed by [`Shallow::last_steps`].
     ///
     /// # Errors
     /// As [`Shallow::step`].
@@ -95,7 +96,7 @@ impl Shallow {
         self.frame(ctx, steps.iter().sum(), Some(steps.len()), next)
     }
 
-    /// A frame; the count of its steps, where that is known.
+    /// A frame; `count` is the number of its steps, if known.
     fn frame(
         &mut self,
         ctx: &Context,
@@ -118,7 +119,7 @@ impl Shallow {
         }
     }
 
-    /// All of a frame, or nothing of it.
+    /// Makes the whole frame or leaves the liquid as it was.
     fn whole(
         &mut self,
         dt: f64,
@@ -137,10 +138,10 @@ impl Shallow {
         result
     }
 
-    /// Whether a frame, of so many steps where that is known, may take so long that a cancel should end it.
+    /// Whether a frame may take so long that it should be cancellable; `count` is the number of its steps, if known.
     pub(super) fn may_take_long(&mut self, dt: f64, count: Option<usize>) -> bool {
         let steps = match (count, self.params.pace) {
-            // Given steps may be so long that columns fill in their course, and how long exact ones are only shows in theirs.
+            // Given steps may be so long that columns fill up on the way; the number of exact steps is only known at the end.
             (Some(_), _) | (None, Pace::Exact) => return true,
             (None, Pace::Realtime(longest)) => (dt / longest).max(1.0),
         };
@@ -150,7 +151,7 @@ impl Shallow {
 
     fn keep(&mut self) {
         let mut kept = std::mem::take(&mut self.kept);
-        // Not again when the liquid spreads.
+        // Reserved once: not again when the liquid spreads.
         kept.state.clear();
         kept.state.reserve(self.most_save_size());
         self.save_into(&mut kept.state);
@@ -165,7 +166,7 @@ impl Shallow {
         self.kept = kept;
     }
 
-    /// The steps of a frame, in which the liquid is as thick as what it carries makes it at the beginning.
+    /// The steps of a frame, with the viscosity that the scalars have at its beginning.
     fn steps(&mut self, dt: f64, next: impl Fn(&Next) -> Option<f64>, stop: &Stop) -> Result<Report> {
         let Self { params, thick, columns, flow, pipes, .. } = &mut *self;
         let Some(law) = params.thickening else { return self.flow_on(dt, next, stop) };

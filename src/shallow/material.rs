@@ -1,4 +1,4 @@
-//! What flows.
+//! Materials: the viscosity of liquids.
 
 use crate::error::{Error, Result};
 use crate::numeric::digits;
@@ -6,18 +6,18 @@ use crate::numeric::digits;
 /// A liquid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Liquid {
-    /// Kinematic viscosity nu (m2/s), 0 and up; of a liquid that thins, at rest.
+    /// Kinematic viscosity nu (m2/s), 0 and up; of a shear-thinning liquid, at rest.
     pub viscosity: f64,
-    /// How it thins under shear; none: it does not.
+    /// How it thins under shear; None: it does not.
     pub thinning: Option<Carreau>,
 }
 
 /// Carreau's law: nu = nu_inf + (nu - nu_inf) (1 + (lambda rate)^2)^((n - 1) / 2), of the shear rate at the ground, 3 u / H.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Carreau {
-    /// nu_inf (m2/s): viscosity under strong shear; not over the one at rest.
+    /// nu_inf (m2/s): viscosity under strong shear; at most the viscosity at rest.
     pub thinnest: f64,
-    /// lambda (s), over 0.
+    /// lambda (s), above 0.
     pub time: f64,
     /// n, 0 to 1.
     pub power: f64,
@@ -43,7 +43,7 @@ impl Liquid {
         thinning: Some(Carreau { thinnest: 3.25e-6, time: 3.313, power: 0.3568 }),
     };
 
-    /// The liquid of a name: water, blood, paint or honey.
+    /// The liquid with this name: water, blood, paint or honey.
     pub fn named(name: &str) -> Option<Self> {
         Some(match name {
             "water" => Self::WATER,

@@ -5,21 +5,22 @@
 //! | word | meaning |
 //! |---|---|
 //! | cell | a square of the ground |
-//! | column | the room for liquid above a solid of a cell, from its *base* to its *ceiling* |
-//! | layer | which column of its cell one is, counted from the lowest |
-//! | strip | 16 columns of one layer, neighbours in a row: what SIMD loads work on |
-//! | pipe | joins columns of adjacent cells; *regular* pipes join columns of one layer, *links* all others, and lead out of the domain |
-//! | cliff, overflow edge | where liquid may fall freely; a link that it falls from (`Lips` in the code) |
+//! | column | the space for liquid above a solid of a cell, from its *base* to its *ceiling* |
+//! | layer | index of a column within its cell, counted from the lowest |
+//! | strip | 16 adjacent columns of one layer along x: the unit of SIMD loads |
+//! | pipe | joins columns of adjacent cells; *regular* pipes join columns of one layer; *links* are all others, and also lead out of the domain |
+//! | donor, receiver | the columns that liquid leaves and enters through a pipe |
+//! | cliff, overflow edge | a drop where liquid may fall freely; a link that it falls from in a step (`Lips` in the code) |
 //! | flux | volume per time through a pipe |
-//! | transfer | what a flux moves in a step, in whole units |
-//! | unit | the smallest difference of heights and depths, which are integers, so that liquid is neither lost nor made |
-//! | amount | what a column holds of a scalar, an integer, too |
-//! | head | the height to which a column's liquid would rise: its surface, or, if it is full up to its ceiling, what its pressure stands for |
-//! | rest, active | strips where no step changes anything are passed over; all others are active |
-//! | packet, rivulet | liquid in the air; overflow edges close to each other whose packets fall as one thread |
-//! | near | the box of fine cells of a liquid in cells of two sizes (`two_level/`) |
+//! | transfer | what a flux moves in a step, in whole units; its *remainder* waits for the next step |
+//! | unit | the resolution of heights and depths; these are integers, so that liquid is neither lost nor created |
+//! | amount | how much of a scalar a column holds; also an integer |
+//! | head | the height to which a column's liquid would rise: its surface or, if it is full to its ceiling, the equivalent of its pressure |
+//! | rest, active | strips in which no step changes anything are skipped; all others are active |
+//! | packet, rivulet | a parcel of liquid in the air; nearby overflow edges whose packets fall as one stream (`Threads` in the code) |
+//! | near | the box of fine cells in a liquid with cells of two sizes (`two_level/`) |
 //!
-//! The surface has words of its own (`surface/mod.rs`).
+//! For the terms of the surface see `surface/mod.rs`.
 
 mod clock;
 pub mod columns;

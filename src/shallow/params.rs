@@ -1,4 +1,4 @@
-//! What a user chooses.
+//! Parameters of the simulation.
 
 use super::free_fall::Falls;
 use super::material::Liquid;
@@ -9,60 +9,61 @@ use crate::error::{Error, Result};
 /// Parameters of the flow.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Params {
-    /// What flows; blood.
+    /// The liquid. Default: blood.
     pub liquid: Liquid,
-    /// Gravity (m/s2), which may turn, but points down; (0, -9.81, 0).
+    /// Gravity (m/s2); its direction may change but must point down. Default: (0, -9.81, 0).
     pub gravity: [f64; 3],
-    /// omega: the share of a flux that is kept in a second, 0 to 1; 0.5 (thesis 4.1.1). At 1 nothing is lost but by viscosity.
+    /// omega: the share of a flux that is kept in a second, 0 to 1. Default: 0.5 (thesis 4.1.1). At 1 only viscosity dissipates.
     pub kept: f64,
     /// How a frame is divided into steps.
     pub pace: Pace,
-    /// What lies beyond the border of the domain; a wall. Chosen once.
+    /// What lies beyond the border of the domain. Default: a wall. Fixed at creation.
     pub border: Border,
-    /// The section A of a pipe in Eq. 4.1.
+    /// The cross-section A of a pipe in Eq. 4.1.
     pub section: Section,
-    /// Where viscosity holds the liquid back. Chosen once.
+    /// Where viscous drag acts. Fixed at creation.
     pub friction: Friction,
-    /// How viscosity depends on what the liquid carries; none: it does not. The scalar has to be there when a frame begins.
+    /// How viscosity depends on a scalar; None: it does not. The scalar must exist when a frame begins.
     pub thickening: Option<Thickening>,
-    /// How liquid falls freely over edges; none: it is below at once. Chosen once.
+    /// How liquid falls freely over edges; None: it arrives below at once. Fixed at creation.
     pub falls: Option<Falls>,
-    /// Where the liquid is slower than this (m/s), and its surface so level that in 1/60 s it would not get faster from rest, it comes to rest; 0 to 0.01.
-    /// 1e-6 does well: a micrometre a second on a slope of 6e-6. Pools at rest sleep, and cost nothing; while liquid moves, the test takes a third of a step
-    /// more. 0: never; nor beside walls ([`Friction::Walls`]), where what flows drags along
-    /// what is beside it.
+    /// Speed (m/s) below which liquid comes to rest, where its surface is also so level that in 1/60 s it would not exceed this speed from
+    /// rest; 0 to 0.01. 1e-6 works well: a micrometre a second, and a slope of 6e-6. Pools at rest sleep and cost nothing; while liquid
+    /// moves, the test makes a step a third slower. 0: never. It has no effect with wall friction ([`Friction::Walls`]), where flowing
+    /// liquid drags along what is beside it.
     pub rest: f64,
 }
 
 /// How a frame is divided into steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pace {
-    /// As many as stability needs.
+    /// As many steps as stability needs.
     Exact,
-    /// Of at most this length (s): where liquid is too deep for that, its waves slow down; films on slopes that would move more than a third of their
-    /// depth from cell to cell in a step are held back to that ([`Report::slowed`](super::Report)). 0.003 in the thesis (Table 4.1).
+    /// Steps of at most this length (s): where liquid is too deep for them, its waves slow down. Films on slopes that would move more than
+    /// a third of their depth from cell to cell in a step are limited to a third ([`Report::slowed`](super::Report)). 0.003 in the thesis
+    /// (Table 4.1).
     Realtime(f64),
 }
 
-/// The section of a pipe.
+/// The cross-section of a pipe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Section {
-    /// dx H: what is wet.
+    /// dx H: the wetted section.
     #[default]
     Wetted,
-    /// dx^2, as the thesis has it: for comparison.
+    /// dx^2, as in the thesis: for comparison.
     Whole,
 }
 
-/// Where viscosity holds the liquid back.
+/// Where viscous drag acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Friction {
-    /// At the ground, as in the thesis: right where the liquid is far wider than deep.
+    /// At the ground, as in the thesis: accurate where the liquid is far wider than deep.
     #[default]
     Ground,
-    /// Also at walls and ceilings, and between liquids that flow beside each other: ducts and channels of any width carry what they do in theory, to
-    /// a few percent (Galerkin's method with the profile of a film). Films thinner than a sixteenth of a cell cost nothing more; nor does it act
-    /// without viscosity, or with [`Section::Whole`]. A closed border is a wall, too. It takes 86 bytes a column.
+    /// Also at walls and ceilings, and between liquids that flow side by side: the discharge of ducts and channels of any width agrees with
+    /// theory to a few percent (Galerkin's method with the profile of a film). Films thinner than a sixteenth of a cell cost nothing more.
+    /// It has no effect without viscosity, or with [`Section::Whole`]. A closed border is a wall, too. Takes 86 bytes a column.
     Walls,
 }
 

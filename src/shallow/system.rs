@@ -1,4 +1,4 @@
-//! The liquid of a domain, frame by frame.
+//! The liquid of a domain, and its frames.
 
 use super::columns::Columns;
 use super::columns::grid::BOTTOMLESS;
@@ -21,11 +21,11 @@ use super::time_step::{Measures, Next};
 use crate::context::Context;
 use crate::error::{Error, Result};
 
-/// Liquid that flows over a terrain.
+/// Liquid that flows over terrain.
 pub struct Shallow {
     pub(super) params: Params,
     pub(super) columns: Columns,
-    /// Where the columns change, a new one takes its place.
+    /// Replaced whenever the columns change.
     pub(super) identity: Identity,
     pub(super) pipes: Pipes,
     pub(super) flow: Flow,
@@ -33,11 +33,11 @@ pub struct Shallow {
     pub(super) remap: Remap,
     pub(super) falls: Falling,
     pub(super) thick: Thick,
-    /// The state at the beginning of a frame that may take long.
+    /// Copy of the state at the beginning of a frame that may take long.
     pub(super) kept: Kept,
-    /// Cells that are another liquid's.
+    /// Cells that belong to another liquid.
     pub(super) apart: Option<Apart>,
-    /// Units poured in, less those taken out, other than by flow points.
+    /// Units poured in, less those removed, other than by flow points.
     pub(super) poured: i64,
     /// Surface of the liquid at rest beyond an absorbing border (units), or BOTTOMLESS.
     pub(super) still: i32,
@@ -47,59 +47,59 @@ pub struct Shallow {
     pub(super) steps: Vec<f64>,
 }
 
-/// What a frame did.
+/// Results of a frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Report {
     /// Count of steps.
     pub steps: u32,
-    /// Simulated time (s): less than was asked for when the budget ran out.
+    /// Simulated time (s): less than requested if the budget ran out.
     pub seconds: f64,
-    /// Greatest depth (m).
+    /// Maximum depth (m).
     pub deepest: f64,
-    /// Rows, summed over steps, in which columns would have given more than they had (K_min under 1).
+    /// Rows, summed over steps, in which columns would have given more than they had (K_min below 1).
     pub emptied: u64,
-    /// Rows, summed over steps, in which columns would have taken more than they had room for (K_max under 1).
+    /// Rows, summed over steps, in which columns would have received more than they had room for (K_max below 1).
     pub filled: u64,
-    /// Rows, summed over steps, in which films on slopes would have gone so fast that steps of this length could not follow, and were held back
+    /// Rows, summed over steps, in which films on slopes were too fast for the step length and were limited
     /// ([`Pace::Realtime`](super::params::Pace)).
     pub slowed: u64,
 }
 
-/// Where all liquid is (m3).
+/// Where all the liquid is (m3).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Balance {
     /// In the columns.
     pub inside: f64,
     /// Poured in so far.
     pub poured: f64,
-    /// Come in through sources.
+    /// Added by sources.
     pub sourced: f64,
-    /// Gone out through drains.
+    /// Removed by drains.
     pub drained: f64,
-    /// Gone into absorbers.
+    /// Removed by absorbers.
     pub absorbed: f64,
-    /// Gone over the border, or into the void.
+    /// Lost over the border, or into the void.
     pub lost: f64,
-    /// Come in over an absorbing border.
+    /// Entered over an absorbing border.
     pub gained: f64,
-    /// Waiting for room, where the terrain moved.
+    /// Waiting for room after the terrain moved.
     pub held: f64,
     /// In the air ([`Params::falls`]).
     pub falling: f64,
-    /// What is missing (units): 0.
+    /// Units unaccounted for: 0.
     pub error: i64,
 }
 
 impl Shallow {
-    /// Dry ground.
+    /// A dry domain.
     ///
     /// # Errors
-    /// `Argument`: numbers out of range, a terrain without a surface in the domain. `Memory`: more than the context allows.
+    /// `Argument`: numbers out of range; a terrain without a surface in the domain. `Memory`: more than the context allows.
     pub fn new(ctx: &Context, solids: &Solids, params: Params) -> Result<Self> {
         Self::beside(ctx, solids, params, None)
     }
 
-    /// As [`Shallow::new`], beside cells that are another liquid's.
+    /// As [`Shallow::new`], beside cells that belong to another liquid.
     pub(super) fn beside(
         ctx: &Context,
         solids: &Solids,
@@ -152,7 +152,7 @@ impl Shallow {
     /// Changes the parameters.
     ///
     /// # Errors
-    /// `Argument`: numbers out of range, another border, other falls, or other friction.
+    /// `Argument`: numbers out of range; a different border, falls or friction.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
         params.validate()?;
         if params.border != self.params.border {
@@ -171,7 +171,7 @@ impl Shallow {
         Ok(())
     }
 
-    /// Whether pools at rest are worked on all the same, which takes longer, and changes nothing else: for comparison.
+    /// Sets whether pools at rest are stepped, too. This is slower and has the same result: for comparison.
     pub fn set_sleepless(&mut self, is_sleepless: bool) {
         self.flow.set_sleepless(is_sleepless);
     }
@@ -191,12 +191,12 @@ impl Shallow {
         self.flow.flux.each_ref().map(|numbers| &numbers[..])
     }
 
-    /// Length of the step in whose measure fluxes are (s).
+    /// The step length (s) that fluxes refer to.
     pub fn last_step(&self) -> f64 {
         self.flow.last
     }
 
-    /// Memory of the columns, their pipes and what flows (bytes).
+    /// Memory of the columns, their pipes and the liquid (bytes).
     pub fn bytes(&self) -> usize {
         self.columns.bytes()
             + self.pipes.bytes()
@@ -210,12 +210,12 @@ impl Shallow {
         self.time
     }
 
-    /// Lengths of the last frame's steps (s): with them [`Shallow::replay`] makes the same frame.
+    /// Lengths of the last frame's steps (s): [`Shallow::replay`] repeats the frame with them.
     pub fn last_steps(&self) -> &[f64] {
         &self.steps
     }
 
-    /// Sets sources, drains and absorbers; `which` names one in an error.
+    /// Sets sources, drains and absorbers; `which` names one in an error message.
     ///
     /// # Errors
     /// As [`Flows::set`].
@@ -223,7 +223,7 @@ impl Shallow {
         self.flows.set(&self.columns, points, which)
     }
 
-    /// Adds a depth (m; negative: takes it) to a column, between 0 and its ceiling; returns what was added (m).
+    /// Adds a depth (m; negative: removes it) to a column, within 0 and its ceiling; returns the depth added (m).
     pub fn pour(&mut self, column: usize, depth: f64) -> f64 {
         let heights = self.columns.heights;
         let units = (depth / heights.unit).round().clamp(-4e9, 4e9) as i64;
@@ -233,8 +233,8 @@ impl Shallow {
         heights.length(added as f64)
     }
 
-    /// Fills all columns up to a height (m), or their ceiling; those that are fuller stay as they are. Beyond an absorbing border liquid
-    /// stands as high.
+    /// Fills all columns up to a height (m), or their ceiling; those that are fuller stay as they are. The level beyond an absorbing border
+    /// is set to this height, too.
     pub fn fill(&mut self, height: f64) {
         self.still = self.columns.heights.round(height);
         self.flow.rouse();
@@ -250,7 +250,7 @@ impl Shallow {
         }
     }
 
-    /// Begins a frame; returns how often its steps are halved, for fast films.
+    /// Begins a frame; returns how many times its steps are halved for fast films.
     pub(super) fn begin(&mut self, dt: f64, measures: &Measures, next: impl Fn(&Next) -> Option<f64>) -> u32 {
         self.steps.clear();
         self.flow.begin_frame(&self.columns, &self.pipes, time_step::bounds(&self.params, measures));
@@ -273,7 +273,7 @@ impl Shallow {
         report.slowed += u64::from(slowed);
     }
 
-    /// Where the frame is, of which so much is left (s).
+    /// The progress of the frame, with `left` (s) to go.
     pub(super) fn next<'a>(
         &'a self,
         measures: &'a Measures,
@@ -285,7 +285,7 @@ impl Shallow {
         Next { params: &self.params, measures, left, deepest, steps, last: self.flow.last, halvings }
     }
 
-    /// Finds the fast films of a frame, and how often they want its steps to be halved.
+    /// Finds the fast films of a frame, and how many times its steps have to be halved for them.
     fn find_fast(&mut self, dt: f64, measures: &Measures, next: impl Fn(&Next) -> Option<f64>) -> u32 {
         let Params { liquid, section, .. } = self.params;
         if liquid.viscosity == 0.0 || section == Section::Whole {
@@ -314,14 +314,14 @@ impl Shallow {
         }
     }
 
-    /// Where all liquid is.
+    /// Where all the liquid is.
     pub fn balance(&self) -> Balance {
         let units = self.units();
         let volume = self.columns.grid.cell * self.columns.grid.cell * self.columns.heights.unit;
         units.balance(volume)
     }
 
-    /// Where all liquid is, in units.
+    /// Where all the liquid is, in units.
     pub(super) fn units(&self) -> Units {
         Units {
             inside: self.flow.units(),
@@ -336,7 +336,7 @@ impl Shallow {
         }
     }
 
-    /// The mean velocity of a column over its depth (m/s), along x and z: at its surface it is 1.5 times as fast (Eq. 4.4). 0 where it is dry.
+    /// Mean velocity of a column over its depth (m/s), along x and z; the surface moves 1.5 times as fast (Eq. 4.4). 0 where it is dry.
     pub fn velocity(&self, index: usize) -> [f32; 2] {
         let depth = self.flow.depths()[index];
         if depth == 0 {
@@ -373,7 +373,7 @@ pub(super) struct Units {
 }
 
 impl Units {
-    /// The volumes of units of a volume (m3).
+    /// The volumes (m3), given the volume of a unit.
     pub fn balance(&self, volume: f64) -> Balance {
         let Self { inside, poured, sourced, drained, absorbed, lost, gained, held, falling } = *self;
         let cubic = |units: i64| units as f64 * volume;
@@ -392,7 +392,7 @@ impl Units {
     }
 }
 
-/// Bytes of a column with its pipes, and its share of strips.
+/// Bytes of a column with its pipes, and its share of a strip's data.
 const BYTES: u64 = 64;
-/// More of them for friction at walls.
+/// Additional bytes for friction at walls.
 const WALLS: u64 = 108;

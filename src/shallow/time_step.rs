@@ -1,4 +1,4 @@
-//! How long a step may be, and what the pipes share in it (thesis 4.3, Fig. 4.12).
+//! The length of steps, and the coefficients that all pipes share in a step (thesis 4.3, Fig. 4.12).
 
 use std::ops::RangeInclusive;
 
@@ -8,30 +8,30 @@ use super::solver::fast_films::FAST_WAVES;
 use super::solver::flux::{Step, Thinning};
 use super::solver::rest::Bounds;
 
-/// Steps are this much shorter than the bound of stability.
+/// Steps are shorter than the stability limit by this factor.
 const SAFETY: f64 = 0.9;
-/// Most steps in a frame: a frame that needs more is refused.
+/// Maximum count of steps in a frame: a frame that needs more is refused.
 pub const MOST_STEPS: u32 = 1_000_000;
-/// Lengths of frames, and of the steps of a replay (s). In shorter ones nothing would move, and numbers in single precision would not hold what they
-/// share.
+/// Range of lengths of frames, and of the steps of a replay (s). In shorter ones nothing would move, and coefficients would exceed single
+/// precision.
 pub const LENGTHS: RangeInclusive<f64> = 1e-12..=1e6;
 
-/// The domain's measures that steps depend on.
+/// Properties of the domain that steps depend on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measures {
     /// Edge of a cell (m).
     pub cell: f64,
     /// A unit of height (m).
     pub unit: f64,
-    /// Most pipes of a column.
+    /// Maximum count of pipes of a column.
     pub pipes: usize,
     /// Surface of the liquid at rest beyond the border (units), or BOTTOMLESS.
     pub still: i32,
 }
 
-/// The longest stable step (s) with liquid of a depth (m): the largest dt with P g A' dt^2 / dx^2 <= 1/q + zeta, for P pipes a column, and
-/// 1/q = 1 + 3 dt nu / H^2. With four pipes and nothing lost this is dt = dx / (c sqrt 2). Infinite where nothing bounds it, as on dry ground. `frame` is
-/// what is left of the frame (s).
+/// The longest stable step (s) for liquid of a depth (m): the largest dt with P g A' dt^2 / dx^2 <= 1/q + zeta, for P pipes a column, and
+/// 1/q = 1 + 3 dt nu / H^2. With four pipes and no loss this is dt = dx / (c sqrt 2). Infinite where nothing limits it, as on dry ground.
+/// `frame` is the time left in the frame (s).
 pub fn longest(params: &Params, measures: &Measures, depth: f64, frame: f64) -> f64 {
     let g = -params.gravity[1];
     let height = if params.section == Section::Wetted { depth } else { measures.cell };
@@ -44,27 +44,27 @@ pub fn longest(params: &Params, measures: &Measures, depth: f64, frame: f64) -> 
     SAFETY * (b + (b * b + 4.0 * a * c).sqrt()) / (2.0 * a)
 }
 
-/// The least viscosity (m2/s) that liquid may have.
+/// The minimum viscosity (m2/s) of the liquid.
 fn least_viscosity(params: &Params) -> f64 {
     let times = params.thickening.map_or(1.0, |law| law.times.min(1.0));
     params.liquid.least_viscosity() * times
 }
 
-/// The greatest depth (m) in a pipe's section for which steps of `dt` are stable without viscosity.
+/// The maximum depth (m) in a pipe's section at which steps of `dt` are stable without viscosity.
 fn deepest_section(params: &Params, measures: &Measures, dt: f64) -> f64 {
     let waves = measures.pipes as f64 * -params.gravity[1] * dt * dt / (measures.cell * measures.cell);
     SAFETY * SAFETY * (1.0 + libm::pow(params.kept, dt)) / waves
 }
 
-/// Where a frame is when its next step is chosen.
+/// State of the frame when its next step is chosen.
 pub struct Next<'a> {
     /// Parameters.
     pub params: &'a Params,
     /// Measures of the domain.
     pub measures: &'a Measures,
-    /// What is left of the frame (s).
+    /// Time left in the frame (s).
     pub left: f64,
-    /// Greatest depth (m).
+    /// Maximum depth (m).
     pub deepest: f64,
     /// Steps made in this frame.
     pub steps: u32,
@@ -74,7 +74,7 @@ pub struct Next<'a> {
     pub halvings: u32,
 }
 
-/// A step stays as long as it was while more is stable, up to this much more: each change of its length heats waves.
+/// A step keeps the last length while that is at least this part of the stable one: each change of the length adds energy to waves.
 const STEADY: f64 = 0.45;
 
 /// The length of the next step (s).
@@ -87,20 +87,20 @@ pub fn next(at: &Next) -> f64 {
         }
         Pace::Realtime(longest) => longest / halved,
     };
-    // Rounding of what is left is no reason for another step; where nothing bounds a step it takes all that is left.
+    // Rounding of the time left must not add a step. Where nothing limits a step, it takes all the time left.
     at.left / (at.left / longest - 1e-9).ceil().max(1.0)
 }
 
-/// How often steps are halved at most, so that a disturbance in fast films stays within a cell. Where it cannot, these are held back.
+/// Maximum count of halvings of a step, which keep a disturbance in a fast film within a cell. Where they cannot, the film is limited.
 pub fn most_halvings(params: &Params) -> u32 {
     if params.pace == Pace::Exact { 3 } else { 0 }
 }
 
-/// What a pipe of a fast film moves in a step at most, as part of the depth of the column that gives. A disturbance travels at three times the film's
-/// speed, and where this no longer grows with depth, at that speed: within a cell a step everywhere, or it would grow.
+/// Maximum transfer of a pipe of a fast film in a step, as part of the donor's depth. A disturbance travels at three times the film's speed
+/// or, where this no longer grows with depth, at that speed. It must stay within a cell a step everywhere, or it would grow.
 const FASTEST: f32 = 1.0 / 3.0;
 
-/// The mean of phi^2, phi being the profile of a film's velocity over its depth (`solver::lateral_friction`).
+/// Mean of phi^2, where phi is the profile of a film's velocity over its depth (`solver::lateral_friction`).
 const BESIDE: f64 = 1.2;
 
 /// g unit dt^2 / dx^2 of a step (1 / units).
@@ -109,38 +109,39 @@ pub fn drive(params: &Params, measures: &Measures, dt: f64) -> f64 {
     dt * dt * -params.gravity[1] * unit / (cell * cell)
 }
 
-/// The time (s) in which a surface that counts as level would bring liquid from rest to [`Params::rest`].
+/// Time (s) that a surface which counts as level would need to bring liquid from rest to [`Params::rest`].
 const LEVEL: f64 = 1.0 / 60.0;
 
-/// The speed (m/s) of what comes to rest. Beside walls nothing does: what flows drags along what is beside it.
+/// Speed (m/s) below which liquid comes to rest. With wall friction, none does: flowing liquid drags along what is beside it.
 fn rest(params: &Params) -> f64 {
     if params.friction == Friction::Walls { 0.0 } else { params.rest }
 }
 
-/// By how much surfaces of adjacent cells may differ where liquid comes to rest (units): a unit at least, unless it never does.
+/// Maximum difference of the surfaces of adjacent cells at which liquid comes to rest (units): at least a unit, or 0 if it never does.
 fn level(params: &Params, measures: &Measures) -> i32 {
     let fall = rest(params) * measures.cell / (LEVEL * -params.gravity[1]);
     if rest(params) > 0.0 { (fall / measures.unit).round().clamp(1.0, 1e6) as i32 } else { 0 }
 }
 
-/// Flux over the depth in its section, in a step of `dt` (s), that is slow: a level surface does not bring liquid at rest over it, in steps of any length.
+/// Maximum flux that counts as slow in a step of `dt` (s), over the depth in its section: a level surface never drives liquid at rest
+/// beyond it.
 fn slow(params: &Params, measures: &Measures, dt: f64) -> f64 {
     let driven = 1.001 * drive(params, measures, dt) * f64::from(level(params, measures));
     (rest(params) * dt / measures.cell).max(driven)
 }
 
-/// What gravity adds to the fall of the surface over a cell along x and along z (units).
+/// What gravity adds to the drop of the surface over a cell, along x and along z (units).
 fn tilt(params: &Params, measures: &Measures) -> [i32; 2] {
     let [x, y, z] = params.gravity;
     [x, z].map(|along| (along / -y * measures.cell / measures.unit).round().clamp(-1e9, 1e9) as i32)
 }
 
-/// What rests in all steps.
+/// The bounds of rest, the same for all steps.
 pub fn bounds(params: &Params, measures: &Measures) -> Bounds {
     Bounds { level: level(params, measures), tilt: tilt(params, measures), still: measures.still }
 }
 
-/// What the pipes share in a step of `dt` after one of `last` (s).
+/// The coefficients that the pipes share in a step of `dt` after one of `last` (s).
 pub fn step(params: &Params, measures: &Measures, dt: f64, last: f64) -> Step {
     let Measures { cell, unit, .. } = *measures;
     let y = params.gravity[1];

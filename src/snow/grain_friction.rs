@@ -1,11 +1,11 @@
-//! The friction between grains that gives a poured pile its slope.
+//! The friction between grains that determines the slope of a poured pile.
 //!
-//! Grains do not turn, so that a little friction holds steep piles; and those that do not attract each other are lighter the
-//! higher they lie, so that less does ([`grains`](crate::snow::grains)).
+//! Grains do not rotate, so a little friction holds steep piles. Grains without attraction are lighter the higher they lie, so they need
+//! less friction ([`grains`](crate::snow::grains)).
 
-/// Angles of poured piles (degrees) and the friction that gives them, on snow: what lies between the slopes of piles of 10,000 and of
-/// 30,000 grains, as `make gates ONLY=snow.grains.pile` pours them. Larger piles are steeper. From a friction of 0.03 on, each grain
-/// lies in a hollow between others; with less, piles flatten.
+/// Angles of poured piles (degrees) and the friction that gives them, on snow: midway between the slopes of piles of 10,000 and of 30,000
+/// grains, as poured by `make gates ONLY=snow.grains.pile`. Larger piles are steeper. From a friction of 0.03 on, each grain lies in a
+/// hollow between others; with less, piles flatten.
 const LOOSE: [(f64, f64); 11] = [
     (0.0, 0.0),
     (12.1, 0.02),
@@ -20,7 +20,7 @@ const LOOSE: [(f64, f64); 11] = [
     (STEEPEST, 0.235),
 ];
 
-/// The same of grains that attract each other, as little as they can.
+/// The same for grains with the weakest attraction.
 const COHESIVE: [(f64, f64); 11] = [
     (0.0, 0.0),
     (5.5, 0.06),
@@ -42,8 +42,7 @@ fn piles(attracts: bool) -> &'static [(f64, f64)] {
     if attracts { &COHESIVE } else { &LOOSE }
 }
 
-/// The angle of repose (degrees) of piles with a friction, of grains that attract each other or do not; the reverse of
-/// [`of_repose`].
+/// The angle of repose (degrees) of piles with a given friction, with or without attraction between grains; the inverse of [`of_repose`].
 pub fn repose_of(friction: f64, attracts: bool) -> f64 {
     let piles = piles(attracts);
     let above = piles.iter().position(|(_, most)| *most >= friction).unwrap_or(piles.len() - 1).max(1);
@@ -51,8 +50,7 @@ pub fn repose_of(friction: f64, attracts: bool) -> f64 {
     low + (high - low) * ((friction - least) / (most - least)).clamp(0.0, 1.0)
 }
 
-/// The friction whose poured pile, of grains that attract each other or do not, has an angle of repose (degrees),
-/// 0..=[`STEEPEST`].
+/// The friction with which a poured pile, with or without attraction between grains, has an angle of repose (degrees), 0..=[`STEEPEST`].
 pub fn of_repose(repose: f64, attracts: bool) -> f64 {
     let piles = piles(attracts);
     let above = piles.iter().position(|(angle, _)| *angle >= repose).unwrap_or(piles.len() - 1).max(1);

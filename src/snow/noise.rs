@@ -1,4 +1,4 @@
-//! How ragged the edges of prints are.
+//! Raggedness of the edges of prints.
 
 use std::ops::RangeInclusive;
 
@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 /// Irregularity of an imprint's surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseParams {
-    /// Greatest outward displacement (m). 0 switches the noise off.
+    /// Maximum outward displacement (m). 0 switches the noise off.
     pub amplitude: f64,
     /// Size of the largest clumps (m).
     pub size: f64,
@@ -53,19 +53,19 @@ impl NoiseParams {
         Ok(())
     }
 
-    /// Amplitudes (m) that make sense for a cell size (m).
+    /// Sensible amplitudes (m) for a cell size (m).
     pub fn amplitudes(cell: f64) -> RangeInclusive<f64> {
         0.0..=32.0 * cell
     }
 
-    /// Sizes (m) that make sense for a cell size (m): below two cells the grid cannot hold the noise.
+    /// Sensible sizes (m) for a cell size (m): below two cells the grid cannot represent the noise.
     pub fn sizes(cell: f64) -> RangeInclusive<f64> {
         2.0 * cell..=10_000.0 * cell
     }
 
-    /// The greatest amplitude (m) that leaves no islands at this size: the displacement's slope stays below 1.
+    /// The maximum amplitude (m) that leaves no islands at this size: the displacement's slope stays below 1.
     ///
-    /// Octave o has strength 4^-o and slope 2^-o, of a sum scaled to 1.
+    /// Octave o has strength 4^-o and slope 2^-o, within a sum scaled to 1.
     pub fn steepest(&self) -> f64 {
         let sum = |ratio: f64| (0..self.octaves).map(|octave| ratio.powi(octave as i32)).sum::<f64>();
         self.size * sum(0.25) / (STEEPEST * sum(0.5))

@@ -1,13 +1,14 @@
-//! A detailed triangle mesh follows a particle liquid and keeps its detail where that neither breaks nor stretches (thesis chapter 2).
+//! A detailed triangle mesh that follows a particle liquid and keeps its detail where the liquid neither breaks nor stretches (thesis
+//! chapter 2).
 //!
-//! Each frame the mesh is carried along by the particles (`track/advect.rs`), then moved so that each vertex is as far from the
-//! surface of the particles as it was at the first frame (`track/project.rs`). That surface is where an implicit function of the
-//! particles is 0 (`level_set/implicit.rs`), turned into signed distances (`level_set/band.rs`). Vertices that this would move too far are where
-//! the liquid has merged or split: they are flagged, and so are those beside which the mesh does not cover the surface (`topology/coverage.rs`).
+//! In each frame the particles carry the mesh along (`track/advect.rs`), then each vertex is moved to its distance from the particles'
+//! surface at the first frame (`track/project.rs`). That surface is the zero set of an implicit function of the particles
+//! (`level_set/implicit.rs`), converted to signed distances (`level_set/band.rs`). Where this would move vertices too far, the liquid has
+//! merged or split: they are flagged, and so are those beside which the mesh does not cover the surface (`topology/coverage.rs`).
 //!
-//! There the mesh is changed (`topology/change.rs`): its own signed distances take the topology of phi (`topology/mesh_distance.rs`, `topology/matching/`), and it is cut and
-//! rebuilt in the cells where it no longer fits (`repair/`). Parts without liquid go (`topology/dry_parts.rs`), edges that were stretched or pressed are
-//! split or collapse (`remesh/`).
+//! There the mesh is changed (`topology/change.rs`): its own signed distances take the topology of phi (`topology/mesh_distance.rs`,
+//! `topology/matching/`), and it is cut and rebuilt in the cells where it no longer fits (`repair/`). Parts without liquid are removed
+//! (`topology/dry_parts.rs`), stretched edges are split and compressed ones collapsed (`remesh/`).
 //!
 //! # Glossary
 //!
@@ -15,13 +16,13 @@
 //! |---|---|
 //! | spacing, r | initial distance between particles |
 //! | cell, node | the grid's spacing, half of r; a corner of the grid, where phi is known |
-//! | phi | the implicit function of the particles; then the signed distance from where it is 0, negative inside |
-//! | fading | delta becomes less: detail of a runny liquid does not last |
-//! | delta | the distance from phi = 0 that a vertex keeps: its detail, signed as phi |
+//! | phi | the implicit function of the particles; then the signed distance from its zero set, negative inside |
+//! | fading | delta shrinks: detail of a runny liquid is not retained |
+//! | delta | the distance from phi = 0 that a vertex keeps: its detail, with the sign of phi |
 //! | patch | 4 x 4 x 4 nodes, which are evaluated together |
-//! | foot | the position of phi = 0 that belongs to a vertex: the vertex without its detail |
+//! | foot | the position on phi = 0 that belongs to a vertex: the vertex without its detail |
 //! | Gamma, psi | the signed distance from the mesh; Gamma - phi |
-//! | change | what a step made of the mesh's vertices and triangles, where it was rebuilt or improved |
+//! | change | how a step changed the mesh's vertices and triangles, where it was rebuilt or improved |
 //! | flagged | of a vertex: its projection failed or jumped (it stays where advection put it), or there is surface beside its foot that no triangle of feet covers |
 
 // Kernels index several arrays by one lane or axis.
@@ -80,12 +81,12 @@ pub struct Particles {
     pub positions: Vec<DVec3>,
     /// Velocities (m/s); may be empty.
     pub velocities: Vec<[f32; 3]>,
-    /// Numbers by which particles are the same from frame to frame; may be empty.
+    /// Ids that identify particles from frame to frame; may be empty.
     pub ids: Vec<i64>,
 }
 
 impl Particles {
-    /// Checks that arrays have one value for each particle, that numbers are finite and ids differ. There may be no particles.
+    /// Checks that arrays have one value for each particle, that numbers are finite and ids unique. There may be no particles.
     ///
     /// # Errors
     /// Names the first particle at fault, counted from 1.

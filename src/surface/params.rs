@@ -1,37 +1,37 @@
-//! How a mesh follows particles.
+//! Parameters of a mesh that follows particles.
 
 use super::track::advect::Weighting;
 use crate::error::{Error, Result};
 
-/// How a mesh follows particles.
+/// Parameters of a mesh that follows particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Params {
     /// Initial distance r between particles (m), over 0.
     pub spacing: f64,
     /// Edge of a cell (r), 0.125..=2 (thesis 2.7: 0.5).
     pub cell: f64,
-    /// Greatest distance (r) that projection may move a vertex; beyond, the liquid has merged or split there (thesis 2.3.3: 0.5).
+    /// Maximum distance (r) that projection may move a vertex; beyond, the liquid has merged or split there (thesis 2.3.3: 0.5).
     pub change: f64,
     /// How particles carry vertices.
     pub weighting: Weighting,
-    /// Time (s) in which half of the detail fades, over 0; infinite: it stays (thesis 2.8 wishes for it).
+    /// Time (s) in which half of the detail fades, over 0; infinite: detail does not fade with time (thesis 2.8 wishes for it).
     pub half_life: f64,
-    /// How much detail fades where the mesh is strained: to exp(-fade) of it while lengths change by a factor of e; 0..=1000.
+    /// How much detail fades where the mesh is strained: to exp(-fade) of it when lengths change by a factor of e; 0..=1000.
     pub fade: f64,
-    /// Whether the mesh is rebuilt where the liquid merges or splits (thesis 2.4, 2.5); it must then be a closed 2-manifold by index.
-    /// Else it is flagged there.
+    /// Whether the mesh is rebuilt where the liquid merges or splits (thesis 2.4, 2.5); it must then be a closed 2-manifold by index. Else
+    /// vertices are only flagged there.
     pub rebuild: bool,
-    /// Where it is rebuilt: whether its topology is matched to the particles' all over it in every step (thesis 2.8), bubbles of
-    /// theirs among it; else where vertices are flagged, and at drops.
+    /// If it is rebuilt: whether its topology is matched to that of the particles everywhere and in every step (thesis 2.8), including
+    /// bubbles; else where vertices are flagged, and at drops.
     pub every: bool,
-    /// Where it is rebuilt: least count of particles in a part of the mesh, 0..=1,000,000. Parts with fewer are taken away, and drops
-    /// with fewer get no mesh; with 0 and 1 only parts without any inside go. Where some lie inside, those that lie beside a part, at half a
-    /// spacing or less, count too. A mesh of one part stays.
+    /// If it is rebuilt: minimum count of particles in a part of the mesh, 0..=1,000,000. Parts with fewer are removed, and drops with fewer
+    /// get no mesh; with 0 and 1 only parts without any inside are removed. If some lie inside, those beside the part, within half a
+    /// spacing, count too. A mesh of one part stays.
     pub min_drop: usize,
 }
 
 impl Params {
-    /// The thesis' values for particles of a spacing (m), but for the weighting.
+    /// The thesis' values for particles of a spacing (m), except for the weighting.
     pub fn for_spacing(spacing: f64) -> Self {
         let (half_life, fade) = (f64::INFINITY, 0.0);
         let weighting = Weighting::Affine;

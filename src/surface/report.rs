@@ -1,40 +1,40 @@
-//! What a step of a tracker did.
+//! Report of a tracker's step.
 
 use super::topology::change::Change;
 use super::topology::uncovered_parts::Apart;
 use crate::context::PhaseTime;
 
-/// What a step did.
+/// Report of a step.
 #[derive(Debug, Clone, Default)]
 pub struct StepReport {
     /// Vertices whose projection jumped: the liquid merged or split there.
     pub jumped: usize,
     /// Vertices whose projection did not find the surface.
     pub lost: usize,
-    /// Vertices beside which there is surface that the mesh does not cover: something has begun to merge or to split there.
+    /// Vertices beside surface that the mesh does not cover: a merge or split has begun there.
     pub uncovered: usize,
-    /// Parts into which the frame was divided.
+    /// Count of parts into which the frame was divided.
     pub parts: usize,
-    /// Particles that are new, and that are gone.
+    /// Count of particles that are new, and of those that are gone.
     pub born: usize,
     /// See `born`.
     pub died: usize,
     /// Triangles of the particles' own surface.
     pub triangles: usize,
-    /// Parts of that surface which the mesh does not cover, the largest first: drops and bubbles.
+    /// Parts of that surface that the mesh does not cover, the largest first: drops and bubbles.
     pub apart: Vec<Apart>,
-    /// What the mesh became where it was rebuilt or improved; none: vertices and triangles are those before.
+    /// Changes to the mesh where it was rebuilt or improved; none: vertices and triangles are as before.
     pub change: Option<Change>,
-    /// How ids, velocities and positions of the particles contradict each other, in a sentence.
+    /// A sentence that describes how ids, velocities and positions of the particles contradict each other.
     pub particle_warning: Option<String>,
-    /// That over half of the mesh was lost or made anew, a sentence each.
+    /// Warnings that over half of the mesh was lost or rebuilt, one sentence each.
     pub mesh_warnings: Vec<String>,
     /// Time of each phase.
     pub phases: Vec<PhaseTime>,
 }
 
 impl StepReport {
-    /// How often a change was found: vertices that were not projected, and others beside surface that is not covered.
+    /// Count of vertices at which a change was found: those that were not projected, and those beside uncovered surface.
     pub fn flagged(&self) -> usize {
         self.jumped + self.lost + self.uncovered
     }
@@ -44,13 +44,13 @@ impl StepReport {
         self.mesh_warnings.iter().chain(&self.particle_warning)
     }
 
-    /// Warnings to log: all of the mesh, and the first one of the particles, after which `has_warned` is set.
+    /// Warnings to log: all of the mesh, and the first one of the particles; after it, `has_warned` is set.
     pub fn new_warnings(&self, has_warned: &mut bool) -> impl Iterator<Item = &String> {
         let of_particles = self.particle_warning.as_ref().filter(|_| !std::mem::replace(has_warned, true));
         self.mesh_warnings.iter().chain(of_particles)
     }
 
-    /// What two steps did, one after the other; what is flagged is so after the second.
+    /// The combined report of two successive steps; flags are those after the second.
     pub fn followed_by(mut self, next: Self) -> Self {
         for phase in next.phases {
             match self.phases.iter_mut().find(|own| own.name == phase.name) {

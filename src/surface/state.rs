@@ -15,11 +15,11 @@ use crate::numeric::packed::Magic;
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzsrf04";
-/// What messages call it.
+/// Name in messages.
 const NOUN: &str = "surface";
 
 impl Tracker {
-    /// The exact state, the same bytes for any number of threads; the triangles and what never fades only where the mesh was rebuilt.
+    /// The exact state, the same bytes for any number of threads; triangles and detail retention are included only if the mesh was rebuilt.
     pub fn save(&self) -> Vec<u8> {
         let mut to = Writer::default();
         [self.params.spacing, self.params.cell, self.reach].into_iter().for_each(|number| to.f64(number));
@@ -46,15 +46,15 @@ impl Tracker {
         packed::pack(&to.0, MAGIC)
     }
 
-    /// Count of bytes of a saved state before it was packed; 0 if it is not one.
+    /// Unpacked size (bytes) of a saved state; 0 if it is invalid.
     pub fn unpacked(bytes: &[u8]) -> u64 {
         packed::unpacked(bytes, MAGIC, NOUN)
     }
 
-    /// Resumes from a state that [`Tracker::save`] wrote; `mesh` is the one that it began with.
+    /// Resumes from a state that [`Tracker::save`] wrote; `mesh` is the initial mesh.
     ///
     /// # Errors
-    /// Parameters out of range; bytes that are not a valid state, or one of other cells or of another mesh.
+    /// Parameters out of range; bytes that are not a valid state, or the state of other cells or of another mesh.
     pub fn resume(params: Params, mesh: &TriMesh, bytes: &[u8]) -> Result<Self> {
         params.validate()?;
         mesh.validate()?;
@@ -68,7 +68,7 @@ impl Tracker {
             }
         }
         let reach = from.f64()?;
-        // Beyond what any state has, a band would take all memory.
+        // No valid state has more, and a band that wide would exhaust memory.
         if !(0.0..=100.0).contains(&reach) {
             return wrong(format!("has a band of {reach} spacings"));
         }
@@ -106,7 +106,7 @@ impl Tracker {
         for _ in 0..count {
             vertices.push(DVec3::new(from.f64()?, from.f64()?, from.f64()?));
         }
-        // A vertex that has no distance has NaN.
+        // NaN for a vertex without a distance.
         let delta = (0..count).map(|_| Ok(f32::from_le_bytes(from.take()?))).collect::<Result<Vec<f32>>>()?;
         if delta.iter().any(|delta| delta.is_infinite()) {
             return wrong("has a distance that is not finite".into());
@@ -146,7 +146,7 @@ impl Tracker {
     }
 }
 
-/// The displacements of a state.
+/// The drift of a state.
 fn drift(from: &mut Reader<'_>) -> Result<Drift> {
     let steps = from.u32()?;
     let count = from.count(12)?;
@@ -157,7 +157,7 @@ fn drift(from: &mut Reader<'_>) -> Result<Drift> {
     Ok(Drift { steps, vertices })
 }
 
-/// Tells meshes of other triangles apart.
+/// Checksum that identifies a mesh by its triangles.
 fn seal(triangles: &[[u32; 3]]) -> [u8; 16] {
     let bytes: Vec<u8> = triangles.as_flattened().iter().flat_map(|corner| corner.to_le_bytes()).collect();
     xxh3_128(&bytes).to_le_bytes()

@@ -1,10 +1,10 @@
-//! What unit tests have in common: balls of particles that lie one spacing apart, which is 1 m, and their surface.
+//! Helpers shared by unit tests: balls of particles one spacing apart, which is 1 m, and their surface.
 
 use super::{Implicit, Isosurface, Particles};
 use crate::context::Context;
 use crate::geometry::{DVec3, TriMesh};
 
-/// Positions of a lattice, from one distance (m) of its centre to another; from 0 on they are a ball.
+/// Positions of a lattice between two distances (m) from its centre; with `from` = 0 they are a ball.
 pub fn shell(centre: DVec3, from: f64, to: f64) -> Vec<DVec3> {
     let most = to.ceil() as i32;
     let on = || (-most..=most).map(f64::from);
@@ -12,7 +12,7 @@ pub fn shell(centre: DVec3, from: f64, to: f64) -> Vec<DVec3> {
     all.filter(|position| (from..=to).contains(&position.norm())).map(|position| position + centre).collect()
 }
 
-/// Particles at these positions, numbered from 0 on, without velocities.
+/// Particles at these positions, with ids from 0 on, without velocities.
 pub fn numbered(positions: Vec<DVec3>) -> Particles {
     Particles { ids: (0..positions.len() as i64).collect(), velocities: Vec::new(), positions }
 }

@@ -37,57 +37,56 @@ pub struct Tracker {
     /// Positions of vertices (m).
     pub(super) vertices: Vec<DVec3>,
     pub(super) triangles: Vec<[u32; 3]>,
-    /// Distance from the surface that each vertex keeps (m); NaN: it was too far from it to have one.
+    /// Distance from the surface that each vertex keeps (m); NaN: it was too far from the surface to have one.
     pub(super) delta: Vec<f32>,
-    /// Share 0..=1 of each vertex' detail that never fades; empty: none.
+    /// Detail retention: share 0..=1 of each vertex' detail that never fades; empty: none.
     pub(super) lasting: Vec<f32>,
     /// Vertices where the last step found a change.
     pub(super) flags: Vec<bool>,
-    /// Vertices beside which the mesh does not cover the surface from the first frame on: that is no change.
+    /// Vertices beside which the mesh has not covered the surface since the first frame: that is no change.
     pub(super) bare: Vec<bool>,
-    /// How far distances from the surface are known (r).
+    /// Distance from the surface up to which distances are known (r).
     pub(super) reach: f64,
-    /// Whether the triangles are no longer those that it began with.
+    /// Whether the triangles are no longer the initial ones.
     pub(super) is_rebuilt: bool,
-    /// Lengths (m) of the shortest and of the longest edge around each vertex at its birth; empty where the mesh is not rebuilt.
+    /// Lengths (m) of the shortest and of the longest edge around each vertex at its birth; empty if the mesh is not rebuilt.
     pub(super) sizes: Vec<Size>,
-    /// Displacements of the vertices over the last steps; empty where the mesh is not rebuilt.
+    /// Displacements of the vertices over the last steps; empty if the mesh is not rebuilt.
     pub(super) drift: Drift,
-    /// What is known of the particles to come.
+    /// Prefetched data of the coming particles.
     pub(super) ahead: Ahead,
 }
 
-/// Least reach of the band, and the greatest that is tried at the first frame (r).
+/// Minimum reach of the band, and the maximum that is tried at the first frame (r).
 pub(super) const REACH: [f64; 2] = [1.5, 8.0];
-/// How far the band reaches around vertices that do not find the surface at the first frame, in one try after the other (r).
+/// Successive reaches of the band around vertices that do not find the surface at the first frame (r).
 const TRIES: [f64; 2] = [5.0, REACH[1]];
-/// The band reaches so much farther than vertices did before (thesis 2.3.1).
+/// Factor by which the band reaches farther than the vertices did before (thesis 2.3.1).
 pub(super) const WIDER: f64 = 1.25;
-/// How far a vertex drifts in a frame at most, where nothing merges or splits (r).
+/// Maximum drift of a vertex in a frame, where nothing merges or splits (r).
 pub(super) const DRIFT: f64 = 0.25;
-/// Share of the vertices that set the reach: a spike does not widen the band everywhere.
+/// Share of the vertices that determines the reach: a spike does not widen the band everywhere.
 const MOST: f64 = 0.999;
-/// Where the band would have to reach farther than this (r) for a share of `MOST`, a share of `OFTEN` sets its reach, which is at least this;
-/// around the remaining vertices it is widened locally.
+/// If the share `MOST` would need a reach over this (r), the share `OFTEN` determines it instead, with this as the minimum; around the
+/// remaining vertices the band is widened locally.
 const WIDE: f64 = 2.5;
 const OFTEN: f64 = 0.95;
-/// Projection moves no vertex by less than this (r): what it would correct is rounding.
+/// Minimum displacement of a vertex by projection (r): anything less is rounding.
 const STILL: f64 = 1e-5;
 /// Share of vertices that must lie near the particles' surface at the first frame.
 const OVERLAP: f64 = 0.5;
 
 impl Tracker {
-    /// A mesh as it is at the first frame, in the particles' space.
+    /// Starts to track a mesh as it is at the first frame, in the particles' space.
     ///
     /// # Errors
-    /// Parameters out of range, a mesh or particles that are not valid; a mesh that is not where the particles are; one
-    /// to be rebuilt that is not closed and 2-manifold by index; cancel.
+    /// Parameters out of range, a mesh or particles that are not valid; a mesh that is not where the particles are; one to be rebuilt that
+    /// is not closed and 2-manifold by index; cancel.
     pub fn new(ctx: &Context, params: Params, mesh: &TriMesh, particles: &Particles) -> Result<Self> {
         Ok(Self::begin(ctx, params, mesh, particles)?.0)
     }
 
-    /// As [`Tracker::new`], with what is known of the first frame: vertices that are too far from the particles' surface to keep a
-    /// distance count as lost.
+    /// As [`Tracker::new`], with a report of the first frame: vertices too far from the particles' surface to keep a distance count as lost.
     ///
     /// # Errors
     /// As [`Tracker::new`].
@@ -148,7 +147,7 @@ impl Tracker {
                 let (lost, triangles) = (tracker.vertices.len() - known, surface.1.count());
                 return Ok((tracker, StepReport { lost, triangles, apart, ..StepReport::default() }));
             }
-            // Measured again: what a step finds must be what was measured.
+            // Measured again: later steps must find the values that were measured.
             if wanted > tracker.reach {
                 tracker.reach = wanted.max(1.25 * tracker.reach).min(REACH[1]);
             }
@@ -189,10 +188,10 @@ impl Tracker {
         Ok(())
     }
 
-    /// Says how little of each vertex' detail fades, 0 (as fast as the parameters say) to 1 (not at all); empty: 0 everywhere.
+    /// Sets the detail retention of each vertex, 0 (fades as fast as the parameters say) to 1 (never fades); empty: 0 everywhere.
     ///
     /// # Errors
-    /// Another count than that of the vertices; a share out of range, which is named by its vertex, counted from 1.
+    /// A count other than that of the vertices; a share out of range, reported with its vertex, counted from 1.
     pub fn set_lasting(&mut self, shares: Vec<f32>) -> Result<()> {
         let count = self.vertices.len();
         if !shares.is_empty() && shares.len() != count {
@@ -209,7 +208,7 @@ impl Tracker {
         Ok(())
     }
 
-    /// How it follows.
+    /// The current parameters.
     pub fn params(&self) -> &Params {
         &self.params
     }
@@ -222,13 +221,13 @@ impl Tracker {
         }
     }
 
-    /// The triangles: those that it began with, until a step changes them.
+    /// The triangles: the initial ones, until a step changes them.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// Whether any step, or [`Tracker::resculpt`], has changed vertices or triangles: by rebuilding, or by dividing, collapsing or flipping
-    /// edges alone.
+    /// Whether any step, or [`Tracker::resculpt`], has changed vertices or triangles: by rebuilding, or only by splitting, collapsing or
+    /// flipping edges.
     pub fn is_rebuilt(&self) -> bool {
         self.is_rebuilt
     }
@@ -243,17 +242,16 @@ impl Tracker {
         &self.delta
     }
 
-    /// At which vertices the last step found a change: those that it could not project, and those beside which there is surface that
-    /// the mesh does not cover.
+    /// Vertices at which the last step found a change: those that it could not project, and those beside surface that the mesh does not
+    /// cover.
     pub fn flags(&self) -> &[bool] {
         &self.flags
     }
 
-    /// Follows the particles from one frame to the next, `dt` (s) later. A step that fails or is cancelled leaves the mesh as it
-    /// was.
+    /// Follows the particles from one frame to the next, `dt` (s) later. A step that fails or is cancelled leaves the mesh as it was.
     ///
     /// Either frame may have no particles. A mesh that is rebuilt then has no vertices, and gets its parts from the particles when these
-    /// come back; one that is not stays where it was, with all of its vertices lost.
+    /// reappear; one that is not rebuilt stays where it was, with all of its vertices lost.
     ///
     /// # Errors
     /// A time that is not positive; particles that are not valid, or have neither ids nor velocities; where the mesh is rebuilt, vertices
@@ -275,7 +273,7 @@ impl Tracker {
                 self.distances(ctx, &surface, deep)
             })?;
             let delta = fade(self, &carried, dt);
-            // Strain is the liquid's own: on a thin sheet projection moves vertices much farther than the particles tremble.
+            // Strain is measured on the carried vertices: on a thin sheet projection moves them much farther than the particles jitter.
             let drifts = self.drift.after(&self.vertices, &carried);
             let (mut vertices, flags) =
                 ctx.phase("project", || self.projected(ctx, carried, &delta, &distances))?;
@@ -340,7 +338,7 @@ impl Tracker {
         Ok(report)
     }
 
-    /// What of the particles' surface the mesh does not cover: whole parts, and the vertices beside other such positions.
+    /// The particles' surface that the mesh does not cover: whole parts, and the vertices beside other uncovered positions.
     fn cover(
         &self,
         ctx: &Context,
@@ -361,7 +359,7 @@ impl Tracker {
         Ok(Covered { apart: parts.apart(phi, surface), bare, positions, reach: cover.reach(), lacking })
     }
 
-    /// Particles at these positions, of which each part of the mesh must hold some.
+    /// Particles at these positions, for the minimum count in each part of the mesh.
     pub(super) fn crowd<'a>(&self, positions: &'a [DVec3]) -> Crowd<'a> {
         Crowd { positions, spacing: self.params.spacing, least: self.params.min_drop.max(1) }
     }
@@ -383,7 +381,7 @@ impl Tracker {
         Distances::deeper(ctx, &surface.0, &surface.1, (self.reach / self.params.cell) as f32, deep)
     }
 
-    /// How far the band must reach everywhere (r): a little farther than most vertices lie from the surface, and as far as they may jump.
+    /// Required reach of the band everywhere (r): slightly more than the distance of most vertices, plus drift and stencil.
     fn wanted_reach(&self) -> f64 {
         let mut far: Vec<f32> =
             self.delta.iter().filter(|delta| !delta.is_nan()).map(|delta| delta.abs()).collect();
@@ -410,7 +408,7 @@ impl Tracker {
         vertices.map_init(|| Sampler::new(distances), one).unzip()
     }
 
-    /// Moves vertices (m) to where they have the distance that they keep, unless that is too far.
+    /// Moves vertices (m) to their kept distance, unless that is too far.
     fn projected(
         &self,
         ctx: &Context,
@@ -448,7 +446,7 @@ impl Tracker {
     }
 }
 
-/// Checks what a step goes from and to, `dt` (s) later.
+/// Validates the frames of a step, `dt` (s) apart.
 pub(super) fn validate_step(from: &Particles, to: &Particles, dt: f64) -> Result<()> {
     if !(dt > 0.0 && dt.is_finite()) {
         return Err(Error::argument(format!("dt = {dt} s must be positive and finite")));
@@ -467,31 +465,31 @@ pub(super) struct Next {
     pub report: StepReport,
 }
 
-/// What of the particles' surface the mesh does not cover.
+/// What the mesh covers of the particles' surface, and what it does not.
 pub(super) struct Covered {
     pub apart: Vec<Apart>,
-    /// Vertices beside positions that it does not cover, and these (cells).
+    /// Vertices beside uncovered positions, and these positions (cells).
     pub bare: Vec<bool>,
     pub positions: Vec<DVec3>,
-    /// How near is beside (cells).
+    /// Maximum distance between such a vertex' foot and such a position (cells).
     pub reach: f64,
-    /// What it should have of the parts that it does not cover at all.
+    /// Uncovered parts that it should cover.
     pub lacking: Lacking,
 }
 
-/// What became of a vertex.
+/// Result of projecting a vertex.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Flag {
     /// It keeps its distance from its foot (cells).
     Placed(DVec3),
-    /// It would have moved too far.
+    /// It would have been moved too far.
     Jumped,
     /// The surface was not found.
     Lost,
 }
 
 impl Flag {
-    /// Its foot (cells); none where it could not be projected.
+    /// Its foot (cells); none if it could not be projected.
     fn foot(&self) -> Option<DVec3> {
         if let Self::Placed(foot) = self { Some(*foot) } else { None }
     }

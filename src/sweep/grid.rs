@@ -1,4 +1,4 @@
-//! Swept volumes and meshes as whole level sets.
+//! Swept volumes and solids of meshes as complete level sets.
 
 use rayon::prelude::*;
 
@@ -14,17 +14,17 @@ use crate::motion::{Keys, Rigid};
 use crate::numeric::blocks::{Block, BlockEdit, DIM};
 use crate::vdb::FloatGrid;
 
-/// Blocks per batch that is handed to the grid; bounds the memory besides the grid.
+/// Blocks per batch added to the grid; bounds the memory in addition to the grid.
 const BATCH: usize = 2048;
-/// A window without bounds.
+/// An unbounded window.
 const EVERYWHERE: Window = Window { min: [i32::MIN; 3], max: [i32::MAX; 3] };
 /// All voxels within the lattice's reach.
 const ALL_VOXELS: [[i32; 3]; 2] = [[-(1 << 18); 3], [1 << 18; 3]];
 
-/// Level set of the volume that bodies sweep from `from` to `to` (s); of the pose when they are equal.
+/// Level set of the volume that bodies sweep from `from` to `to` (s), or of the pose if they are equal.
 ///
 /// # Errors
-/// Settings out of range, a pose that cannot be computed, a region too large, cancel.
+/// Settings out of range, a pose that cannot be computed, a region that is too large, cancel.
 pub fn chain(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &Settings) -> Result<FloatGrid> {
     settings.validate()?;
     let mut pose = Vec::new();
@@ -44,8 +44,8 @@ pub fn chain(ctx: &Context, bodies: &[Body], from: f64, to: f64, settings: &Sett
     fill(ctx, faces, lattice, settings.half_width)
 }
 
-/// Level set of the solid that a mesh bounds: winding number > 0, vertices that are one corner welded ([`crate::geometry::mesh::weld`]), open
-/// loops closed. Corners that rounding does not decide are a warning of the context.
+/// Level set of the solid that a mesh bounds: winding number > 0, vertices of the same corner welded ([`crate::geometry::mesh::weld`]),
+/// open loops closed. Corners that are ambiguous within rounding cause a warning of the context.
 ///
 /// # Errors
 /// As [`chain`].
@@ -57,8 +57,8 @@ pub fn voxelise(ctx: &Context, mesh: TriMesh, settings: &Settings) -> Result<Flo
     chain(ctx, &[still], 0.0, 0.0, settings)
 }
 
-/// As [`voxelise`], in a box of voxels (least and greatest, both included): the cost is that of what lies there, however large the
-/// solid is. Beside the box, from a block on, all counts as outside.
+/// As [`voxelise`], in a box of voxels (minimum and maximum, both inclusive): the cost depends only on what lies in it, however large the
+/// solid is. Everything more than a block away from the box counts as outside.
 ///
 /// # Errors
 /// As [`voxelise`].
@@ -74,7 +74,7 @@ pub fn voxelise_within(
     let lattice = Lattice::near(settings.voxel, DVec3::from(middle))?;
     let relative = |voxel: [i32; 3]| [0, 1, 2].map(|axis| voxel[axis] - lattice.origin[axis]);
     let bounds = [relative(low), relative(high)];
-    // Whole blocks are made, and winding numbers are needed around them.
+    // Whole blocks are built, and winding numbers are needed around them.
     let margin = settings.half_width.ceil() as i32 + 3 + DIM as i32;
     let fixed = |cells: i32| cells.saturating_mul(UNITS);
     let min = bounds[0].map(|cells| fixed(cells - margin));
@@ -87,7 +87,7 @@ pub fn voxelise_within(
 /// Level set of the points where the winding number of a closed chain is at least 1.
 ///
 /// # Errors
-/// A region too large; cancel.
+/// A region that is too large; cancel.
 pub fn fill(ctx: &Context, faces: Vec<Face>, lattice: Lattice, half_width: f32) -> Result<FloatGrid> {
     fill_within(ctx, faces, lattice, half_width, ALL_VOXELS)
 }

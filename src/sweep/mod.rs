@@ -1,30 +1,30 @@
 //! The volume that moving meshes sweep in an interval of time.
 //!
-//! [`chain`] is exact up to a tolerance: signed space-time tetrahedra (`chain.rs`), poses dense enough
-//! for arcs (`moving_mesh/body.rs`), edges split where their ends move differently (`moving_mesh/refine.rs`), order in time where a skin folds
-//! inside out (`chain/folds.rs`, `moving_mesh/passages.rs`), winding numbers from exact line crossings (room `distance`, `signed_distance/exposure.rs`), the
-//! parts of faces that bound the volume (`signed_distance/bins.rs`, `chain/facets.rs`; `chain/patch.rs` where many sheets nearly coincide), then
-//! exact distances in the narrow band (room `distance`, `signed_distance/depth.rs`, `signed_distance/voxelise.rs`).
-//! [`samples`] is the thesis' method (section 3.2): the union of N + 1 poses, dilated and smoothed.
+//! [`chain`] is exact up to a tolerance: signed space-time tetrahedra (`chain.rs`), poses dense enough for arcs (`moving_mesh/body.rs`),
+//! edges split where their ends move differently (`moving_mesh/refine.rs`), passages ordered in time where a surface folds inside out
+//! (`chain/folds.rs`, `moving_mesh/passages.rs`), winding numbers from exact line crossings (room `distance`,
+//! `signed_distance/exposure.rs`), the parts of faces that bound the volume (`signed_distance/bins.rs`, `chain/facets.rs`; `chain/patch.rs`
+//! where many sheets nearly coincide), then exact distances in the narrow band (room `distance`, `signed_distance/depth.rs`,
+//! `signed_distance/voxelise.rs`). [`samples`] is the thesis' method (section 3.2): the union of N + 1 poses, dilated and smoothed.
 //!
 //! # Glossary
 //!
 //! | word | meaning |
 //! |---|---|
 //! | cell | the grid spacing, as a unit of length |
-//! | voxel, block | a sample of the grid; 8 x 8 x 8 of them |
-//! | lattice, unit | where the voxels lie, counted from an origin voxel; 1/4096 cell, the step of fixed-point coordinates |
+//! | voxel, block | a sample of the grid; 8 x 8 x 8 voxels |
+//! | lattice, unit | the positions of voxels, relative to an origin voxel; 1/4096 cell, the step of fixed-point coordinates |
 //! | pose, level, step | all vertices at one time; a pose in fixed point; the interval from one level to the next |
 //! | chain | the solid at the first pose plus the tetrahedra that the surface sweeps outward, each counted with its sign |
-//! | winding number | how many times the chain covers a point; where it is at least 1 is the *volume* |
+//! | winding number | how many times the chain covers a point; the *volume* is where it is at least 1 |
 //! | face, coefficient | a triangle of the chain's boundary; how many layers of the chain end there |
-//! | open, buried | of a point on a face: the volume lies behind it and not in front; not so |
-//! | facet | a triangle of the volume's surface: an open part of a face, or of a patch; *sure* when known to be open throughout |
-//! | line, crossing | a line through voxels parallel to an axis; where it passes through a face |
+//! | open, buried | of a point on a face: the volume lies behind it and not in front of it; any other point |
+//! | facet | a triangle of the volume's surface: an open part of a face, or part of a patch; *sure* if known to be open throughout |
+//! | line, crossing | a line through voxels parallel to an axis; a point where it passes through a face |
 //! | meeting, spot | a crossing at which the line enters or leaves the volume; a meeting together with its line |
 //! | exposed | of a face: outermost at a meeting |
-//! | bin | the unit cube around a voxel, with the faces that may pass through it; a block with few faces is one bin |
-//! | sheet, bundle, stack | adjoining faces; sheets that nearly coincide; so many that only patches make the surface |
+//! | bin | the unit cube around a voxel, with the faces that may pass through it; a block with few faces is a single bin |
+//! | sheet, bundle, stack | adjoining faces; nearly coincident sheets; so many of them that the surface consists only of patches |
 //! | patch | a piece of the plane of an exposed face, around a spot |
 //! | passage | a tetrahedron through which the surface passes in a step |
 
@@ -49,7 +49,7 @@ pub use signed_distance::voxelise::{ALL, Band, Piece, Scratch, Voxeliser};
 
 use crate::error::{Error, Result};
 
-/// Default of [`Settings::tolerance`] (cells): the error of a sweep is far below what a level set can show.
+/// Default of [`Settings::tolerance`] (cells): the error of a sweep is far below what a level set can represent.
 pub const TOLERANCE: f64 = 0.02;
 
 /// Parameters of a swept volume.
@@ -59,7 +59,7 @@ pub struct Settings {
     pub voxel: f64,
     /// Half width of the narrow band (cells), at least 3.
     pub half_width: f32,
-    /// Largest error against true arcs and flat moving triangles (cells), 0.001..=1.
+    /// Maximum error against true arcs and flat moving triangles (cells), 0.001..=1.
     pub tolerance: f64,
 }
 
@@ -90,10 +90,10 @@ impl Settings {
     }
 }
 
-/// Peak memory (bytes) of making a level set whose surface has an area of `area` m2.
+/// Peak memory (bytes) of building a level set whose surface has an area of `area` m2.
 pub fn surface_bytes(area: f64, cell: f64) -> u64 {
-    // A band of six voxels crosses 1.6 blocks of 8 voxels on average, at four bytes and a bit a voxel; a surface that is
-    // not level crosses more; writing a file takes as much again.
+    // A band of six voxels crosses 1.6 blocks of 8 voxels on average, at slightly over four bytes a voxel; an inclined surface crosses
+    // more; writing a file needs as much again.
     (area / (cell * cell) * 128.0).min(1.0e18) as u64
 }
 

@@ -16,7 +16,7 @@ pub struct SamplesSettings {
     pub half_width: f32,
     /// N: poses are taken at t + n dt / N, n = 0..=N.
     pub samples: u32,
-    /// Dilation before smoothing (cells); it compensates the smoothing's shrinking. 0: none.
+    /// Dilation before smoothing (cells); compensates for the shrinkage of smoothing. 0: none.
     pub dilate: f32,
     /// Gaussian smoothing passes of one cell. 0: none.
     pub smooth: u32,
@@ -30,7 +30,7 @@ impl SamplesSettings {
         Self { voxel, half_width: 3.0, samples: 8, dilate: 1.0, smooth: 1, scheme: level_set::Scheme::Weno5 }
     }
 
-    /// One step per frame (Fig. 3.3a): the poses at both ends and none between.
+    /// One step per frame (Fig. 3.3a): only the poses at both ends.
     pub fn one_step(voxel: f64) -> Self {
         Self::sub_steps(voxel, 1)
     }

@@ -1,8 +1,8 @@
-//! The only door to C++: declarations, no logic.
+//! The only bridge to C++: declarations, no logic.
 
 #[cxx::bridge(namespace = "frazil")]
 pub(super) mod ffi {
-    /// Where a leaf lies in memory.
+    /// The position of a leaf in memory.
     struct LeafView {
         x: i32,
         y: i32,
@@ -10,7 +10,7 @@ pub(super) mod ffi {
         /// 1 when `values` and `mask` are set; otherwise the tile below is valid.
         is_leaf: bool,
         tile_active: bool,
-        /// Of a float the first number.
+        /// For floats, the first number.
         tile: [f32; 3],
         values: usize,
         mask: usize,
@@ -19,7 +19,7 @@ pub(super) mod ffi {
     /// A metadata entry; `kind` selects the valid value.
     struct Meta {
         key: String,
-        /// "string", "float", "double", "int", "bool", or another type's name with its text.
+        /// "string", "float", "double", "int", "bool", or the name of another type, whose value is then text.
         kind: String,
         text: String,
         number: f64,
@@ -41,7 +41,7 @@ pub(super) mod ffi {
         meta: Vec<Meta>,
     }
 
-    /// A value above the leaves.
+    /// A tile above the leaves.
     struct Tile {
         x: i32,
         y: i32,
@@ -49,7 +49,7 @@ pub(super) mod ffi {
         /// 1 for a position of 8 voxels along an edge, 2 for 128, 3 for 4096.
         level: u32,
         active: bool,
-        /// Of a float the first number.
+        /// For floats, the first number.
         value: [f32; 3],
     }
 
@@ -69,24 +69,24 @@ pub(super) mod ffi {
         name: String,
         /// OpenVDB's name of its type.
         type_name: String,
-        /// As in `PointArray`, or -1 for a type that frazil does not hold.
+        /// As in `PointArray`, or -1 for a type that frazil does not support.
         kind: i32,
         uniform: bool,
     }
 
-    /// What stored points consist of.
+    /// Description of stored points.
     struct PointsHead {
         name: String,
         count: usize,
         voxel: f64,
         /// Whether `to_world` is the whole transform.
         is_linear: bool,
-        /// From index space to the world (m): rows of a matrix that row vectors are multiplied by.
+        /// From index space to the world (m): rows of a matrix that multiplies row vectors from the right.
         to_world: [f64; 16],
         attributes: Vec<PointAttribute>,
     }
 
-    /// A grid out of a file: one of the three, or none when it is of another type.
+    /// A grid from a file: one of the three, or none if it is of another type.
     struct Found {
         floats: UniquePtr<Grid>,
         vectors: UniquePtr<VectorGrid>,
@@ -105,12 +105,12 @@ pub(super) mod ffi {
         indices: Vec<u32>,
     }
 
-    /// The part of a grid that becomes a mesh: all, the blocks at some origins, or without any the voxels of a box.
+    /// The part of a grid to mesh: all of it, the blocks at some origins, or, without origins, the voxels of a box.
     struct Part {
         whole: bool,
         /// Three numbers each.
         origins: Vec<i32>,
-        /// Least and greatest voxel, both included.
+        /// Minimum and maximum voxel, both inclusive.
         low: [i32; 3],
         high: [i32; 3],
     }
@@ -149,7 +149,7 @@ pub(super) mod ffi {
             constants: &[f32],
         ) -> Result<UniquePtr<Blocks>>;
         fn put_blocks(grid: Pin<&mut Grid>, blocks: Pin<&mut Blocks>) -> Result<()>;
-        /// Bytes that a file of this grid takes at most.
+        /// Upper bound on the bytes of a file of this grid.
         fn file_bound(grid: &Grid) -> u64;
         fn value_at(grid: &Grid, x: i32, y: i32, z: i32) -> f32;
         fn sample(grid: &Grid, call: &Call, world: &[f64], linear: bool, out: &mut [f32]) -> Result<()>;
@@ -158,9 +158,9 @@ pub(super) mod ffi {
         fn dilate(grid: Pin<&mut Grid>, call: &Call) -> Result<()>;
         fn components(grid: &Grid, call: &Call) -> Result<Vec<u64>>;
 
-        /// Whether every value of the grid at an address is finite in 16 bits.
+        /// Whether every value of the grid at an address is finite when converted to 16 bits.
         fn fits_half(grid: usize, vectors: bool) -> Result<bool>;
-        /// `vectors[i]` says that `grids[i]` is the address of a `VectorGrid`, not of a `Grid`.
+        /// `vectors[i]` says whether `grids[i]` is the address of a `VectorGrid` rather than of a `Grid`.
         fn grids_to_bytes(
             grids: &[usize],
             vectors: &[bool],
@@ -175,9 +175,9 @@ pub(super) mod ffi {
         fn describe_stored(stored: &Stored) -> Result<Vec<GridHeader>>;
         /// The grid with this index in the description; it can be taken once.
         fn take_stored(stored: Pin<&mut Stored>, index: usize) -> Result<Found>;
-        /// Transform and metadata, in OpenVDB's own coding.
+        /// Transform and metadata, in OpenVDB's own encoding.
         fn grid_head(grid: &Grid) -> Result<UniquePtr<CxxString>>;
-        /// Every value above the leaves that is not an inactive background.
+        /// Every tile above the leaves except inactive background.
         fn tiles(grid: &Grid) -> Result<Vec<Tile>>;
         /// A grid without leaves.
         fn assemble(head: &[u8], background: f32, tiles: &[Tile]) -> Result<UniquePtr<Grid>>;
@@ -244,8 +244,8 @@ pub(super) mod ffi {
         ) -> Result<UniquePtr<VectorGrid>>;
 
         type PointGrid;
-        /// Points, with the positions within their voxels as the first array. `order` lists the points by leaf and voxel, or is
-        /// empty when they are in that order; `starts` are the indices in it of the first point of each leaf.
+        /// Points; the first array has the positions within their voxels. `order` lists the points by leaf and voxel, or is empty if they
+        /// are already in that order; `starts` are the indices in it of the first point of each leaf.
         fn make_points(
             call: &Call,
             voxel: f64,
@@ -263,10 +263,10 @@ pub(super) mod ffi {
         fn points_head(grid: &PointGrid, call: &Call) -> Result<PointsHead>;
         /// Three numbers for each point.
         fn point_cells(grid: &PointGrid, call: &Call, out: &mut [i32]) -> Result<()>;
-        /// Writes `count` values of an attribute to an address: one for each point, or one when the attribute is uniform.
+        /// Writes `count` values of an attribute to an address: one for each point, or one if the attribute is uniform.
         ///
         /// # Safety
-        /// There must be room for so many values of this kind.
+        /// The memory at the address must hold `count` values of this kind.
         unsafe fn point_values(
             grid: &PointGrid,
             call: &Call,

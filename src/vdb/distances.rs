@@ -1,4 +1,4 @@
-//! Checks that the values of a level set are distances in metres in a band of some cells, as every tool expects.
+//! Checks that the values of a level set are distances in metres in a band of several cells, as every tool expects.
 
 use super::level_set::{from_mesh, to_mesh};
 use super::{FloatGrid, Leaf};
@@ -7,18 +7,18 @@ use crate::error::Result;
 use crate::geometry::TriMesh;
 use crate::numeric::blocks::VOXELS;
 
-/// Leaves that are sampled.
+/// Number of leaves that are sampled.
 const LEAVES: usize = 512;
-/// Fewest edges between voxels inside and outside to judge by.
+/// Minimum number of edges between inside and outside voxels for a verdict.
 const ENOUGH: usize = 64;
-/// Median of differences along such edges over their length, where values are distances: 0.67 to 1, by how the surface lies. Beyond
-/// these they are not.
+/// Valid range of the median slope (difference over length) along such edges. For distances it is 0.67 to 1, depending on the orientation
+/// of the surface.
 const SLOPES: [f64; 2] = [0.4, 1.6];
-/// The same of distances that count in voxels.
+/// The same for distances in voxels.
 const IN_VOXELS: [f64; 2] = [0.5, 1.1];
-/// Least width of the band on each side (cells): with less, no tool measures or moves the surface rightly.
+/// Minimum width of the band on each side (cells): with less, no tool measures or moves the surface correctly.
 const LEAST_BAND: f64 = 1.9;
-/// Width of the band on each side that is made (cells).
+/// Width of the rebuilt band on each side (cells).
 const BAND: f32 = 3.0;
 
 /// What is wrong with the values of a level set.
@@ -28,12 +28,12 @@ enum Fault {
     InVoxels,
     /// Their gradient at the surface.
     Slope(f64),
-    /// The band reaches so far on each side (cells).
+    /// Width (cells) of a band that is too thin, on each side.
     Thin(f64),
 }
 
 impl Fault {
-    /// What it is, in words that follow the grid's name.
+    /// Its description, to be appended to the grid's name.
     fn words(self) -> String {
         match self {
             Self::InVoxels => "has distances in voxels, not in metres".to_string(),
@@ -48,8 +48,8 @@ impl Fault {
     }
 }
 
-/// What is wrong with the values of a level set, in words that follow its name; none where they are distances in metres, in a band of two
-/// cells or more on each side.
+/// What is wrong with the values of a level set, to be appended to its name; none if they are distances in metres in a band of two cells or
+/// more on each side.
 ///
 /// # Errors
 /// What OpenVDB reports.
@@ -57,9 +57,9 @@ pub fn warning(grid: &FloatGrid) -> Result<Option<String>> {
     Ok(fault(grid)?.map(Fault::words))
 }
 
-/// A level set as it was read, or one with distances in metres in a band of three cells around the same surface, where its own values
-/// count in voxels or end within two cells of the surface; with what was wrong, in words that follow its name. Values that
-/// are no distances at all stay as they are, with what is wrong with them.
+/// A level set as it was read or, where its values are in voxels or end within two cells of the surface, one with distances in metres in a
+/// band of three cells around the same surface; also what was wrong, to be appended to its name. Values that are not distances at all are
+/// left unchanged, and the fault is returned.
 ///
 /// # Errors
 /// Cancel, or what OpenVDB reports.
@@ -71,7 +71,7 @@ pub fn mended(ctx: &Context, grid: FloatGrid) -> Result<(FloatGrid, Option<Strin
     }
     let voxel = grid.voxel_size();
     let mesh = if grid.is_world_fixed() {
-        // Of a surface through a voxel itself, a band of one cell has that voxel alone, and no mesh both of its sides.
+        // Where the surface passes through a voxel, a one-cell band contains only that voxel: meshing also needs its neighbours on both sides.
         let mut wider = grid.deep_copy()?;
         wider.dilate()?;
         to_mesh(ctx, &wider, 0.0, 0.0)?
@@ -107,12 +107,12 @@ fn fault(grid: &FloatGrid) -> Result<Option<Fault>> {
     Ok((band < LEAST_BAND).then_some(Fault::Thin(band)))
 }
 
-/// Differences between the values of voxels beside each other, one inside and one outside, in a leaf.
+/// Differences between the values of adjacent voxels, one inside and one outside, in a leaf.
 fn differences(leaf: &Leaf<'_>) -> Vec<f64> {
     let is_active = |at: usize| leaf.mask[at / 64] >> (at % 64) & 1 == 1;
     let mut out = Vec::new();
     for at in 0..VOXELS {
-        // x, y and z stand above each other.
+        // Bit offset in the index, and stride, of x, y and z.
         for (shift, stride) in [(6, 64), (3, 8), (0, 1)] {
             if at >> shift & 7 == 7 || !is_active(at) || !is_active(at + stride) {
                 continue;
@@ -137,7 +137,7 @@ mod tests {
 
     const VOXEL: f64 = 0.05;
 
-    /// A ball of 0.5 m, and a box beside it, whose values are distances times a factor, in a band of so many cells.
+    /// A ball of 0.5 m, and a box beside it, whose values are distances times a factor, in a band of `cells` cells.
     fn ball(ctx: &Context, factor: f32, cells: f32) -> FloatGrid {
         let exact = from_particles(ctx, &[DVec3::zeros()], &[0.5], VOXEL, 3.0).unwrap();
         let band = cells * VOXEL as f32;

@@ -1,4 +1,4 @@
-//! .vdb files: written atomically, the same bytes for the same grids.
+//! .vdb files: written atomically, with the same bytes for the same grids.
 
 use std::path::Path;
 
@@ -11,10 +11,10 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::files::hash::Hasher;
 
-/// How values are packed.
+/// Compression of values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Compression {
-    /// Not at all.
+    /// Uncompressed.
     None,
     /// Zip: small, slow.
     Zip,
@@ -23,7 +23,7 @@ pub enum Compression {
     Blosc,
 }
 
-/// How a file is written.
+/// Options for writing a file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct WriteOptions {
     /// Codec.
@@ -45,11 +45,11 @@ pub struct GridInfo {
     pub class: String,
     /// Edge of a cell along x (m).
     pub voxel: f64,
-    /// Active voxels, if the file has them.
+    /// Active voxels, if the file states them.
     pub active_voxels: Option<u64>,
-    /// Least and greatest active voxel, if the file has them.
+    /// Minimum and maximum active voxel, if the file states them.
     pub bbox: Option<([i32; 3], [i32; 3])>,
-    /// Memory when loaded (bytes), if the file has them.
+    /// Memory when loaded (bytes), if the file states it.
     pub memory: Option<u64>,
     /// Whether values are stored in 16 bits.
     pub half: bool,
@@ -70,7 +70,7 @@ pub fn write(path: &Path, grids: &[&FloatGrid], options: &WriteOptions) -> Resul
     crate::io::files::atomic::write_bytes(path, &to_bytes(grids, options)?)
 }
 
-/// As [`write()`], of grids of any kind.
+/// As [`write()`], for grids of any kind.
 ///
 /// # Errors
 /// As there.
@@ -81,13 +81,13 @@ pub fn write_any(path: &Path, grids: &[GridRef<'_>], options: &WriteOptions) -> 
 /// The bytes of a .vdb file.
 ///
 /// # Errors
-/// When memory runs out; numbers that 16 bits do not hold, where they are wanted in 16 bits (the grid is named).
+/// When memory runs out; numbers outside the 16-bit range if 16 bits are requested (the grid is named).
 pub fn to_bytes(grids: &[&FloatGrid], options: &WriteOptions) -> Result<Vec<u8>> {
     let grids: Vec<GridRef<'_>> = grids.iter().map(|grid| GridRef::Floats(grid)).collect();
     any_to_bytes(&grids, options)
 }
 
-/// As [`to_bytes`], of grids of any kind.
+/// As [`to_bytes`], for grids of any kind.
 ///
 /// # Errors
 /// As there.
@@ -116,7 +116,7 @@ pub(super) fn codec_number(compression: Compression) -> i32 {
     }
 }
 
-/// The bytes of a file, with the random identifier replaced by one made from the rest.
+/// The bytes of a file, with the random identifier replaced by one derived from the rest.
 pub(super) fn named_by_content(bytes: &cxx::CxxString) -> Vec<u8> {
     let mut bytes = bytes.as_bytes().to_vec();
     if bytes.len() < UUID.end {
@@ -128,13 +128,12 @@ pub(super) fn named_by_content(bytes: &cxx::CxxString) -> Vec<u8> {
     bytes
 }
 
-/// Descriptions of a file's grids, of any type, in the order of their names; values are not read, except in a stream, which
-/// has no offsets of its grids.
+/// Descriptions of a file's grids, of any type, sorted by name; values are not read, except in a stream, which has no offsets to its grids.
 ///
 /// In a program that called [`guard::install`], files that are not its own are decoded by another process.
 ///
 /// # Errors
-/// A missing, empty, cut or damaged file.
+/// A file that is missing, empty, cut short or damaged.
 pub fn describe(path: &Path) -> Result<Vec<GridInfo>> {
     match guard::of(path) {
         Some(guard) => guard.describe(path),
@@ -142,8 +141,8 @@ pub fn describe(path: &Path) -> Result<Vec<GridInfo>> {
     }
 }
 
-/// The metadata of a file itself, which [`WriteOptions::metadata`] puts there; OpenVDB is not asked. None where the file is of
-/// a newer version than this library knows.
+/// The metadata of the file itself, as [`WriteOptions::metadata`] sets it; read without OpenVDB. None if the file's version is newer than
+/// this library knows.
 ///
 /// # Errors
 /// A file that is missing, cut short or of another kind.
@@ -168,7 +167,7 @@ pub fn metadata(path: &Path) -> Result<Vec<(String, MetaValue)>> {
     Ok(all.into_iter().map(|(key, kind, bytes)| (key, value(kind, bytes))).collect())
 }
 
-/// Every grid of a file, in the order of their names; all must be float grids.
+/// Every grid of a file, sorted by name; all must be float grids.
 ///
 /// # Errors
 /// As [`describe`]; a grid of another type (named); no grid at all.
@@ -187,7 +186,7 @@ pub fn read_own(path: &Path) -> Result<Vec<FloatGrid>> {
     decode::read(path)
 }
 
-/// The float grid of that name; without a name the first level set, else the first float grid.
+/// The float grid of that name; without a name, the first level set, or else the first float grid.
 ///
 /// # Errors
 /// As [`describe`]; no such grid (the file's grids are named); values that are not finite.
@@ -198,7 +197,7 @@ pub fn read_named(path: &Path, name: Option<&str>) -> Result<FloatGrid> {
     }
 }
 
-/// The float grid of that index in what [`describe`] lists: of several of one name each can be read.
+/// The float grid with that index in the list of [`describe`]: this can read each of several grids with one name.
 ///
 /// # Errors
 /// As [`read_named`].
@@ -209,11 +208,11 @@ pub fn read_nth(path: &Path, index: usize) -> Result<FloatGrid> {
     }
 }
 
-/// A level set of a file, as [`read_named`] finds it, with distances in metres: see [`distances::mended`]. What is wrong with its values is
-/// logged, and that there are several grids of its name, of which the first is read.
+/// A level set of a file, found as by [`read_named`], with distances in metres: see [`distances::mended`]. Faults of its values are logged,
+/// and so is the fact that several grids have its name, in which case the first is read.
 ///
 /// # Errors
-/// As [`read_named`]; a grid that is no level set, or whose cells are no cubes; cancel.
+/// As [`read_named`]; a grid that is not a level set, or whose cells are not cubes; cancel.
 pub fn read_level_set(ctx: &Context, path: &Path, name: Option<&str>) -> Result<FloatGrid> {
     let grid = read_named(path, name)?;
     let name = grid.name();
@@ -242,8 +241,8 @@ pub fn read_own_named(path: &Path, name: &str) -> Result<FloatGrid> {
     decode::read_named(path, Some(name))
 }
 
-/// The grid of that name, of floats or of vectors; without a name the first level set, else the first float grid, else
-/// the first grid of vectors.
+/// The grid of that name, of floats or vectors; without a name, the first level set, or else the first float grid, or else the first vector
+/// grid.
 ///
 /// # Errors
 /// As [`read_named`].
@@ -254,7 +253,7 @@ pub fn read_any(path: &Path, name: Option<&str>) -> Result<AnyGrid> {
     }
 }
 
-/// As [`read_named`], out of the bytes of a .vdb file.
+/// As [`read_named`], from the bytes of a .vdb file.
 ///
 /// # Errors
 /// [`Error::Bytes`]: bytes of another kind, cut short or damaged; no such grid; values that are not finite.
@@ -263,7 +262,7 @@ pub fn from_bytes(bytes: &[u8], name: Option<&str>) -> Result<FloatGrid> {
     decode::from_bytes(bytes, name).map_err(unreadable)
 }
 
-/// As [`read_any`], out of the bytes of a .vdb file.
+/// As [`read_any`], from the bytes of a .vdb file.
 ///
 /// # Errors
 /// As [`from_bytes`].

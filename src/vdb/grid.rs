@@ -21,7 +21,7 @@ pub enum GridClass {
     LevelSet,
     /// A density.
     Fog,
-    /// Vectors whose components lie in the middle of the faces of voxels.
+    /// Vectors whose components are located at the centres of voxel faces.
     Staggered,
 }
 
@@ -64,7 +64,7 @@ pub enum MetaValue {
     Other(String, String),
 }
 
-/// A sparse grid of floats with a uniform transform; it shares no memory.
+/// A sparse grid of floats with a uniform transform; it owns its memory.
 pub struct FloatGrid {
     pub(super) inner: UniquePtr<ffi::Grid>,
 }
@@ -75,7 +75,7 @@ const EDGES: [i32; 4] = [1, 8, 128, 4096];
 /// One value for a cube of voxels, of a leaf's size or larger.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tile {
-    /// Least corner, in voxels.
+    /// Minimum corner, in voxels.
     pub origin: Origin,
     /// Voxels along an edge: 8, 128 or 4096.
     pub edge: i32,
@@ -85,7 +85,7 @@ pub struct Tile {
     pub active: bool,
 }
 
-/// Blocks with their memory, ready to be put into a grid.
+/// Blocks with allocated memory, ready to be put into a grid.
 pub struct Ready(UniquePtr<ffi::Blocks>);
 
 impl Ready {
@@ -106,7 +106,7 @@ impl Ready {
             constants.push(constant);
         }
         let (mut call, _running) = call(ctx);
-        // The last step of an edit cannot be cancelled.
+        // The commit of an edit cannot be cancelled.
         call.cancel = 0;
         let blocks = ffi::make_blocks(&call, origins.as_flattened(), &values, &masks, &constants);
         Ok(Self(blocks.map_err(fail)?))
@@ -135,7 +135,7 @@ impl FloatGrid {
         Ok(Self { inner: ffi::make_grid(voxel, half_width * voxel as f32, true).map_err(fail)? })
     }
 
-    /// A grid of cells of `voxel` m that consists of tiles of at least a leaf's size, and is `background` elsewhere.
+    /// A grid with cells of `voxel` m that consists of tiles of at least a leaf's size, and is `background` elsewhere.
     ///
     /// # Errors
     /// A tile of one voxel; as [`FloatGrid::new`].
@@ -165,12 +165,12 @@ impl FloatGrid {
         ffi::voxel_size(&self.inner)
     }
 
-    /// Whether the transform only scales, rotates and moves, by the same factor on each axis.
+    /// Whether the transform is only a rotation, a translation and one scale for all axes.
     pub fn is_uniform(&self) -> bool {
         ffi::is_uniform(&self.inner)
     }
 
-    /// Whether voxel (0, 0, 0) lies at the origin and the axes are the world's, as in our own grids.
+    /// Whether voxel (0, 0, 0) is at the origin and the axes are those of the world, as in our own grids.
     pub fn is_world_fixed(&self) -> bool {
         is_world_fixed(self.voxel_size(), |index| ffi::index_to_world(&self.inner, index))
     }
@@ -203,7 +203,7 @@ impl FloatGrid {
         ffi::set_grid_class(self.inner.pin_mut(), class.number()).map_err(fail)
     }
 
-    /// Moves the whole grid (m).
+    /// Translates the whole grid (m).
     ///
     /// # Errors
     /// When memory runs out.
@@ -240,7 +240,7 @@ impl FloatGrid {
         ffi::set_metadata(self.inner.pin_mut(), &to_meta(key, &value)).map_err(fail)
     }
 
-    /// Number of active voxels, tiles counted in full.
+    /// Number of active voxels, including all those of tiles.
     pub fn active_voxels(&self) -> u64 {
         ffi::active_voxels(&self.inner)
     }
@@ -255,13 +255,14 @@ impl FloatGrid {
         ffi::memory_bytes(&self.inner)
     }
 
-    /// Least and greatest active voxel, both included; none when there is none.
+    /// Minimum and maximum active voxel, both inclusive; none if no voxel is active.
     pub fn active_bbox(&self) -> Option<([i32; 3], [i32; 3])> {
         let (mut low, mut high) = ([0; 3], [0; 3]);
         ffi::active_bbox(&self.inner, &mut low, &mut high).ok()?.then_some((low, high))
     }
 
-    /// Heights (m) between which all active voxels lie, with a neighbour of each: below and above them are tiles only. All heights where no voxel is active.
+    /// Heights (m) between which all active voxels lie, including one neighbour of each: below and above there are only tiles. An infinite
+    /// range if no voxel is active.
     pub fn heights(&self) -> [f64; 2] {
         let Some((low, high)) = self.active_bbox() else { return [f64::NEG_INFINITY, f64::INFINITY] };
         let ends = |axis: usize| [f64::from(low[axis]) - 1.0, f64::from(high[axis]) + 1.0];
@@ -282,7 +283,7 @@ impl FloatGrid {
         Ok(views.iter().map(|view| unsafe { lend(view, PhantomData) }).collect())
     }
 
-    /// Every leaf, to change; nothing is copied.
+    /// Every leaf, for modification; nothing is copied.
     ///
     /// # Errors
     /// When memory runs out.
@@ -292,7 +293,7 @@ impl FloatGrid {
         Ok(views.iter().map(|view| unsafe { lend_mut(view, PhantomData) }).collect())
     }
 
-    /// Every tile that is not an inactive background.
+    /// Every tile except inactive background.
     ///
     /// # Errors
     /// When memory runs out.
@@ -323,7 +324,7 @@ impl FloatGrid {
     /// Replaces leaves or tiles by blocks. All memory for leaves is allocated before the first is replaced.
     ///
     /// # Errors
-    /// When memory runs out; the grid is then as it was.
+    /// When memory runs out; the grid is then unchanged.
     pub fn replace_blocks(&mut self, ctx: &Context, edits: &[BlockEdit]) -> Result<()> {
         self.put(Ready::new(ctx, edits)?)
     }
@@ -354,7 +355,7 @@ impl FloatGrid {
         self.sample(ctx, world, true, out)
     }
 
-    /// Values of the voxels that hold world positions (m); `out` is cleared first.
+    /// Values of the voxels that contain world positions (m); `out` is cleared first.
     ///
     /// # Errors
     /// Cancel.
@@ -370,7 +371,7 @@ impl FloatGrid {
         ffi::sample(&self.inner, &call, &flat, linear, out).map_err(fail)
     }
 
-    /// Replaces leaves and nodes of one value (within `tolerance`) by tiles.
+    /// Replaces leaves and nodes of uniform value (within `tolerance`) by tiles.
     ///
     /// # Errors
     /// When memory runs out.
@@ -386,7 +387,7 @@ impl FloatGrid {
         ffi::prune(self.inner.pin_mut(), &alone(), true, 0.0).map_err(fail)
     }
 
-    /// Gives everything outside the band the sign of the band beside it.
+    /// Gives everything outside the band the sign of the adjacent band.
     ///
     /// # Errors
     /// When memory runs out.
@@ -394,7 +395,7 @@ impl FloatGrid {
         ffi::flood_fill(self.inner.pin_mut(), &alone()).map_err(fail)
     }
 
-    /// Makes the voxels that share a face with an active one active too, with the values that they have.
+    /// Activates the voxels that share a face with an active one; their values do not change.
     ///
     /// # Errors
     /// What OpenVDB reports.

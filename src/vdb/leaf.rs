@@ -5,10 +5,10 @@ use std::marker::PhantomData;
 use super::bridge::ffi::LeafView;
 use crate::numeric::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 
-/// A leaf to read, of floats by default.
+/// A read-only leaf, of floats by default.
 #[derive(Clone, Copy)]
 pub struct Leaf<'a, V = Values> {
-    /// Least corner, in voxels.
+    /// Minimum corner, in voxels.
     pub origin: Origin,
     /// The 512 values.
     pub values: &'a V,
@@ -19,10 +19,10 @@ pub struct Leaf<'a, V = Values> {
 /// Values of a leaf of vectors; voxel (x, y, z) lies at `x << 6 | y << 3 | z`.
 pub type Vectors = [[f32; 3]; VOXELS];
 
-/// Values of a leaf, as a grid of their kind holds them.
+/// Values of a leaf, in the type of its grid.
 ///
 /// # Safety
-/// They must be floats without padding, as many as a leaf of such a grid has.
+/// They must be floats without padding, exactly as many as a leaf of such a grid has.
 pub unsafe trait LeafValues: Copy {}
 // SAFETY: a leaf of a grid of floats has 512 of them.
 unsafe impl LeafValues for Values {}
@@ -50,9 +50,9 @@ impl Leaf<'_> {
     }
 }
 
-/// A leaf to change; no two of them share memory.
+/// A mutable leaf; no two of them share memory.
 pub struct LeafMut<'a> {
-    /// Least corner, in voxels.
+    /// Minimum corner, in voxels.
     pub origin: Origin,
     /// The 512 values.
     pub values: &'a mut Values,
@@ -75,7 +75,7 @@ pub enum Probe<'a, V = Values, T = f32> {
 }
 
 impl Probe<'_> {
-    /// A copy with its own memory, of the block at an origin; a tile becomes an inactive value.
+    /// A copy of the block at `origin` with its own memory; a tile becomes an inactive value.
     pub fn to_edit(&self, origin: Origin) -> BlockEdit {
         match self {
             Self::Leaf(leaf) => BlockEdit::Dense(leaf.to_block()),
@@ -84,10 +84,10 @@ impl Probe<'_> {
     }
 }
 
-/// Lends the leaf that a view points at.
+/// Lends the leaf that a view points to.
 ///
 /// # Safety
-/// The view must come from a grid of such values that is borrowed for `'a` and not changed meanwhile.
+/// The view must come from a grid with such values that is borrowed for `'a` and not changed during it.
 pub(super) unsafe fn lend<'a, V: LeafValues>(view: &LeafView, _grid: PhantomData<&'a ()>) -> Leaf<'a, V> {
     Leaf {
         origin: [view.x, view.y, view.z],
@@ -98,7 +98,7 @@ pub(super) unsafe fn lend<'a, V: LeafValues>(view: &LeafView, _grid: PhantomData
     }
 }
 
-/// Lends the leaf that a view points at, to change.
+/// Lends the leaf that a view points to, mutably.
 ///
 /// # Safety
 /// As [`lend`], with the grid borrowed mutably, and each leaf lent once.

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::geometry::{DVec3, TriMesh, Vec3};
 use crate::numeric::blocks::Origin;
 
-/// Accuracy of the tools that renormalise as they go.
+/// Accuracy of the tools that renormalise as they advance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scheme {
     /// First order in space and time, one pass: about seven times cheaper.
@@ -41,8 +41,8 @@ pub fn from_mesh(ctx: &Context, mesh: &TriMesh, voxel: f64, half_width: f32) -> 
     Ok(FloatGrid { inner })
 }
 
-/// Level set of the union of spheres (m), `half_width` cells on each side; spheres smaller than a cell and a half
-/// are omitted, as the grid cannot resolve them.
+/// Level set of the union of spheres (m), `half_width` cells on each side; spheres smaller than a cell and a half are omitted, because the
+/// grid cannot resolve them.
 ///
 /// # Errors
 /// Different numbers of radii and positions, cancel, or what OpenVDB reports.
@@ -72,8 +72,8 @@ pub fn to_mesh(ctx: &Context, grid: &FloatGrid, iso: f32, adaptivity: f32) -> Re
     mesh_of(ctx, grid, iso, adaptivity, &part)
 }
 
-/// As [`to_mesh`], of the voxels of a box (least and greatest, both included). Boxes beside each other give meshes that
-/// meet, each triangle in one of them.
+/// As [`to_mesh`], for the voxels of a box (minimum and maximum, both inclusive). The meshes of adjacent boxes fit together, with each
+/// triangle in exactly one of them.
 ///
 /// # Errors
 /// As [`to_mesh`].
@@ -87,7 +87,7 @@ pub fn box_to_mesh(
     mesh_of(ctx, grid, iso, adaptivity, &ffi::Part { whole: false, origins: Vec::new(), low, high })
 }
 
-/// As [`to_mesh`], of the blocks at some origins: the cost grows with their number, not with the grid.
+/// As [`to_mesh`], for the blocks at these origins: the cost grows with their number, not with the grid.
 ///
 /// # Errors
 /// As [`to_mesh`].
@@ -99,7 +99,7 @@ pub fn blocks_to_mesh(
     origins: &[Origin],
 ) -> Result<TriMesh> {
     let origins = origins.as_flattened().to_vec();
-    // Without any: a box without voxels.
+    // Without origins: a box without voxels.
     let part = ffi::Part { whole: false, origins, low: [1; 3], high: [0; 3] };
     mesh_of(ctx, grid, iso, adaptivity, &part)
 }
@@ -149,7 +149,7 @@ fn csg_copy(ctx: &Context, a: &FloatGrid, b: &FloatGrid, operation: Operation) -
     Ok(FloatGrid { inner })
 }
 
-/// a becomes a or b.
+/// Union: a becomes a or b.
 ///
 /// # Errors
 /// Cells of different sizes; cancel.
@@ -157,7 +157,7 @@ pub fn union(ctx: &Context, a: &mut FloatGrid, b: FloatGrid) -> Result<()> {
     csg(ctx, a, b, Operation::Union)
 }
 
-/// a becomes a without b.
+/// Difference: a becomes a without b.
 ///
 /// # Errors
 /// As [`union`].
@@ -165,7 +165,7 @@ pub fn difference(ctx: &Context, a: &mut FloatGrid, b: FloatGrid) -> Result<()> 
     csg(ctx, a, b, Operation::Difference)
 }
 
-/// a becomes what a and b share.
+/// Intersection: a becomes a and b.
 ///
 /// # Errors
 /// As [`union`].
@@ -173,7 +173,7 @@ pub fn intersection(ctx: &Context, a: &mut FloatGrid, b: FloatGrid) -> Result<()
     csg(ctx, a, b, Operation::Intersection)
 }
 
-/// a or b, both kept.
+/// Union of a and b, which are unchanged.
 ///
 /// # Errors
 /// As [`union`].
@@ -181,7 +181,7 @@ pub fn union_copy(ctx: &Context, a: &FloatGrid, b: &FloatGrid) -> Result<FloatGr
     csg_copy(ctx, a, b, Operation::Union)
 }
 
-/// a without b, both kept.
+/// a without b; both are unchanged.
 ///
 /// # Errors
 /// As [`union`].
@@ -189,7 +189,7 @@ pub fn difference_copy(ctx: &Context, a: &FloatGrid, b: &FloatGrid) -> Result<Fl
     csg_copy(ctx, a, b, Operation::Difference)
 }
 
-/// What a and b share, both kept.
+/// Intersection of a and b, which are unchanged.
 ///
 /// # Errors
 /// As [`union`].
@@ -197,8 +197,8 @@ pub fn intersection_copy(ctx: &Context, a: &FloatGrid, b: &FloatGrid) -> Result<
     csg_copy(ctx, a, b, Operation::Intersection)
 }
 
-/// Moves the surface outward by `metres` (inward when negative). Beyond the band the surface is moved in steps;
-/// the first-order scheme loses about a tenth of the distance at each, the other one hardly anything.
+/// Moves the surface outward by `metres` (inward if negative). Beyond the band the surface is moved in steps; the first-order scheme loses
+/// about a tenth of the distance in each, the other hardly anything.
 ///
 /// # Errors
 /// The first-order scheme beyond the narrow band; cancel, or what OpenVDB reports.
@@ -214,12 +214,12 @@ pub fn offset(ctx: &Context, grid: &mut FloatGrid, metres: f32, scheme: Scheme) 
     ffi::offset(grid.inner.pin_mut(), &call, metres, scheme == Scheme::Weno5).map_err(fail)
 }
 
-/// Whether an offset (m) is farther than a level set's band of distances reaches.
+/// Whether an offset (m) exceeds a level set's narrow band.
 pub fn beyond_band(grid: &FloatGrid, metres: f64) -> bool {
     metres.abs() > f64::from(grid.background()) * (1.0 + 1e-4)
 }
 
-/// Means over cubes of (2 `width` + 1) cells, `times` times.
+/// Mean filter over cubes of (2 `width` + 1) cells, applied `times` times.
 ///
 /// # Errors
 /// As [`offset`].
@@ -233,7 +233,7 @@ pub fn mean_filter(
     smooth(ctx, grid, 0, width, times, scheme)
 }
 
-/// Gaussian smoothing (four means in a row), `times` times.
+/// Gaussian smoothing (four mean filters in a row), applied `times` times.
 ///
 /// # Errors
 /// As [`offset`].
@@ -269,8 +269,8 @@ pub fn renormalise(ctx: &Context, grid: &mut FloatGrid, scheme: Scheme, times: u
     ffi::renormalise(grid.inner.pin_mut(), &call, scheme == Scheme::Weno5, times as i32).map_err(fail)
 }
 
-/// Advects the surface along its normals by the distance (m) that `speed` has there: the
-/// thesis' noise step (section 3.2) with OpenVDB's default schemes; a baseline.
+/// Advects the surface along its normals by the local value of `speed`, a distance (m): the thesis' noise step (section 3.2) with OpenVDB's
+/// default schemes; a baseline.
 ///
 /// # Errors
 /// As [`offset`].
@@ -280,8 +280,8 @@ pub fn advect_outward(ctx: &Context, grid: &mut FloatGrid, speed: &FloatGrid) ->
     ffi::advect_outward(grid.inner.pin_mut(), &call, &speed.inner).map_err(fail)
 }
 
-/// Area and volume by OpenVDB's smeared delta function, about the level set's own middle. Sharp edges are smeared
-/// too: boxes lose some 3 % of their area, and less than 1 % of their volume.
+/// Area and volume by OpenVDB's smeared delta function, about the centre of the level set. Sharp edges are smeared too: boxes lose about 3
+/// % of their area, and less than 1 % of their volume.
 ///
 /// # Errors
 /// As [`offset`].
@@ -292,7 +292,7 @@ pub fn measure(ctx: &Context, grid: &FloatGrid) -> Result<Measure> {
     Ok(measure)
 }
 
-/// Voxels of each connected part of the inside, largest first.
+/// Number of voxels in each connected component of the inside, largest first.
 ///
 /// # Errors
 /// As [`offset`].

@@ -1,7 +1,7 @@
-//! The only door to OpenVDB: grids of floats and of vectors, points, level-set tools and .vdb files.
+//! The only access to OpenVDB: grids of floats and vectors, points, level-set tools and .vdb files.
 //!
-//! Each grid owns its tree; leaves are lent without copying. Index space is world-fixed: voxel
-//! (i, j, k) has its centre at (i, j, k) x voxel size, unless a file has another transform.
+//! Each grid owns its tree; leaves are lent without copying. Index space is world-fixed: the centre of voxel (i, j, k) is at (i, j, k) x
+//! voxel size, unless a file has another transform.
 
 mod bridge;
 pub mod distances;
@@ -21,7 +21,7 @@ pub use vectors::{AnyGrid, GridRef, VectorEdit, VectorGrid, VectorLeaf, VectorPr
 use crate::context::{Context, Running};
 use crate::error::Error;
 
-/// Metadata of a fog volume: the density (1/m) that a value of 1 stands for, which its values do not contain.
+/// Metadata of a fog volume: the density (1/m) that a value of 1 stands for; the values are not multiplied by it.
 pub const DENSITY_SCALE_KEY: &str = "frazil:density_scale";
 
 fn fail(error: cxx::Exception) -> Error {
@@ -35,8 +35,8 @@ fn call(ctx: &Context) -> (bridge::ffi::Call, Running) {
     (bridge::ffi::Call { threads: ctx.pool().threads() as i32, cancel }, running)
 }
 
-/// Ends the worker threads that OpenVDB's tools have started in this process; they start again when needed.
-/// Threads that other users of TBB in the process hold are kept. No tool may run meanwhile.
+/// Ends the worker threads that OpenVDB's tools have started in this process; they restart when needed. Threads that other users of TBB in
+/// the process hold are kept. No tool may run at the same time.
 pub fn end_workers() {
     bridge::ffi::end_workers();
 }

@@ -1,8 +1,8 @@
-//! Point clouds in .vdb files, as OpenVDB's PointDataGrid: any program that reads VDB Points reads them.
+//! Point clouds in .vdb files, as OpenVDB's PointDataGrid: any program that supports VDB Points can read them.
 //!
-//! Every array keeps the full width of its numbers (no 16-bit or fixed-point codec), and a value that all points share is
-//! stored once a leaf. A file lists the points leaf by leaf and voxel by voxel, those of a voxel in the order in which they
-//! were given: [`order`] says which order that is, and points that are in it come back as they went.
+//! Every array keeps its numbers in full width (no 16-bit or fixed-point codec), and a value that all points share is stored once per leaf.
+//! A file lists the points leaf by leaf and voxel by voxel, and those of a voxel in the order in which they were given. [`order`] returns
+//! this order; points that already have it are read back in the same order.
 
 use std::path::Path;
 
@@ -19,10 +19,10 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::geometry::points::{Attribute, Column, Points, Values};
 
-/// Most points of a grid: OpenVDB counts those of a leaf in 32 bits, and orders are 32-bit indices.
+/// Maximum number of points of a grid: OpenVDB counts those of a leaf in 32 bits, and orders are 32-bit indices.
 const MOST: usize = u32::MAX as usize;
 
-/// The order of the points in a file, as indices into `cells`; none when they are in it.
+/// The order of the points in a file, as indices into `cells`; none if they already have this order.
 ///
 /// # Errors
 /// More than 2^32 - 1 points; cancel.
@@ -37,16 +37,16 @@ pub fn order(ctx: &Context, cells: &[[i32; 3]]) -> Result<Option<Vec<u32>>> {
             return Ok(None);
         }
         let mut order: Vec<u32> = (0..cells.len() as u32).collect();
-        // Equal keys stay in the order of their indices, as they differ by them.
+        // Equal cells stay in the order of their indices, which are part of the key.
         order.par_sort_unstable_by_key(|&point| (keys[point as usize], point));
         Ok(Some(order))
     })
 }
 
-/// Where a voxel stands in the order of OpenVDB's tree: cubes of 4096 voxels by x, then y, then z; in each of them cubes of 128;
-/// in those leaves of 8; in those voxels.
+/// Sort key of a voxel in the order of OpenVDB's tree: cubes of 4096 voxels by x, then y, then z; within them cubes of 128; within those
+/// leaves of 8; within those voxels.
 fn key(cell: [i32; 3]) -> u128 {
-    // Without its sign, the least coordinate is 0.
+    // Flipping the sign bit maps the minimum coordinate to 0.
     let cell = cell.map(|part| (part as u32) ^ (1 << 31));
     let level = |shift: u32, bits: u32| {
         cell.iter().fold(0u128, |key, part| key << bits | u128::from(part >> shift & ((1 << bits) - 1)))
@@ -54,8 +54,8 @@ fn key(cell: [i32; 3]) -> u128 {
     level(12, 20) << 36 | level(7, 5) << 21 | level(3, 4) << 9 | level(0, 3)
 }
 
-/// The bytes of a .vdb file that holds points as a grid of this name; the same for the same points from any number of
-/// threads. Numbers keep 32 bits: `options.half` has no effect. A file of no points keeps no attributes.
+/// The bytes of a .vdb file that holds points as a grid of this name; the same bytes for the same points and any number of threads. Numbers
+/// keep 32 bits: `options.half` has no effect. A file without points has no attributes.
 ///
 /// # Errors
 /// As [`Points::validate`] and [`order`]; when memory runs out; cancel.
@@ -91,14 +91,14 @@ pub fn write(ctx: &Context, path: &Path, name: &str, points: &Points, options: &
     crate::io::files::atomic::write_bytes(path, &to_bytes(ctx, name, points, options)?)
 }
 
-/// The points of the grid of that name; without a name those of the file's first grid of points. Codecs of 16 and 8 bits are
-/// decoded; attributes of types that [`Values`] does not hold are named in a warning and left out, groups without one. A
-/// transform that is more than a voxel size becomes part of the positions.
+/// The points of the grid of that name; without a name, those of the file's first point grid. Codecs of 16 and 8 bits are decoded;
+/// attributes of types that [`Values`] does not support are omitted and named in a warning, groups are omitted without one. A transform
+/// other than a voxel size is applied to the positions.
 ///
 /// In a program that called [`guard::install`], files that are not its own are decoded by another process.
 ///
 /// # Errors
-/// A missing, empty, cut or damaged file; no such grid (the file's grids are named); numbers that are not finite.
+/// A file that is missing, empty, cut short or damaged; no such grid (the file's grids are named); numbers that are not finite.
 pub fn read(path: &Path, name: Option<&str>) -> Result<Points> {
     match guard::of(path) {
         Some(guard) => guard.read_points(path, name),
@@ -116,7 +116,7 @@ pub fn read_own(path: &Path, name: Option<&str>) -> Result<Points> {
     Ok(points)
 }
 
-/// Names the attributes that a file has and its points are without.
+/// Warns about the attributes of a file that were omitted.
 pub(super) fn warn_of(path: &Path, skipped: &[String]) {
     if !skipped.is_empty() {
         let list = skipped.join(", ");
@@ -124,7 +124,7 @@ pub(super) fn warn_of(path: &Path, skipped: &[String]) {
     }
 }
 
-/// An attribute as the C++ side takes it.
+/// An attribute in the form that the C++ side takes.
 fn array(attribute: &Attribute) -> ffi::PointArray {
     fn address<T: Copy>(column: &Column<T>) -> usize {
         column.stored().as_ptr() as usize
@@ -140,7 +140,7 @@ fn array(attribute: &Attribute) -> ffi::PointArray {
     ffi::PointArray { name: attribute.name.clone(), kind, uniform: attribute.values.is_uniform(), address }
 }
 
-/// The number of a type, in the order of `PointKind` of points.cc.
+/// The number of a type, in the order of `PointKind` in points.cc.
 pub(super) fn kind(values: &Values) -> i32 {
     match values {
         Values::Float(_) => 0,
@@ -151,10 +151,10 @@ pub(super) fn kind(values: &Values) -> i32 {
     }
 }
 
-/// What a grid of a file holds, and the names and types of attributes that are left out.
+/// The points of a grid of a file, and the names and types of the omitted attributes.
 ///
 /// # Errors
-/// As [`read`], in words that follow the name of the file.
+/// As [`read`], as a message to be appended to the name of the file.
 pub(super) fn of_grid(
     grid: &UniquePtr<ffi::PointGrid>,
 ) -> std::result::Result<(Points, Vec<String>), String> {
@@ -168,7 +168,7 @@ pub(super) fn of_grid(
     for attribute in &head.attributes {
         let ffi::PointAttribute { name, type_name, kind, uniform } = attribute;
         let count = if *uniform { 1 } else { head.count };
-        // The positions are an array even where all points lie in the middle of their voxel.
+        // The positions are an array even if all points lie at the centre of their voxel.
         let is_position = name == "P";
         let count = if is_position { head.count } else { count };
         macro_rules! column {
@@ -223,13 +223,12 @@ fn shared<T: Copy>(values: Vec<T>, uniform: bool) -> Column<T> {
     }
 }
 
-/// Brings positions into voxels of their own, where the file has another transform than a voxel size or has points outside
-/// the voxels that it puts them in.
+/// Assigns positions to voxels anew, if the file has a transform other than a voxel size or stores points outside their voxels.
 fn position(points: &mut Points, head: &ffi::PointsHead) -> std::result::Result<(), String> {
     if !head.is_linear {
         return Err(format!("grid \"{}\" has points in a space that is not linear", head.name));
     }
-    // Row vectors are multiplied from the left: element (row, column) stands at 4 x row + column.
+    // Row vectors are multiplied from the left: element (row, column) is at 4 x row + column.
     let m = &head.to_world;
     let identity = |n: usize| match n {
         0 | 5 | 10 => head.voxel,

@@ -5,10 +5,10 @@ use crate::error::{Error, one_line};
 /// Exception text of the C++ side's `Cancelled`.
 const CANCELLED: &str = "frazil: cancelled";
 
-/// Words in exceptions of the C++ library and OpenVDB when memory has run out.
+/// Parts of exception texts of the C++ library and OpenVDB that mean out of memory.
 const MEMORY: [&str; 5] = ["bad_alloc", "length_error", "vector::", "basic_string::", "array new length"];
 
-/// Whether an exception is about memory.
+/// Whether an exception means out of memory.
 pub(super) fn is_of_memory(what: &str) -> bool {
     MEMORY.iter().any(|word| what.contains(word))
 }

@@ -1,5 +1,5 @@
-//! Sparse grids of vectors of three 32-bit floats: velocities, winds, colours. They come from files and hosts, and
-//! are written to them; the level-set tools take floats only.
+//! Sparse grids of vectors of three 32-bit floats: velocities, winds, colours. They are read from and written to files and hosts; the
+//! level-set tools accept only floats.
 
 use std::marker::PhantomData;
 
@@ -14,12 +14,12 @@ use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::numeric::blocks::{Mask, Origin};
 
-/// A leaf of vectors to read.
+/// A read-only leaf of vectors.
 pub type VectorLeaf<'a> = Leaf<'a, Vectors>;
 /// The leaf or tile of a grid of vectors at a block position.
 pub type VectorProbe<'a> = Probe<'a, Vectors, [f32; 3]>;
 
-/// A sparse grid of vectors with a uniform transform; it shares no memory.
+/// A sparse grid of vectors with a uniform transform; it owns its memory.
 pub struct VectorGrid {
     pub(super) inner: UniquePtr<ffi::VectorGrid>,
 }
@@ -28,7 +28,7 @@ pub struct VectorGrid {
 pub enum VectorEdit {
     /// Dense values.
     Dense {
-        /// Least corner, in voxels.
+        /// Minimum corner, in voxels.
         origin: Origin,
         /// The 512 values.
         values: Box<Vectors>,
@@ -66,7 +66,7 @@ impl VectorGrid {
         ffi::vector_voxel_size(&self.inner)
     }
 
-    /// Whether voxel (0, 0, 0) lies at the origin and the axes are the world's.
+    /// Whether voxel (0, 0, 0) is at the origin and the axes are those of the world.
     pub fn is_world_fixed(&self) -> bool {
         is_world_fixed(self.voxel_size(), |index| ffi::vector_index_to_world(&self.inner, index))
     }
@@ -89,7 +89,7 @@ impl VectorGrid {
         ffi::set_vector_class(self.inner.pin_mut(), class.number()).map_err(fail)
     }
 
-    /// Moves the whole grid (m).
+    /// Translates the whole grid (m).
     ///
     /// # Errors
     /// When memory runs out.
@@ -130,7 +130,7 @@ impl VectorGrid {
         ffi::vector_file_bound(&self.inner)
     }
 
-    /// Least and greatest active voxel, both included; none when there is none.
+    /// Minimum and maximum active voxel, both inclusive; none if no voxel is active.
     pub fn active_bbox(&self) -> Option<([i32; 3], [i32; 3])> {
         let (mut low, mut high) = ([0; 3], [0; 3]);
         ffi::vector_active_bbox(&self.inner, &mut low, &mut high).ok()?.then_some((low, high))
@@ -163,7 +163,7 @@ impl VectorGrid {
     /// Replaces leaves or tiles by blocks. All memory for leaves is allocated before the first is replaced.
     ///
     /// # Errors
-    /// When memory runs out, or cancel; the grid is then as it was.
+    /// When memory runs out, or cancel; the grid is then unchanged.
     pub fn replace_blocks(&mut self, ctx: &Context, edits: &[VectorEdit]) -> Result<()> {
         let (mut origins, mut values, mut masks, mut constants) = (vec![], vec![], vec![], vec![]);
         for edit in edits {
@@ -184,8 +184,8 @@ impl VectorGrid {
         ffi::put_vector_blocks(self.inner.pin_mut(), blocks.pin_mut()).map_err(fail)
     }
 
-    /// Values at world positions (m): trilinear between voxel centres, or of the voxels that hold them. Components of a
-    /// staggered grid are sampled on the faces of voxels, where they lie.
+    /// Values at world positions (m): trilinear between voxel centres, or those of the voxels that contain the positions. Components of a
+    /// staggered grid are sampled on the faces of voxels, where they are located.
     ///
     /// # Errors
     /// Cancel.
@@ -198,7 +198,7 @@ impl VectorGrid {
     }
 }
 
-/// A grid of a kind that can be read from files.
+/// A grid of any kind that can be read from files.
 pub enum AnyGrid {
     /// Of floats.
     Floats(FloatGrid),
@@ -206,7 +206,7 @@ pub enum AnyGrid {
     Vectors(VectorGrid),
 }
 
-/// A grid of any kind, to write.
+/// A grid of any kind, for writing.
 #[derive(Clone, Copy)]
 pub enum GridRef<'a> {
     /// Of floats.
@@ -224,7 +224,7 @@ impl AnyGrid {
         }
     }
 
-    /// A grid that was found in a file.
+    /// A grid found in a file.
     pub(super) fn of(found: ffi::Found) -> Option<Self> {
         if !found.floats.is_null() {
             return Some(Self::Floats(FloatGrid { inner: found.floats }));
@@ -232,7 +232,7 @@ impl AnyGrid {
         (!found.vectors.is_null()).then(|| Self::Vectors(VectorGrid { inner: found.vectors }))
     }
 
-    /// The grid, to write it.
+    /// A reference to the grid, for writing.
     pub fn borrow(&self) -> GridRef<'_> {
         match self {
             Self::Floats(grid) => GridRef::Floats(grid),
@@ -258,7 +258,7 @@ impl AnyGrid {
     }
 }
 
-/// Functions of both kinds of grid.
+/// Methods that both kinds of grid have.
 macro_rules! of_both {
     ($($(#[$text:meta])* $name:ident -> $type:ty;)*) => {
         $($(#[$text])* pub fn $name(&self) -> $type {
@@ -274,13 +274,13 @@ impl GridRef<'_> {
     of_both! {
         /// Edge of a cell (m).
         voxel_size -> f64;
-        /// Whether voxel (0, 0, 0) lies at the origin and the axes are the world's.
+        /// Whether voxel (0, 0, 0) is at the origin and the axes are those of the world.
         is_world_fixed -> bool;
         /// The meaning of the values.
         class -> GridClass;
         /// The grid's name in a file.
         name -> String;
-        /// Number of active voxels, tiles counted in full.
+        /// Number of active voxels, including all those of tiles.
         active_voxels -> u64;
         /// Number of leaves.
         leaf_count -> usize;
@@ -288,7 +288,7 @@ impl GridRef<'_> {
         memory_bytes -> u64;
         /// Upper bound on the bytes of a .vdb file of this grid.
         file_bound -> u64;
-        /// Least and greatest active voxel, both included; none when there is none.
+        /// Minimum and maximum active voxel, both inclusive; none if no voxel is active.
         active_bbox -> Option<([i32; 3], [i32; 3])>;
     }
 
@@ -303,7 +303,7 @@ impl GridRef<'_> {
         })
     }
 
-    /// Its address on the C++ side, and whether it is one of vectors.
+    /// Its address on the C++ side, and whether it is a vector grid.
     pub(super) fn address(&self) -> (usize, bool) {
         match self {
             Self::Floats(grid) => (std::ptr::from_ref::<ffi::Grid>(&grid.inner) as usize, false),

@@ -1,6 +1,7 @@
 //! Closed bodies of many shapes, the same for each state of the dice: round, bumpy, long, flat, with needles, and models from outside
 //! with fewer triangles.
 
+use super::skip::skipped;
 use std::collections::HashMap;
 
 use frazil::geometry::mesh::coincident;
@@ -312,7 +313,7 @@ pub fn models() -> Vec<TriMesh> {
     let read = |name: &&str| {
         let path = data(&format!("mesh/{name}"));
         if path.is_none() {
-            eprintln!("skipped: no mesh/{name}");
+            skipped(&format!("no mesh/{name}"));
         }
         let mut model = mesh::read(&path?).expect("a mesh");
         let same = coincident(model.positions.iter().map(|position| position.cast()));

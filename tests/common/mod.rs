@@ -23,6 +23,7 @@ pub mod repaired;
 pub mod rough_ground;
 pub mod shallow;
 pub mod shapes;
+pub mod skip;
 pub mod sleigh;
 pub mod soups;
 pub mod spot;

@@ -44,6 +44,7 @@ mod flow {
     mod pressure;
 }
 mod house {
+    mod circles;
     mod defaults;
     mod gates;
     mod imports;

@@ -1,4 +1,4 @@
-//! The border: every failure inside becomes a status and a message.
+//! The C boundary: every failure inside it becomes a status and a message.
 
 use std::any::Any;
 use std::cell::{Cell, RefCell};
@@ -16,25 +16,25 @@ pub enum frz_status {
     FRZ_OK = 0,
     /// An argument is NULL, out of range or not finite.
     FRZ_ERROR_ARGUMENT = 1,
-    /// The contents of a file, or of bytes in its position, cannot be used.
+    /// The contents of a file, or the bytes given in place of a file, cannot be used.
     FRZ_ERROR_FILE = 2,
     /// The operating system refused to read or write.
     FRZ_ERROR_IO = 3,
-    /// More memory would be needed than the context allows, or than there is.
+    /// More memory would be needed than the context allows, or than is available.
     FRZ_ERROR_MEMORY = 4,
     /// The context was cancelled; everything is as it was before the call.
     FRZ_CANCELLED = 5,
     /// OpenVDB cannot do this, for a reason that no other status covers.
     FRZ_ERROR_OPENVDB = 6,
-    /// An invariant of the library does not hold: a bug of frazil. The objects of the call are poisoned.
+    /// An internal invariant was violated: a bug in frazil. The objects of the call are poisoned.
     FRZ_ERROR_INTERNAL = 7,
     /// The handle saw FRZ_ERROR_INTERNAL before: it can only be destroyed.
     FRZ_ERROR_POISONED = 8,
-    /// The handle is in use by another call, in another thread or around this one.
+    /// The handle is in use by another call: on another thread, or the one within which this call is made.
     FRZ_ERROR_BUSY = 9,
     /// The caller's buffer is too small.
     FRZ_ERROR_CAPACITY = 10,
-    /// The caller's header and this library do not fit together.
+    /// The caller's header and this library are incompatible.
     FRZ_ERROR_VERSION = 11,
     /// The pointer is not a handle of the required kind.
     FRZ_ERROR_HANDLE = 12,
@@ -50,11 +50,11 @@ pub(in crate::capi) struct Failure {
     pub text: String,
 }
 
-/// A result on its way out.
+/// Result of the body of an interface function.
 pub(in crate::capi) type Outcome<T = ()> = Result<T, Failure>;
 
 impl Failure {
-    /// A failure with its words.
+    /// A failure with a message.
     pub(in crate::capi) fn new(status: frz_status, text: impl Into<String>) -> Self {
         Self { status, text: text.into() }
     }
@@ -80,17 +80,16 @@ impl From<Error> for Failure {
     }
 }
 
-/// Longest text of an error (bytes), with the zero at its end.
+/// Maximum length (bytes) of an error message, including its terminating zero.
 const LONGEST: usize = 1024;
 
 thread_local! {
-    // Nothing here needs to be destroyed: a thread may end after the library was unloaded.
+    // No destructor: a thread may end after the library is unloaded.
     static LAST: RefCell<[u8; LONGEST]> = const { RefCell::new([0; LONGEST]) };
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Runs the body of a function of the interface: a failure or a panic becomes its status and this thread's last
-/// error.
+/// Runs the body of an interface function. A failure or a panic becomes its status and this thread's last error.
 pub(in crate::capi) fn guard(body: impl FnOnce() -> Outcome) -> frz_status {
     keep_quiet();
     DEPTH.set(DEPTH.get() + 1);
@@ -105,7 +104,7 @@ pub(in crate::capi) fn guard(body: impl FnOnce() -> Outcome) -> frz_status {
     failure.status
 }
 
-/// As [`guard`], for functions that return something else than a status: `otherwise` when they fail.
+/// As [`guard`], for functions that do not return a status: `otherwise` is returned on failure.
 pub(in crate::capi) fn guard_value<T>(otherwise: T, body: impl FnOnce() -> Outcome<T>) -> T {
     let mut value = otherwise;
     guard(|| {
@@ -115,7 +114,7 @@ pub(in crate::capi) fn guard_value<T>(otherwise: T, body: impl FnOnce() -> Outco
     value
 }
 
-/// The text of this thread's last failed call; empty before the first.
+/// The message of this thread's last failed call; empty before the first.
 pub(in crate::capi) fn last_error() -> *const c_char {
     LAST.with_borrow(|text| text.as_ptr().cast())
 }
@@ -128,14 +127,14 @@ fn remember(text: &str) {
     });
 }
 
-/// Where a text may be cut so that at most so many bytes are left.
+/// The longest prefix of a text that has at most the given number of bytes and ends between characters.
 trait Cut {
     fn floor_char_boundary_at(&self, most: usize) -> usize;
 }
 
 impl Cut for str {
     fn floor_char_boundary_at(&self, most: usize) -> usize {
-        // A zero inside would end the text for C.
+        // C would end the text at an embedded zero.
         let end = self.find('\0').unwrap_or(self.len());
         (0..=most.min(end)).rev().find(|&at| self.is_char_boundary(at)).unwrap_or(0)
     }

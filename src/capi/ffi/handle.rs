@@ -9,7 +9,7 @@ use super::guard::{Failure, Outcome};
 
 /// A kind of handle.
 ///
-/// C knows only its name: a pointer to it is one to a [`Handle`] with its value.
+/// Opaque to C: a pointer to it is a pointer to a [`Handle`] that holds its value.
 pub(in crate::capi) trait Noun {
     /// The value of the handle.
     type Value;
@@ -19,28 +19,28 @@ pub(in crate::capi) trait Noun {
     const TAG: u32;
 }
 
-/// Memory of a destroyed handle, until it is used again.
+/// Tag of a destroyed handle, until its memory is reused.
 const GONE: u32 = 0xdead_0fff;
-/// Users of a handle that is being changed.
+/// Value of `users` while a handle is being changed.
 const CHANGING: i32 = -1;
 
-/// A value behind the header by which misuse is detected; all kinds begin with the tag.
+/// A value behind a header that detects misuse; handles of all kinds begin with the tag.
 #[repr(C)]
 pub(in crate::capi) struct Handle<T> {
     tag: AtomicU32,
-    /// Calls that read, or [`CHANGING`].
+    /// Number of calls that read it, or [`CHANGING`].
     users: AtomicI32,
     poisoned: AtomicBool,
     value: UnsafeCell<T>,
 }
 
-/// A handle that this call reads; other calls may read it too.
+/// A handle that this call reads; other calls may read it at the same time.
 pub(in crate::capi) struct Reading<'a, T>(&'a Handle<T>);
 
 /// A handle that this call alone uses; a panic poisons it.
 pub(in crate::capi) struct Changing<'a, T>(&'a Handle<T>);
 
-/// Gives a value to the host.
+/// Moves a value into a new handle and gives it to the host.
 ///
 /// # Safety
 /// `out` must be NULL or point to memory for a pointer.
@@ -52,18 +52,18 @@ pub(in crate::capi) unsafe fn give<N: Noun>(out: *mut *mut N, value: N::Value) -
         poisoned: AtomicBool::new(false),
         value: UnsafeCell::new(value),
     };
-    // SAFETY: the caller's promise, and it is not NULL.
+    // SAFETY: guaranteed by the caller, and it is not NULL.
     unsafe { out.write(Box::into_raw(Box::new(head)).cast()) };
     Ok(())
 }
 
-/// Zeroes the output of a call, if requested: its value after every failure.
+/// Zeroes an output of a call unless it is NULL: outputs are 0 after every failure.
 ///
 /// # Safety
 /// `out` must be NULL or point to memory for a number or pointer.
 pub(in crate::capi) unsafe fn clear<T>(out: *mut T) {
     if !out.is_null() {
-        // SAFETY: the caller's promise; all zeroes are 0 and NULL.
+        // SAFETY: guaranteed by the caller; all-zero bytes are 0 and NULL.
         unsafe { out.write_bytes(0, 1) };
     }
 }
@@ -88,7 +88,7 @@ unsafe fn look<'a, N: Noun>(pointer: *const N) -> Outcome<&'a Handle<N::Value>> 
     if !handle.is_aligned() {
         return Err(Failure::new(FRZ_ERROR_HANDLE, format!("the pointer is not a {}", N::NAME)));
     }
-    // SAFETY: the caller's promise; handles of all kinds begin with their tag.
+    // SAFETY: guaranteed by the caller; handles of all kinds begin with their tag.
     match unsafe { &(*handle).tag }.load(Ordering::Acquire) {
         // SAFETY: the tag says that it is a handle of this kind.
         tag if tag == N::TAG => Ok(unsafe { &*handle }),
@@ -102,7 +102,7 @@ unsafe fn look<'a, N: Noun>(pointer: *const N) -> Outcome<&'a Handle<N::Value>> 
 /// # Safety
 /// The pointer must be NULL or point to a handle of any kind that was not destroyed, for `'a`.
 pub(in crate::capi) unsafe fn read<'a, N: Noun>(pointer: *const N) -> Outcome<Reading<'a, N::Value>> {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let handle = unsafe { look(pointer) }?;
     let one_more = |users: i32| (users >= 0).then_some(users + 1);
     if handle.users.fetch_update(Ordering::Acquire, Ordering::Relaxed, one_more).is_err() {
@@ -113,14 +113,14 @@ pub(in crate::capi) unsafe fn read<'a, N: Noun>(pointer: *const N) -> Outcome<Re
     Ok(reading)
 }
 
-/// The handle behind a pointer, to read; none for NULL.
+/// The handle behind a pointer, to read; `None` for NULL.
 ///
 /// # Safety
 /// As [`read`].
 pub(in crate::capi) unsafe fn read_some<'a, N: Noun>(
     pointer: *const N,
 ) -> Outcome<Option<Reading<'a, N::Value>>> {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     if pointer.is_null() { Ok(None) } else { unsafe { read(pointer) }.map(Some) }
 }
 
@@ -129,7 +129,7 @@ pub(in crate::capi) unsafe fn read_some<'a, N: Noun>(
 /// # Safety
 /// As [`read`].
 pub(in crate::capi) unsafe fn change<'a, N: Noun>(pointer: *mut N) -> Outcome<Changing<'a, N::Value>> {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let handle = unsafe { look(pointer.cast_const()) }?;
     if handle.users.compare_exchange(0, CHANGING, Ordering::Acquire, Ordering::Relaxed).is_err() {
         return Err(busy::<N>());
@@ -139,20 +139,20 @@ pub(in crate::capi) unsafe fn change<'a, N: Noun>(pointer: *mut N) -> Outcome<Ch
     Ok(changing)
 }
 
-/// Destroys a handle; NULL is fine, and a handle in use is kept.
+/// Destroys a handle; NULL is ignored, and a handle in use is kept.
 ///
 /// # Safety
 /// As [`read`]; the handle must not be used afterwards.
 pub(in crate::capi) unsafe fn destroy<N: Noun>(pointer: *mut N) -> Outcome {
-    // SAFETY: the caller's promise; there are no parts.
+    // SAFETY: guaranteed by the caller; there are no lent handles.
     unsafe { destroy_whole::<N, N>(pointer, |_| Vec::new()) }
 }
 
-/// Destroys a handle whose value lends handles of its own, which its drop has to [`free`]; NULL is fine. Where one of
-/// all these is in use, all stay as they are.
+/// Destroys a handle whose value lends handles of its own, which its `Drop` must [`free`]; NULL is ignored. If any of them is in use, none
+/// is destroyed.
 ///
 /// # Safety
-/// As [`destroy`], also for the lent ones.
+/// As [`destroy`], also for the lent handles.
 pub(in crate::capi) unsafe fn destroy_whole<N: Noun, P: Noun>(
     pointer: *mut N,
     lent: impl FnOnce(&N::Value) -> Vec<*mut P>,
@@ -160,7 +160,7 @@ pub(in crate::capi) unsafe fn destroy_whole<N: Noun, P: Noun>(
     if pointer.is_null() {
         return Ok(());
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let handle = unsafe { look(pointer.cast_const()) }?;
     let whole = seize::<N>(handle)?;
     // SAFETY: nobody else uses it.
@@ -168,14 +168,14 @@ pub(in crate::capi) unsafe fn destroy_whole<N: Noun, P: Noun>(
     // SAFETY: they live as long as the value.
     let take = |part: &*mut P| seize::<P>(unsafe { look(part.cast_const()) }?);
     let parts = lent.iter().map(take).collect::<Outcome<Vec<Seized<'_, P::Value>>>>()?;
-    // None of them is in use now, nor can be again.
+    // None of them is in use now, and none can be used again.
     std::mem::forget((whole, parts));
     // SAFETY: made by `give`, and nobody uses it.
     unsafe { free(pointer) };
     Ok(())
 }
 
-/// Destroys a handle that can no longer be used.
+/// Frees a handle that can no longer be used.
 ///
 /// # Safety
 /// It must come from [`give`], and must not be used now or afterwards.
@@ -184,14 +184,14 @@ pub(in crate::capi) unsafe fn free<N: Noun>(pointer: *mut N) {
         return;
     }
     let handle = pointer.cast::<Handle<N::Value>>();
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         (*handle).tag.store(GONE, Ordering::Release);
         drop(Box::from_raw(handle));
     }
 }
 
-/// A handle that is locked against use; poisoned or not.
+/// A handle that is locked against use, poisoned or not.
 struct Seized<'a, T>(&'a Handle<T>);
 
 fn seize<N: Noun>(handle: &Handle<N::Value>) -> Outcome<Seized<'_, N::Value>> {
@@ -314,7 +314,7 @@ mod tests {
 
     impl Drop for Shelf {
         fn drop(&mut self) {
-            // SAFETY: the test lets nobody use it then.
+            // SAFETY: the test no longer uses it.
             unsafe { free(self.0) };
         }
     }

@@ -1,6 +1,6 @@
-//! The border itself: statuses, handles, views of a host's memory, saved states.
+//! The C boundary itself: statuses, handles, views of a host's memory, saved states.
 
-// In the header's order.
+// In the order of the header.
 pub(in crate::capi) mod guard;
 
 pub(in crate::capi) mod views;

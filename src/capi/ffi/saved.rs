@@ -1,4 +1,4 @@
-//! States that a host saves and brings back.
+//! States that a host saves and restores.
 
 use std::ffi::c_void;
 use std::sync::{Mutex, PoisonError};
@@ -8,17 +8,17 @@ use super::views::write_bytes;
 use crate::context::Context;
 use crate::error::{Error, Result};
 
-/// The bytes of a state whose size was asked for: they are handed out next.
+/// The bytes of a state whose size was queried, kept for the call that copies them.
 #[derive(Default)]
 pub(in crate::capi) struct Saved(Mutex<Option<Vec<u8>>>);
 
 impl Saved {
-    /// Drops the bytes: what they are of has changed. Returns them.
+    /// Removes and returns the bytes, which are outdated once the object changes.
     pub(in crate::capi) fn take(&self) -> Option<Vec<u8>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Writes a state to the host, or reports its size, as [`write_bytes`] does; `save` makes it where it is not there yet.
+    /// Writes a state to the host, or reports its size, as [`write_bytes`] does; `save` makes it unless it was kept.
     ///
     /// # Safety
     /// As [`write_bytes`].
@@ -27,22 +27,22 @@ impl Saved {
         (dst, capacity, size): (*mut c_void, usize, *mut usize),
         save: impl FnOnce() -> Result<Vec<u8>>,
     ) -> Outcome {
-        // Nothing is locked while polls of the host run.
+        // No lock is held while the host's poll function runs.
         let bytes = match self.take() {
             Some(bytes) => bytes,
             None => save()?,
         };
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let written = unsafe { write_bytes(dst, capacity, size, || bytes.len(), || Ok(bytes.as_slice())) };
         if dst.is_null() || written.is_err() {
-            // A caller that asked for the size, or had too little room, calls a second time.
+            // A caller that queried the size, or whose buffer was too small, calls again.
             *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(bytes);
         }
         written
     }
 }
 
-/// What `resume` makes of a saved state of a `noun`, which takes so many bytes before it is packed.
+/// Resumes from a saved state of a `noun`, which has `unpacked` bytes when unpacked.
 pub(in crate::capi) fn resumed<T: Send>(
     ctx: &Context,
     noun: &str,

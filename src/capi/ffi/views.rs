@@ -1,4 +1,4 @@
-//! Arrays and structs that cross the border: the only position that follows a host's pointers.
+//! Arrays and structs that cross the boundary: the only code that follows a host's array and struct pointers.
 
 use std::ffi::{CStr, c_char, c_void};
 use std::ops::RangeInclusive;
@@ -8,34 +8,34 @@ use super::guard::frz_status::FRZ_ERROR_VERSION;
 use super::guard::{Failure, Outcome};
 use crate::numeric::digits;
 
-/// An array that the caller lends for the time of the call.
+/// An array that the caller lends for the duration of the call.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct frz_view {
-    /// First element; NULL when there is none. It need not be aligned.
+    /// First element; NULL if there is none. It need not be aligned.
     pub data: *const c_void,
     /// Number of elements.
     pub count: usize,
-    /// Bytes from one element to the next; 0: they are packed.
+    /// Bytes from one element to the next; 0: elements are packed.
     pub stride: usize,
 }
 
-/// Memory of the caller that is written in the time of the call.
+/// Memory of the caller that a call writes to.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct frz_span {
-    /// First element; NULL where the function says so. It need not be aligned.
+    /// First element; NULL where the function allows it. It need not be aligned.
     pub data: *mut c_void,
-    /// Elements that there is room for.
+    /// Number of elements that fit.
     pub count: usize,
-    /// Bytes from one element to the next; 0: they are packed. Bytes between elements are not touched.
+    /// Bytes from one element to the next; 0: elements are packed. Bytes between elements are not touched.
     pub stride: usize,
 }
 
-/// Types of which any bytes are a value.
+/// Types for which any bytes are a valid value.
 ///
 /// # Safety
-/// Every pattern of bits must be valid.
+/// Every bit pattern must be valid.
 pub(in crate::capi) unsafe trait Plain: Copy {}
 // SAFETY: numbers and arrays of numbers.
 unsafe impl Plain for u8 {}
@@ -72,10 +72,10 @@ unsafe impl Plain for [u64; 8] {}
 // SAFETY: as above.
 unsafe impl Plain for [u32; 3] {}
 
-/// Most memory that one array may span (bytes): the largest pointer offset.
+/// Maximum memory that one array may span (bytes): the largest pointer offset.
 const MOST: usize = isize::MAX as usize;
 
-/// Bytes between elements, when all of them can be reached.
+/// Bytes between elements; an error if pointers cannot reach all of them.
 fn stride<T>(name: &str, data: *const c_void, count: usize, stride: usize) -> Outcome<usize> {
     let size = size_of::<T>();
     let stride = if stride == 0 { size } else { stride };
@@ -105,7 +105,7 @@ impl frz_view {
     /// # Safety
     /// The view must describe memory that can be read.
     pub(in crate::capi) unsafe fn elements<T: Plain>(&self, name: &str) -> Outcome<Vec<T>> {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let elements = unsafe { self.in_place::<T>(name) }?;
         let mut out = Vec::new();
         out.try_reserve_exact(self.count)
@@ -114,7 +114,7 @@ impl frz_view {
         Ok(out)
     }
 
-    /// The elements one after another, read where they lie.
+    /// The elements one by one, read in place.
     ///
     /// # Safety
     /// The view must describe memory that can be read, for `'a`.
@@ -124,12 +124,12 @@ impl frz_view {
     ) -> Outcome<impl ExactSizeIterator<Item = T> + Clone + use<'a, T>> {
         let stride = stride::<T>(name, self.data, self.count, self.stride)?;
         let first = self.data.cast::<u8>();
-        // SAFETY: the caller's promise, and the whole span was checked to be one that pointers can reach.
+        // SAFETY: guaranteed by the caller, and the whole span was checked to be reachable by pointers.
         let element = move |index: usize| unsafe { first.add(index * stride).cast::<T>().read_unaligned() };
         Ok((0..self.count).map(element))
     }
 
-    /// Packed bytes where they lie.
+    /// Packed bytes, in place.
     ///
     /// # Safety
     /// As [`frz_view::in_place`].
@@ -138,7 +138,7 @@ impl frz_view {
         if self.count == 0 {
             return Ok(&[]);
         }
-        // SAFETY: the caller's promise, and all of them can be reached.
+        // SAFETY: guaranteed by the caller, and all of them can be reached.
         Ok(unsafe { std::slice::from_raw_parts(self.data.cast(), self.count) })
     }
 
@@ -147,7 +147,7 @@ impl frz_view {
     /// # Safety
     /// As [`frz_view::elements`].
     pub(in crate::capi) unsafe fn finite(&self, name: &str) -> Outcome<Vec<[f32; 3]>> {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let elements = unsafe { self.elements::<[f32; 3]>(name) }?;
         match elements.iter().position(|triple| !triple.iter().all(|number| number.is_finite())) {
             Some(at) => Err(Failure::argument(format!("{name}: element {at} is not finite"))),
@@ -157,16 +157,16 @@ impl frz_view {
 }
 
 impl frz_span {
-    /// Writes elements, if there is room for all of them.
+    /// Writes elements if there is room for all of them.
     ///
     /// # Safety
     /// The span must describe memory that can be written.
     pub(in crate::capi) unsafe fn fill<T: Plain>(&self, name: &str, elements: &[T]) -> Outcome {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { self.put(name, elements.iter().copied()) }
     }
 
-    /// Refuses a span that has no room for so many elements.
+    /// Refuses a span with room for fewer elements than `needed`.
     pub(in crate::capi) fn check_room(&self, name: &str, needed: usize) -> Outcome {
         if self.count < needed {
             let text = format!("{name}: there is room for {} elements, {needed} are needed", self.count);
@@ -175,7 +175,7 @@ impl frz_span {
         Ok(())
     }
 
-    /// As [`frz_span::fill`], one after another.
+    /// As [`frz_span::fill`], from an iterator.
     ///
     /// # Safety
     /// As [`frz_span::fill`].
@@ -188,13 +188,13 @@ impl frz_span {
         let stride = stride::<T>(name, self.data, elements.len(), self.stride)?;
         let first = self.data.cast::<u8>();
         for (index, element) in elements.enumerate() {
-            // SAFETY: the caller's promise, and the whole span was checked to be one that pointers can reach.
+            // SAFETY: guaranteed by the caller, and the whole span was checked to be reachable by pointers.
             unsafe { first.add(index * stride).cast::<T>().write_unaligned(element) };
         }
         Ok(())
     }
 
-    /// Packed, aligned numbers to be written in place, `width` an element; none where the data are NULL.
+    /// Packed, aligned numbers to be written in place, `width` for each element; `None` if the data are NULL.
     ///
     /// # Safety
     /// As [`frz_span::fill`], for `'a`; nothing else may use the memory meanwhile.
@@ -220,11 +220,11 @@ impl frz_span {
         }
         let count = self.count.saturating_mul(width);
         stride::<T>(name, self.data, count, 0)?;
-        // SAFETY: the caller's promise, and all of it can be reached.
+        // SAFETY: guaranteed by the caller, and all of it can be reached.
         Ok(Some(unsafe { std::slice::from_raw_parts_mut(first, count) }))
     }
 
-    /// Reports how many elements there are, and writes them unless the span's data are NULL.
+    /// Reports the number of elements, and writes them unless the span's data are NULL.
     ///
     /// # Safety
     /// As [`frz_span::fill`]; `count` must be writable.
@@ -234,7 +234,7 @@ impl frz_span {
         total: usize,
         elements: impl FnOnce() -> Outcome<Vec<T>>,
     ) -> Outcome {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe {
             if self.data.is_null() {
                 count.write(total);
@@ -247,7 +247,7 @@ impl frz_span {
     }
 }
 
-/// Writes bytes to the host, or reports how many there are: with `dst` NULL, `size` becomes `bound` at least.
+/// Writes bytes to the host, or reports how many there are: with `dst` NULL, `size` receives `bound`, an upper bound.
 ///
 /// # Safety
 /// `dst` must be NULL or have room for `capacity` bytes; `size` must be NULL or point to a number.
@@ -259,7 +259,7 @@ pub(in crate::capi) unsafe fn write_bytes<B: AsRef<[u8]>>(
     bytes: impl FnOnce() -> Outcome<B>,
 ) -> Outcome {
     let size = super::handle::required(size, "size")?;
-    // SAFETY: the caller's promise, and it is not NULL.
+    // SAFETY: guaranteed by the caller, and it is not NULL.
     let tell = |count: usize| unsafe { size.write(count) };
     tell(0);
     if dst.is_null() {
@@ -273,12 +273,12 @@ pub(in crate::capi) unsafe fn write_bytes<B: AsRef<[u8]>>(
         let text = format!("there is room for {capacity} bytes, {} are needed", bytes.len());
         return Err(Failure::new(FRZ_ERROR_CAPACITY, text));
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), dst.cast(), bytes.len()) };
     Ok(())
 }
 
-/// Refuses a value that is not finite, by its name.
+/// Refuses a value that is not finite, naming it.
 pub(in crate::capi) fn finite(name: &str, value: f64) -> Outcome {
     if value.is_finite() { Ok(()) } else { Err(Failure::argument(format!("{name} is not finite"))) }
 }
@@ -294,7 +294,7 @@ pub(in crate::capi) fn within(name: &str, value: f64, range: RangeInclusive<f64>
     Ok(())
 }
 
-/// The value for a number of a host's enum.
+/// Maps a number of a host's enum to its value.
 pub(in crate::capi) fn meaning<T: Copy>(
     name: &str,
     kind: &str,
@@ -307,15 +307,15 @@ pub(in crate::capi) fn meaning<T: Copy>(
         .ok_or_else(|| Failure::argument(format!("{name} = {number} is not a value of {kind}")))
 }
 
-/// A text of the host; none for NULL.
+/// A host's text; `None` for NULL.
 ///
 /// # Safety
-/// The pointer must be NULL or point to a text that ends with a zero.
+/// The pointer must be NULL or point to a zero-terminated text.
 pub(in crate::capi) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Outcome<Option<&'a str>> {
     if pointer.is_null() {
         return Ok(None);
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let text = unsafe { CStr::from_ptr(pointer) };
     text.to_str().map(Some).map_err(|_| Failure::argument(format!("{name} is not valid UTF-8")))
 }
@@ -325,32 +325,32 @@ pub(in crate::capi) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Ou
 /// # Safety
 /// As [`text`].
 pub(in crate::capi) unsafe fn required_text<'a>(pointer: *const c_char, name: &str) -> Outcome<&'a str> {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { text(pointer, name) }?.ok_or_else(|| Failure::argument(format!("{name} is NULL")))
 }
 
 /// A struct that begins with its own size: a host's header may be older or newer than this library.
 ///
 /// # Safety
-/// The struct must be `repr(C)`, begin with a `u32` of its size, and consist of numbers and pointers for which all
-/// zeroes are a value.
+/// The struct must be `repr(C)`, begin with a `u32` that holds its size, and consist of numbers and pointers for which zero bytes are a
+/// valid value.
 pub(in crate::capi) unsafe trait Sized32: Copy {
-    /// Sizes that a header may give: after the fields of each version.
+    /// Sizes that a header may state: the end of the fields of each version.
     const SIZES: &'static [usize];
     /// Its name in messages.
     const NAME: &'static str;
 }
 
-/// A host's struct over defaults: fields that its header does not have keep them.
+/// Reads a host's struct over defaults, which fields that its header does not have keep.
 ///
 /// # Safety
-/// The pointer must be NULL or point to a struct of the size in its struct_size.
+/// The pointer must be NULL or point to a struct of the size that its struct_size states.
 pub(in crate::capi) unsafe fn sized<T: Sized32>(pointer: *const T, mut defaults: T) -> Outcome<T> {
     let pointer = super::handle::required(pointer.cast_mut(), T::NAME)?;
-    // SAFETY: the caller's promise: a size is there at least.
+    // SAFETY: guaranteed by the caller: there is at least a size.
     let size = unsafe { pointer.cast::<u32>().read_unaligned() } as usize;
     check_size::<T>(size)?;
-    // SAFETY: so many bytes are there, and no more than the struct has are copied.
+    // SAFETY: `size` bytes are readable, and no more than the struct has are copied.
     unsafe {
         std::ptr::copy_nonoverlapping(
             pointer.cast::<u8>(),
@@ -359,7 +359,7 @@ pub(in crate::capi) unsafe fn sized<T: Sized32>(pointer: *const T, mut defaults:
         );
     }
     let beyond = size.saturating_sub(size_of::<T>());
-    // SAFETY: as above: the bytes up to the size that the struct says.
+    // SAFETY: as above: the bytes up to the size that the struct states.
     let newer = unsafe { std::slice::from_raw_parts(pointer.cast::<u8>().add(size - beyond), beyond) };
     if newer.iter().any(|&byte| byte != 0) {
         let text = format!(
@@ -371,16 +371,16 @@ pub(in crate::capi) unsafe fn sized<T: Sized32>(pointer: *const T, mut defaults:
     Ok(defaults)
 }
 
-/// Fills a host's struct, as far as its header knows it.
+/// Fills a host's struct with the fields that its header has.
 ///
 /// # Safety
-/// The pointer must be NULL or have room for the bytes that the struct, or `size`, says.
+/// The pointer must be NULL or have room for as many bytes as the struct, or `size`, states.
 pub(in crate::capi) unsafe fn fill<T: Sized32>(pointer: *mut T, size: Option<usize>, value: T) -> Outcome {
     let pointer = super::handle::required(pointer, T::NAME)?;
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let size = size.unwrap_or_else(|| unsafe { pointer.cast::<u32>().read_unaligned() } as usize);
     check_size::<T>(size)?;
-    // SAFETY: as many bytes are there.
+    // SAFETY: that many bytes are writable.
     unsafe {
         pointer.cast::<u8>().write_bytes(0, size);
         std::ptr::copy_nonoverlapping(
@@ -393,10 +393,10 @@ pub(in crate::capi) unsafe fn fill<T: Sized32>(pointer: *mut T, size: Option<usi
     Ok(())
 }
 
-/// Largest struct that a newer header is believed to have (bytes).
+/// Maximum size (bytes) accepted for a struct of a newer header.
 const LARGEST: usize = 4096;
 
-/// Refuses sizes that no version of a struct has.
+/// Refuses a size that no version of a struct has.
 pub(in crate::capi) fn check_size<T: Sized32>(size: usize) -> Outcome {
     let known = T::SIZES.contains(&size) || (size > size_of::<T>() && size <= LARGEST);
     if !known {
@@ -428,7 +428,7 @@ mod tests {
 
     #[test]
     fn older_headers_get_defaults_and_newer_ones_are_read_as_far_as_known() {
-        // SAFETY: all structs have the bytes that they say.
+        // SAFETY: all structs have as many bytes as they state.
         unsafe {
             let older = Params { struct_size: 8, first: 5.0, second: u64::MAX };
             assert_eq!(

@@ -13,7 +13,7 @@ use crate::context::Context;
 use crate::vdb::file::{self, Compression, WriteOptions};
 use crate::vdb::{AnyGrid, GridRef};
 
-/// How the values of a .vdb file are packed.
+/// Compression of the values of a .vdb file.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_compression {
@@ -25,7 +25,7 @@ pub enum frz_compression {
     FRZ_COMPRESSION_NONE = 2,
 }
 
-/// Flag of frz_grid_save and frz_grid_to_bytes: values in 16 bits, for files that are only rendered.
+/// Flag of frz_grid_save and frz_grid_to_bytes: values are stored in 16 bits, for files that are only rendered.
 pub const FRZ_HALF: u32 = 1;
 
 fn options(compression: u32, flags: u32) -> Outcome<WriteOptions> {
@@ -48,10 +48,10 @@ struct Pointer(*const frz_grid);
 unsafe impl Plain for Pointer {}
 
 /// # Safety
-/// `grids` must be NULL or `count` pointers to grids.
+/// `grids` must be NULL or point to `count` pointers to grids.
 unsafe fn several<'a>(grids: *const *const frz_grid, count: usize) -> Outcome<Vec<Reading<'a, Grid>>> {
     let view = frz_view { data: grids.cast(), count, stride: 0 };
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let grids = unsafe { view.elements::<Pointer>("grids") }?;
     if grids.is_empty() {
         return Err(Failure::argument("grids: there is none"));
@@ -67,17 +67,17 @@ unsafe fn several<'a>(grids: *const *const frz_grid, count: usize) -> Outcome<Ve
     Ok(grids)
 }
 
-/// A function of the interface that reads a grid from a file.
+/// An interface function that reads a grid from a file.
 ///
 /// # Safety
-/// The pointers must be NULL or the caller's.
+/// The pointers must be NULL or valid.
 pub(in crate::capi) unsafe fn loads(
     context: *mut frz_context,
     [path, name]: [*const c_char; 2],
     out: *mut *mut frz_grid,
     load: impl FnOnce(&Context, &Path, Option<&str>) -> Outcome<AnyGrid>,
 ) -> frz_status {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         creates(context, out, |ctx| {
             let path = Path::new(required_text(path, "path")?);
@@ -86,11 +86,11 @@ pub(in crate::capi) unsafe fn loads(
     }
 }
 
-/// Reads a grid of floats or of vectors from a .vdb file. A cancel is heeded before and after the work, not within.
+/// Reads a grid of floats or of vectors from a .vdb file. A cancel takes effect before and after the work, not during it.
 ///
 /// path: UTF-8.
-/// name: which grid; NULL for the first level set, else the first grid of floats, else the first of vectors.
-///     FRZ_ERROR_FILE names those that there are when it is not found, and the type when it is another.
+/// name: which grid; NULL for the first level set, else the first grid of floats, else the first of vectors. If there is no such grid
+///     FRZ_ERROR_FILE lists the existing ones; if its type is not supported FRZ_ERROR_FILE names the type.
 /// out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
 ///
 /// One thread at a time for each context.
@@ -108,14 +108,14 @@ pub unsafe extern "C" fn frz_grid_load(
             file::read_any(path, name)
         })?)
     };
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe { loads(context, [path, name], out, load) }
 }
 
-/// Writes grids into one .vdb file. The file appears only when complete: it is written under another name first. A cancel is
-/// heeded before it is begun, not within.
+/// Writes grids into one .vdb file. The file appears only when complete: it is written under a temporary name first. A cancel takes effect
+/// before the writing begins, not during it.
 ///
-/// grids: count pointers to grids of different names.
+/// grids: count pointers to grids with different names.
 /// path: UTF-8; an existing file is replaced.
 /// compression: a frz_compression.
 /// flags: 0 or FRZ_HALF, which is refused for numbers over 65,504.
@@ -131,7 +131,7 @@ pub unsafe extern "C" fn frz_grid_save(
     flags: u32,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let call = enter(context)?;
             let ctx = call.ctx();
@@ -146,8 +146,8 @@ pub unsafe extern "C" fn frz_grid_save(
 
 /// Reads a grid of floats or of vectors from the bytes of a .vdb file.
 ///
-/// Bytes must come from a .vdb file: OpenVDB does not survive every kind of damage. What cannot be used is
-/// FRZ_ERROR_FILE. A cancel is heeded before and after the work, not within.
+/// The bytes must come from a .vdb file: OpenVDB does not survive every kind of damage. Bytes that cannot be used are FRZ_ERROR_FILE. A
+/// cancel takes effect before and after the work, not during it.
 ///
 /// bytes: size bytes.
 /// name: as in frz_grid_load.
@@ -162,7 +162,7 @@ pub unsafe extern "C" fn frz_grid_from_bytes(
     name: *const c_char,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             ctx.allow("a grid from bytes", size as u64)?;
@@ -173,15 +173,15 @@ pub unsafe extern "C" fn frz_grid_from_bytes(
     }
 }
 
-/// Writes grids as the bytes of one .vdb file, the same bytes for the same grids. A cancel is heeded before and after the
-/// work, not within.
+/// Writes grids as the bytes of one .vdb file; equal grids give equal bytes. A cancel takes effect before and after the work, not during
+/// it.
 ///
-/// grids: count pointers to grids of different names.
+/// grids: count pointers to grids with different names.
 /// compression: a frz_compression.
 /// flags: 0 or FRZ_HALF, which is refused for numbers over 65,504.
-/// dst: room for capacity bytes. NULL: size receives a number that certainly suffices, and nothing is written.
-/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
-/// size: receives the bytes that were written, or are needed; 0 after other failures.
+/// dst: room for capacity bytes. NULL: only an upper bound of the size is reported.
+/// capacity: size of dst (bytes). FRZ_ERROR_CAPACITY if it is too small.
+/// size: receives the number of bytes written, or needed; 0 after other failures.
 ///
 /// Any number of threads may read a grid; one thread at a time for each context.
 #[unsafe(no_mangle)]
@@ -196,7 +196,7 @@ pub unsafe extern "C" fn frz_grid_to_bytes(
     size: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(size);
             let call = enter(context)?;

@@ -1,4 +1,4 @@
-//! Grids out of a host's blocks of voxels.
+//! Grids from a host's blocks of voxels.
 
 use std::collections::HashSet;
 use std::ffi::c_char;
@@ -19,18 +19,17 @@ use crate::vdb::{AnyGrid, FloatGrid, GridClass, VectorEdit, VectorGrid, Vectors}
 pub struct frz_grid_desc {
     /// sizeof(frz_grid_desc).
     pub struct_size: u32,
-    /// A frz_grid_class. A level set gets the sign of its band everywhere outside the leaves. Of vectors FRZ_GRID_UNKNOWN
-    /// or FRZ_GRID_STAGGERED.
+    /// A frz_grid_class. A level set takes the sign of its band everywhere outside the leaves. For vectors FRZ_GRID_UNKNOWN or
+    /// FRZ_GRID_STAGGERED.
     pub grid_class: u32,
     /// Edge of a voxel (m), 1e-6 to 1000.
     pub voxel_size: f64,
-    /// Value where nothing is stored, finite. For a level set the half width of its band (m), at least 3 voxels. 0 for
-    /// vectors.
+    /// Value where nothing is stored, finite. For a level set the half width of its band (m), at least 3 voxels. 0 for vectors.
     pub background: f32,
-    /// 0.
+    /// Must be 0.
     pub flags: u32,
-    /// Leaves, with different origins; NULL for none. Values are finite. A mask of NULL makes all voxels active, of a
-    /// level set those nearer than the background.
+    /// Leaves, with different origins; NULL for none. Values are finite. If a mask is NULL all voxels are active, or, in a level set, those
+    /// nearer to the surface than the background.
     pub leaves: *const frz_leaf,
     /// Number of leaves, or of vector_leaves.
     pub leaf_count: usize,
@@ -38,14 +37,14 @@ pub struct frz_grid_desc {
     pub name: *const c_char,
     /// A frz_value_type.
     pub value_type: u32,
-    /// Of vectors the value where nothing is stored, finite; else zeroes.
+    /// For vectors the value where nothing is stored, finite; else zeroes.
     pub background_vector: [f32; 3],
-    /// As leaves, which are NULL then, of a grid of vectors; else NULL.
+    /// Leaves of a grid of vectors, as leaves, which must then be NULL; else NULL.
     pub vector_leaves: *const frz_vector_leaf,
 }
 
 impl frz_grid_desc {
-    /// Values of fields that an older header does not have.
+    /// Values of the fields that an older header does not have.
     const NONE: Self = Self {
         struct_size: 0,
         grid_class: 0,
@@ -71,12 +70,12 @@ unsafe impl Sized32 for frz_grid_desc {
     const NAME: &'static str = "frz_grid_desc";
 }
 
-/// Where leaves lie: at positions of blocks, one at each.
+/// The origins of leaves: multiples of 8, each used once.
 #[derive(Default)]
 struct Places(HashSet<Origin>);
 
 impl Places {
-    /// Checks the position of the next leaf, which is the one with this number.
+    /// Checks the origin of the next leaf, the one with index `at`.
     fn add(&mut self, at: usize, origin: Origin) -> Outcome<Origin> {
         let named = |failure: Failure| Failure { text: format!("leaf {at}: {}", failure.text), ..failure };
         if !self.0.insert(check_origin(origin).map_err(named)?) {
@@ -94,7 +93,7 @@ fn check_values(at: usize, values: &[f32]) -> Outcome {
     Err(Failure::argument(format!("leaf {at}: a value is not finite")))
 }
 
-/// The active voxels of a leaf; none where the host leaves them to us.
+/// The active voxels of a leaf; `None` if the host does not specify them.
 ///
 /// # Safety
 /// The pointer must be NULL or point to 8 words.
@@ -103,7 +102,7 @@ unsafe fn mask_of(mask: *const u64) -> Outcome<Option<Mask>> {
         return Ok(None);
     }
     let mask = frz_view { data: mask.cast(), count: 1, stride: 0 };
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     Ok(Some(unsafe { mask.elements::<Mask>("mask") }?[0]))
 }
 
@@ -113,7 +112,7 @@ unsafe fn mask_of(mask: *const u64) -> Outcome<Option<Mask>> {
 /// The description must describe memory that can be read.
 unsafe fn blocks(desc: &frz_grid_desc, class: GridClass) -> Outcome<Vec<BlockEdit>> {
     let view = frz_view { data: desc.leaves.cast(), count: desc.leaf_count, stride: 0 };
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let leaves = unsafe { view.elements::<frz_leaf>("leaves") }?;
     let mut positions = Places::default();
     let mut out = Vec::with_capacity(leaves.len());
@@ -125,20 +124,20 @@ unsafe fn blocks(desc: &frz_grid_desc, class: GridClass) -> Outcome<Vec<BlockEdi
             continue;
         }
         let values = frz_view { data: leaf.values.cast(), count: 1, stride: 0 };
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let values: Box<Values> = Box::new(unsafe { values.elements::<Values>("values") }?[0]);
         check_values(at, &*values)?;
         let band = |index: usize| class != GridClass::LevelSet || values[index].abs() < desc.background;
         let near =
             || std::array::from_fn(|x| (0..64).fold(0, |word, at| word | u64::from(band(x << 6 | at)) << at));
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let mask = unsafe { mask_of(leaf.mask) }?.unwrap_or_else(near);
         out.push(BlockEdit::Dense(Block { origin, values, mask }));
     }
     Ok(out)
 }
 
-/// A grid of floats as it is described.
+/// A grid of floats from its description.
 ///
 /// # Safety
 /// As [`blocks`].
@@ -158,7 +157,7 @@ unsafe fn of_floats(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> Ou
         return Err(Failure::argument("grid_class: floats are not staggered, vectors are"));
     }
     ctx.allow("a grid", (desc.leaf_count as u64).saturating_mul((VOXELS * 8 + 64) as u64))?;
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let blocks = unsafe { blocks(desc, class) }?;
     let mut grid = FloatGrid::new(desc.voxel_size, desc.background)?;
     grid.set_class(class)?;
@@ -171,7 +170,7 @@ unsafe fn of_floats(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> Ou
     })?)
 }
 
-/// A grid of vectors as it is described.
+/// A grid of vectors from its description.
 ///
 /// # Safety
 /// The description must describe memory that can be read.
@@ -188,7 +187,7 @@ unsafe fn of_vectors(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> O
     }
     let bytes = (VOXELS * 2 * size_of::<[f32; 3]>() + 64) as u64;
     ctx.allow("a grid", (desc.leaf_count as u64).saturating_mul(bytes))?;
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let edits = unsafe { edits(desc) }?;
     let mut grid = VectorGrid::new(desc.voxel_size, desc.background_vector)?;
     grid.set_class(class)?;
@@ -202,7 +201,7 @@ unsafe fn of_vectors(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> O
 /// As [`of_vectors`].
 unsafe fn edits(desc: &frz_grid_desc) -> Outcome<Vec<VectorEdit>> {
     let view = frz_view { data: desc.vector_leaves.cast(), count: desc.leaf_count, stride: 0 };
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let leaves = unsafe { view.elements::<frz_vector_leaf>("vector_leaves") }?;
     let mut positions = Places::default();
     let mut out = Vec::with_capacity(leaves.len());
@@ -214,17 +213,17 @@ unsafe fn edits(desc: &frz_grid_desc) -> Outcome<Vec<VectorEdit>> {
             continue;
         }
         let values = frz_view { data: leaf.values.cast(), count: 1, stride: 0 };
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let values: Box<Vectors> = Box::new(unsafe { values.elements::<Vectors>("values") }?[0]);
         check_values(at, values.as_flattened())?;
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let mask = unsafe { mask_of(leaf.mask) }?.unwrap_or([u64::MAX; DIM]);
         out.push(VectorEdit::Dense { origin, values, mask });
     }
     Ok(out)
 }
 
-/// Makes a grid from blocks of voxels, which are copied.
+/// Creates a grid from blocks of voxels, which are copied.
 ///
 /// desc: its description.
 /// out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
@@ -236,7 +235,7 @@ pub unsafe extern "C" fn frz_grid_create(
     desc: *const frz_grid_desc,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let desc = sized(desc, frz_grid_desc::NONE)?;

@@ -12,17 +12,17 @@ use crate::vdb::{Leaf, Probe, VectorLeaf, VectorProbe};
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_leaf {
-    /// Voxel of the least corner, multiples of 8.
+    /// Minimum voxel of the block, multiples of 8.
     pub origin: [i32; 3],
-    /// The value of all voxels where values is NULL.
+    /// The value of all voxels if values is NULL.
     pub tile: f32,
     /// 512 values, or NULL.
     pub values: *const f32,
-    /// 8 words: which voxels are active; NULL where values is NULL.
+    /// 8 words: which voxels are active; NULL if values is NULL.
     pub mask: *const u64,
 }
 
-// SAFETY: numbers and pointers, which are looked at only after the host promised them.
+// SAFETY: numbers and pointers, which are followed only under the host's guarantee.
 unsafe impl Plain for frz_leaf {}
 
 /// A block of 8 x 8 x 8 voxels of vectors. Voxel (x, y, z) of the block has its float[3] at x * 64 + y * 8 + z, and its
@@ -30,23 +30,23 @@ unsafe impl Plain for frz_leaf {}
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_vector_leaf {
-    /// Voxel of the least corner, multiples of 8.
+    /// Minimum voxel of the block, multiples of 8.
     pub origin: [i32; 3],
-    /// The value of all voxels where values is NULL.
+    /// The value of all voxels if values is NULL.
     pub tile: [f32; 3],
     /// 512 times float[3], or NULL.
     pub values: *const f32,
-    /// 8 words: which voxels are active; NULL where values is NULL.
+    /// 8 words: which voxels are active; NULL if values is NULL.
     pub mask: *const u64,
 }
 
-// SAFETY: numbers and pointers, which are looked at only after the host promised them.
+// SAFETY: numbers and pointers, which are followed only under the host's guarantee.
 unsafe impl Plain for frz_vector_leaf {}
 
-/// Farthest voxel of a leaf from the origin.
+/// Maximum distance of a leaf's voxels from the origin.
 const FARTHEST: i32 = 1 << 30;
 
-/// Checks the position of a block.
+/// Checks the origin of a block.
 pub(in crate::capi) fn check_origin(origin: Origin) -> Outcome<Origin> {
     if origin.iter().any(|&index| index & 7 != 0 || !(-FARTHEST..=FARTHEST).contains(&index)) {
         let text = format!("origin {origin:?} is not a block's: multiples of 8 within -2^30 to 2^30");
@@ -59,14 +59,13 @@ fn leaf_view(leaf: &Leaf<'_>) -> frz_leaf {
     frz_leaf { origin: leaf.origin, tile: 0.0, values: leaf.values.as_ptr(), mask: leaf.mask.as_ptr() }
 }
 
-/// Lends the leaves of a grid of floats without copying them, in an order that does not change while the grid does not.
+/// Lends the leaves of a grid of floats without copying them, in an order that changes only when the grid changes.
 ///
-/// Blocks without a leaf have one value: the background, or for a level set plus or minus the background. Values of a
-/// level set are distances (m).
+/// Blocks without a leaf have a single value: the background, or for a level set plus or minus the background. Values of a level set are
+/// distances (m).
 ///
-/// dst: room for leaf_count elements of frz_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when it
-///     is too small. The pointers in it are the grid's: they stay until it is changed or destroyed, those of a base
-///     layer until its next step.
+/// dst: room for leaf_count elements of frz_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY if it is too small. The
+///     pointers in it belong to the grid: they are valid until it is changed or destroyed, those of a base layer until its next step.
 /// count: receives the number of leaves; 0 after other failures.
 ///
 /// Any number of threads may read a grid.
@@ -78,7 +77,7 @@ pub unsafe extern "C" fn frz_grid_leaves(
 ) -> frz_status {
     guard(|| {
         let count = required(count, "count")?;
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             count.write(0);
             let held = read(grid)?;
@@ -88,10 +87,10 @@ pub unsafe extern "C" fn frz_grid_leaves(
     })
 }
 
-/// Lends the leaves of a grid of floats at some origins, or the value of all 512 voxels there.
+/// Lends the leaves of a grid of floats at given origins, or the value that all 512 voxels there have.
 ///
-/// origins: int32_t[3] for each position, multiples of 8, for instance those of frz_base_dirty.
-/// dst: room for as many elements of frz_leaf, whose pointers stay as those of frz_grid_leaves do.
+/// origins: int32_t[3] for each block, multiples of 8, for instance those of frz_base_dirty.
+/// dst: room for as many elements of frz_leaf; their pointers are valid as long as those of frz_grid_leaves.
 ///
 /// Any number of threads may read a grid.
 #[unsafe(no_mangle)]
@@ -101,7 +100,7 @@ pub unsafe extern "C" fn frz_grid_probe(
     dst: frz_span,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let held = read(grid)?;
             let origins = origins.elements::<[i32; 3]>("origins")?;
@@ -123,12 +122,12 @@ fn vector_leaf_view(leaf: &VectorLeaf<'_>) -> frz_vector_leaf {
     frz_vector_leaf { origin: leaf.origin, tile: [0.0; 3], values, mask }
 }
 
-/// Lends the leaves of a grid of vectors without copying them, in an order that does not change while the grid does not.
+/// Lends the leaves of a grid of vectors without copying them, in an order that changes only when the grid changes.
 ///
-/// Blocks without a leaf have one value: the background, or that of frz_grid_vector_probe.
+/// Blocks without a leaf have a single value: the background, or that of frz_grid_vector_probe.
 ///
-/// dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when
-///     it is too small. The pointers in it are the grid's: they stay until it is destroyed.
+/// dst: room for leaf_count elements of frz_vector_leaf; with data NULL only the count is reported. FRZ_ERROR_CAPACITY if it is too small.
+///     The pointers in it belong to the grid: they are valid until it is destroyed.
 /// count: receives the number of leaves; 0 after other failures.
 ///
 /// Any number of threads may read a grid.
@@ -140,7 +139,7 @@ pub unsafe extern "C" fn frz_grid_vector_leaves(
 ) -> frz_status {
     guard(|| {
         let count = required(count, "count")?;
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             count.write(0);
             let held = read(grid)?;
@@ -150,10 +149,10 @@ pub unsafe extern "C" fn frz_grid_vector_leaves(
     })
 }
 
-/// Lends the leaves of a grid of vectors at some origins, or the value of all 512 voxels there.
+/// Lends the leaves of a grid of vectors at given origins, or the value that all 512 voxels there have.
 ///
-/// origins: int32_t[3] for each position, multiples of 8.
-/// dst: room for as many elements of frz_vector_leaf, whose pointers stay as those of frz_grid_vector_leaves do.
+/// origins: int32_t[3] for each block, multiples of 8.
+/// dst: room for as many elements of frz_vector_leaf; their pointers are valid as long as those of frz_grid_vector_leaves.
 ///
 /// Any number of threads may read a grid.
 #[unsafe(no_mangle)]
@@ -163,7 +162,7 @@ pub unsafe extern "C" fn frz_grid_vector_probe(
     dst: frz_span,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let held = read(grid)?;
             let grid = held.vectors()?;

@@ -1,6 +1,6 @@
-//! Sparse grids: made, sampled, lent and saved.
+//! Sparse grids: created, sampled, lent and saved.
 
-// In the header's order.
+// In the order of the header.
 pub mod sparse;
 
 pub mod create;

@@ -1,4 +1,4 @@
-//! Grids as numbers and meshes: samples, and the triangles along their surface.
+//! Grids as numbers and meshes: samples, and triangle meshes of their surface.
 
 use std::ffi::c_char;
 
@@ -14,17 +14,17 @@ use crate::error::Result;
 use crate::geometry::{DVec3, TriMesh};
 use crate::vdb::{FloatGrid, GridRef, VectorGrid, level_set};
 
-/// How values between voxels are found.
+/// Interpolation of values between voxels.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_sampling {
-    /// The value of the voxel that holds the position.
+    /// The value of the voxel that contains the position.
     FRZ_SAMPLE_NEAREST = 0,
     /// Trilinear between voxel centres.
     FRZ_SAMPLE_LINEAR = 1,
 }
 
-/// Whether values are to be trilinear.
+/// Whether values are interpolated trilinearly.
 fn sampling_of(sampling: u32) -> Outcome<bool> {
     let known =
         [(frz_sampling::FRZ_SAMPLE_NEAREST as u32, false), (frz_sampling::FRZ_SAMPLE_LINEAR as u32, true)];
@@ -36,15 +36,15 @@ fn sampling_of(sampling: u32) -> Outcome<bool> {
 /// # Safety
 /// The view must describe memory that can be read.
 unsafe fn positions_of(positions: &frz_view) -> Outcome<Vec<DVec3>> {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let positions = unsafe { positions.finite("positions") }?;
     Ok(positions.iter().map(|&p| DVec3::from(p.map(f64::from))).collect())
 }
 
-/// Positions that are sampled at once: between them a cancel is heeded, and the part that is done is known.
+/// Number of positions sampled at once: between batches a cancel takes effect and progress is known.
 const PIECE: usize = 1 << 16;
 
-/// Values at positions (m), piece by piece.
+/// Values at positions (m), batch by batch.
 fn in_pieces<T: Clone + Send>(
     ctx: &Context,
     positions: &[DVec3],
@@ -86,7 +86,7 @@ fn sampled_vectors(
     in_pieces(ctx, positions, |piece| grid.sample(ctx, piece, linear))
 }
 
-/// Values of a grid of floats at world positions.
+/// Samples a grid of floats at world positions.
 ///
 /// positions: float[3] for each (m), finite.
 /// sampling: a frz_sampling.
@@ -102,7 +102,7 @@ pub unsafe extern "C" fn frz_grid_sample(
     dst: frz_span,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let call = enter(context)?;
             let ctx = call.ctx();
@@ -114,7 +114,7 @@ pub unsafe extern "C" fn frz_grid_sample(
     })
 }
 
-/// Vectors of a grid at world positions. Components of a staggered grid are found where they lie.
+/// Samples a grid of vectors at world positions. Components of a staggered grid are sampled at their own positions.
 ///
 /// positions: float[3] for each (m), finite.
 /// sampling: a frz_sampling.
@@ -130,7 +130,7 @@ pub unsafe extern "C" fn frz_grid_sample_vectors(
     dst: frz_span,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let call = enter(context)?;
             let held = read(grid)?;
@@ -141,9 +141,9 @@ pub unsafe extern "C" fn frz_grid_sample_vectors(
     })
 }
 
-/// Gives a mesh's vertices an attribute: a grid's values there, one float each, or three of a grid of vectors.
+/// Samples a grid at a mesh's vertices into an attribute: one float each, or three from a grid of vectors.
 ///
-/// mesh: gets the attribute, in the place of one of the same name.
+/// mesh: receives the attribute, which replaces one of the same name.
 /// sampling: a frz_sampling.
 /// name: of the attribute, UTF-8; NULL for the grid's own.
 ///
@@ -157,7 +157,7 @@ pub unsafe extern "C" fn frz_grid_sample_mesh(
     name: *const c_char,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let call = enter(context)?;
             let ctx = call.ctx();
@@ -183,13 +183,13 @@ pub unsafe extern "C" fn frz_grid_sample_mesh(
     })
 }
 
-/// Bytes of a leaf's part of a mesh, while it is made.
+/// Memory (bytes) for each leaf while a mesh is made.
 const BYTES_PER_LEAF: u64 = 6000;
 
-/// A function of the interface that makes a mesh of a grid.
+/// An interface function that makes a mesh from a grid.
 ///
 /// # Safety
-/// The pointers must be NULL or the caller's.
+/// The pointers must be NULL or valid.
 unsafe fn meshes(
     context: *mut frz_context,
     grid: *const frz_grid,
@@ -197,7 +197,7 @@ unsafe fn meshes(
     out: *mut *mut frz_mesh,
     make: impl FnOnce(&Context, &FloatGrid) -> Outcome<TriMesh>,
 ) -> frz_status {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         creates(context, out, |ctx| {
             let held = read(grid)?;
@@ -211,15 +211,13 @@ unsafe fn meshes(
     }
 }
 
-/// Makes a mesh of triangles along the surface of a grid of floats, counter-clockwise seen from outside, also where the grid's transform
-/// mirrors.
+/// Creates a triangle mesh of the surface of a grid of floats, counter-clockwise seen from outside, even if the grid's transform mirrors.
 ///
-/// A cancel is heeded before and after the work, not within.
+/// A cancel takes effect before and after the work, not during it.
 ///
-/// iso: the value at the surface; of a level set a distance (m), 0 for its surface. Finite.
+/// iso: the value at the surface, finite; for a level set a distance (m), 0 for its surface.
 /// adaptivity: 0 to 1; above 0 flat regions get fewer and larger triangles.
-/// out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure. It has no faces where there
-///     is no surface.
+/// out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure. It has no faces if there is no surface.
 ///
 /// Any number of threads may read a grid; one thread at a time for each context.
 #[unsafe(no_mangle)]
@@ -230,7 +228,7 @@ pub unsafe extern "C" fn frz_grid_to_mesh(
     adaptivity: f32,
     out: *mut *mut frz_mesh,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         meshes(context, grid, [iso, adaptivity], out, |ctx, grid| {
             ctx.allow("a mesh of the grid", grid.leaf_count() as u64 * BYTES_PER_LEAF)?;
@@ -239,10 +237,10 @@ pub unsafe extern "C" fn frz_grid_to_mesh(
     }
 }
 
-/// As frz_grid_to_mesh, of the voxels in a box. The meshes of boxes beside each other meet; each triangle is in one.
+/// As frz_grid_to_mesh, for the voxels in a box. The meshes of adjacent boxes meet; each triangle belongs to one of them.
 ///
-/// voxel_min: int32_t[3]: the least voxel on each axis.
-/// voxel_max: int32_t[3]: the greatest voxel on each axis, included; not less than voxel_min.
+/// voxel_min: int32_t[3]: the minimum voxel on each axis.
+/// voxel_max: int32_t[3]: the maximum voxel on each axis, inclusive; not less than voxel_min.
 /// out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
 ///
 /// Any number of threads may read a grid; one thread at a time for each context.
@@ -256,7 +254,7 @@ pub unsafe extern "C" fn frz_grid_to_mesh_box(
     voxel_max: *const i32,
     out: *mut *mut frz_mesh,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         meshes(context, grid, [iso, adaptivity], out, |ctx, grid| {
             let corner = |pointer: *const i32, name: &str| -> Outcome<[i32; 3]> {
@@ -274,8 +272,8 @@ pub unsafe extern "C" fn frz_grid_to_mesh_box(
     }
 }
 
-/// As frz_grid_to_mesh, of some blocks only, for instance those of frz_base_dirty: the cost grows with their number.
-/// The meshes of different blocks meet; each triangle is in one.
+/// As frz_grid_to_mesh, for some blocks only, for instance those of frz_base_dirty: the cost grows with their number. The meshes of
+/// different blocks meet; each triangle belongs to one of them.
 ///
 /// origins: int32_t[3] for each block, multiples of 8.
 /// out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
@@ -290,7 +288,7 @@ pub unsafe extern "C" fn frz_grid_to_mesh_blocks(
     origins: frz_view,
     out: *mut *mut frz_mesh,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         meshes(context, grid, [iso, adaptivity], out, |ctx, grid| {
             let origins = origins.elements::<[i32; 3]>("origins")?;

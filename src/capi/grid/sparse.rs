@@ -1,4 +1,4 @@
-//! Sparse grids of floats, and what they have in common with those of vectors.
+//! Sparse grids of floats, and what they share with grids of vectors.
 
 use std::ffi::{c_char, c_void};
 use std::ptr::NonNull;
@@ -9,8 +9,8 @@ use crate::capi::ffi::views::{Sized32, fill, finite, text, write_bytes};
 use crate::capi::runtime::context::{creates, frz_context};
 use crate::vdb::{AnyGrid, FloatGrid, GridClass, GridRef, VectorGrid};
 
-/// A sparse grid of 32-bit floats, or of vectors of three of them; voxel (i, j, k) has its centre at (i, j, k) x voxel
-/// size, unless a file brought another transform.
+/// A sparse grid of 32-bit floats, or of vectors of three of them. Voxel (i, j, k) has its centre at (i, j, k) x voxel size, unless a file
+/// gave another transform.
 pub struct frz_grid {
     _opaque: [u8; 0],
 }
@@ -21,11 +21,11 @@ pub struct frz_grid {
 pub enum frz_grid_class {
     /// Not specified.
     FRZ_GRID_UNKNOWN = 0,
-    /// Signed distances (m), negative inside, cut off at the background.
+    /// Signed distances (m), negative inside, truncated at the background.
     FRZ_GRID_LEVEL_SET = 1,
     /// A density.
     FRZ_GRID_FOG = 2,
-    /// Of vectors: component x of voxel (i, j, k) is that at (i - 1/2, j, k), on the voxel's face, y and z likewise.
+    /// For vectors: component x of voxel (i, j, k) is the value at (i - 1/2, j, k), on the voxel's face; y and z likewise.
     FRZ_GRID_STAGGERED = 3,
 }
 
@@ -35,7 +35,7 @@ pub enum frz_grid_class {
 pub enum frz_value_type {
     /// A float.
     FRZ_VALUE_FLOAT = 0,
-    /// float[3]: a velocity, a wind, a colour. Functions that say nothing of vectors refuse such a grid.
+    /// float[3]: a velocity, a wind, a colour. Functions that do not mention vectors refuse such a grid.
     FRZ_VALUE_VECTOR = 1,
 }
 
@@ -51,21 +51,21 @@ pub struct frz_grid_info {
     pub voxel_size: f64,
     /// Value where nothing is stored; 0 for vectors.
     pub background: f32,
-    /// 1 when voxel (0, 0, 0) lies at the origin and the axes are the world's, else 0.
+    /// 1 if voxel (0, 0, 0) lies at the origin and the axes are the world's, else 0.
     pub world_fixed: u32,
-    /// Active voxels, constant blocks counted in full.
+    /// Number of active voxels; constant blocks count in full.
     pub active_voxels: u64,
-    /// Leaves.
+    /// Number of leaves.
     pub leaf_count: u64,
-    /// Memory (bytes).
+    /// Memory of the grid (bytes).
     pub memory_bytes: u64,
-    /// Least active voxel on each axis; all zeroes when there is none.
+    /// Minimum active voxel on each axis; all zeroes if there is none.
     pub voxel_min: [i32; 3],
-    /// Greatest active voxel on each axis, included; all zeroes when there is none.
+    /// Maximum active voxel on each axis, inclusive; all zeroes if there is none.
     pub voxel_max: [i32; 3],
     /// A frz_value_type.
     pub value_type: u32,
-    /// Of vectors the value where nothing is stored; else zeroes.
+    /// For vectors the value where nothing is stored; else zeroes.
     pub background_vector: [f32; 3],
 }
 
@@ -77,7 +77,7 @@ unsafe impl Sized32 for frz_grid_info {
 
 /// The value of a grid's handle.
 pub(in crate::capi) enum Grid {
-    /// The host's own.
+    /// The host's own grid.
     Own(AnyGrid),
     /// A part of another object, which keeps it alive and unchanged while it is read.
     Lent(NonNull<FloatGrid>),
@@ -95,14 +95,14 @@ impl From<FloatGrid> for Grid {
     }
 }
 
-/// The error for a grid whose values a function does not accept.
+/// The error for a grid of a type that a function does not accept.
 fn of_another_kind(name: &str, holds: &str, needed: &str) -> Failure {
     let name = if name.is_empty() { String::new() } else { format!(" \"{name}\"") };
     Failure::argument(format!("the grid{name} holds {holds}, but one of {needed} is needed"))
 }
 
 impl Grid {
-    /// The grid, to read, whatever it holds.
+    /// The grid, to read, of any type.
     pub(in crate::capi) fn any(&self) -> GridRef<'_> {
         match self {
             Self::Own(grid) => grid.borrow(),
@@ -111,7 +111,7 @@ impl Grid {
         }
     }
 
-    /// The grid, to read, if it is one of floats.
+    /// The grid, to read, if it holds floats.
     pub(in crate::capi) fn floats(&self) -> Outcome<&FloatGrid> {
         match self.any() {
             GridRef::Floats(grid) => Ok(grid),
@@ -119,7 +119,7 @@ impl Grid {
         }
     }
 
-    /// The grid, to read, if it is one of vectors.
+    /// The grid, to read, if it holds vectors.
     pub(in crate::capi) fn vectors(&self) -> Outcome<&VectorGrid> {
         match self.any() {
             GridRef::Vectors(grid) => Ok(grid),
@@ -127,7 +127,7 @@ impl Grid {
         }
     }
 
-    /// The grid, to change; what is lent stays as it is.
+    /// The grid, to change; an error if it is lent.
     fn own(&mut self) -> Outcome<&mut AnyGrid> {
         match self {
             Self::Own(grid) => Ok(grid),
@@ -137,7 +137,7 @@ impl Grid {
         }
     }
 
-    /// The grid, to change, if it is one of floats.
+    /// The grid, to change, if it holds floats.
     pub(in crate::capi) fn own_floats(&mut self) -> Outcome<&mut FloatGrid> {
         match self.own()? {
             AnyGrid::Floats(grid) => Ok(grid),
@@ -166,14 +166,14 @@ pub(in crate::capi) fn check_voxel(voxel: f64) -> Outcome {
     Ok(())
 }
 
-/// Destroys a grid; NULL is fine. A grid that belongs to another object stays.
+/// Destroys a grid; NULL is ignored. A grid that belongs to another object is not destroyed.
 ///
 /// grid: may be NULL.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_grid_destroy(grid: *mut frz_grid) {
-    // SAFETY: the grid is NULL or was not destroyed.
+    // SAFETY: the grid is NULL or alive.
     guard(|| unsafe {
         if let Ok(held) = read(grid.cast_const())
             && matches!(*held, Grid::Lent(_))
@@ -186,7 +186,7 @@ pub unsafe extern "C" fn frz_grid_destroy(grid: *mut frz_grid) {
 
 /// Copies a grid; the copy shares no memory and belongs to the caller.
 ///
-/// grid: of the caller or of another object.
+/// grid: owned by the caller or by another object.
 /// out: receives the copy, to be destroyed with frz_grid_destroy; NULL after a failure.
 ///
 /// Any number of threads may read a grid; one thread at a time for each context.
@@ -196,7 +196,7 @@ pub unsafe extern "C" fn frz_grid_copy(
     grid: *const frz_grid,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let held = read(grid)?;
@@ -209,13 +209,13 @@ pub unsafe extern "C" fn frz_grid_copy(
 
 /// Reports the properties of a grid.
 ///
-/// info: receives it; its struct_size says how much of it the caller knows.
+/// info: receives them. The caller sets its struct_size.
 ///
 /// Any number of threads may read a grid.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_grid_get_info(grid: *const frz_grid, info: *mut frz_grid_info) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let held = read(grid)?;
             let grid = held.any();
@@ -243,11 +243,11 @@ pub unsafe extern "C" fn frz_grid_get_info(grid: *const frz_grid, info: *mut frz
     })
 }
 
-/// Copies a grid's name, in UTF-8 with a zero at its end.
+/// Copies a grid's name as zero-terminated UTF-8.
 ///
-/// dst: room for capacity bytes; NULL only queries the size. FRZ_ERROR_CAPACITY when it is too small.
-/// capacity: bytes at dst.
-/// size: receives the bytes that are needed, the zero counted; 0 after other failures.
+/// dst: room for capacity bytes; NULL: only the size is reported. FRZ_ERROR_CAPACITY if it is too small.
+/// capacity: size of dst (bytes).
+/// size: receives the number of bytes needed, including the zero; 0 after other failures.
 ///
 /// Any number of threads may read a grid.
 #[unsafe(no_mangle)]
@@ -258,7 +258,7 @@ pub unsafe extern "C" fn frz_grid_name(
     size: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(size);
             let mut name = read(grid)?.any().name().into_bytes();
@@ -269,16 +269,16 @@ pub unsafe extern "C" fn frz_grid_name(
     })
 }
 
-/// Names a grid, as files know it.
+/// Sets a grid's name, under which files store it.
 ///
-/// grid: of the caller.
+/// grid: owned by the caller.
 /// name: UTF-8; NULL for none.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_grid_set_name(grid: *mut frz_grid, name: *const c_char) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let name = text(name, "name")?.unwrap_or("");
             match change(grid)?.own()? {

@@ -19,10 +19,10 @@ use crate::sweep::{Body, Shape};
 /// Flag of a body: its imprints have no noise.
 pub const FRZ_BODY_EXACT: u32 = 1;
 
-/// Flag of a body: of the snow that it removes, the share frz_body.compression becomes no grains.
+/// Flag of a body: frz_body.compression is the share of the snow it removes that becomes no grains.
 pub const FRZ_BODY_COMPRESSION: u32 = 2;
 
-/// A mesh that moves in the time of one step. All arrays are lent for the call.
+/// A mesh that moves during a step. All arrays are lent for the duration of the call.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_body {
@@ -30,29 +30,30 @@ pub struct frz_body {
     pub struct_size: u32,
     /// 0, FRZ_BODY_EXACT, FRZ_BODY_COMPRESSION or both.
     pub flags: u32,
-    /// A number of the host that stays with the body from step to step, different in all bodies of a call. It saves
-    /// work where a body keeps its faces; results do not depend on it.
+    /// An id chosen by the host, different in all bodies of a call and the same for the body in every step. It saves work while a body
+    /// keeps its faces; results do not depend on it.
     pub id: u64,
-    /// float[3] for each vertex (m): where it is at the step's beginning. Finite.
+    /// float[3] for each vertex (m), finite: its position at the beginning of the step.
     pub positions: frz_view,
-    /// float[3] for each vertex (m): where it is at the step's end. data NULL: the body rests.
+    /// float[3] for each vertex (m), finite: its position at the end of the step. data NULL: the body does not move.
     pub positions_end: frz_view,
-    /// Poses at equal times between the two, each float[3] for each vertex; vertices move straight from pose to pose.
-    /// NULL for none, as it must be without positions_end.
+    /// Poses at equal intervals between the two, each float[3] for each vertex; vertices move straight from pose to pose. NULL for none, as
+    /// it must be without positions_end.
     pub between: *const frz_view,
-    /// Number of poses between.
+    /// Number of poses in between.
     pub between_count: usize,
     /// As in frz_mesh_desc.
     pub face_counts: frz_view,
-    /// As in frz_mesh_desc. Where open meshes press into snow or are swept they are closed, and a warning says so.
+    /// As in frz_mesh_desc. Where open meshes press into snow or are swept they are closed, with a warning.
     pub indices: frz_view,
-    /// Friction of grains against it, 0 to 10; only grains read it. It holds them, and carries them along while the body moves; loose grains
-    /// that slide over one that stands still meet the friction between grains. 0.3 in headers of interface 1.1 and from frz_body_init.
+    /// Friction of grains against it, 0 to 10; only grains use it. It holds them, and carries them along while the body moves; loose grains
+    /// that slide over a body at rest are subject to the friction between grains instead. 0.3 for headers of interface 1.1 and from
+    /// frz_body_init.
     pub friction: f64,
-    /// With which it holds grains that touch it (weights of a grain), 0 to 1000; only grains read it.
+    /// Adhesion to grains that touch it (weights of a grain), 0 to 1000; only grains use it.
     pub stick: f64,
-    /// In place of frz_grains_params.compression, 0 to 1; only with FRZ_BODY_COMPRESSION, and only grains read it. Where several
-    /// bodies that differ in it took the snow, that of the one counts whose surface came nearest to the position.
+    /// Replaces frz_grains_params.compression, 0 to 1; only with FRZ_BODY_COMPRESSION, and only grains use it. Where several bodies with
+    /// different values removed the snow, the value of the body whose surface came nearest to the position applies.
     pub compression: f64,
 }
 
@@ -79,25 +80,25 @@ impl frz_body {
     };
 }
 
-/// Fills a body with the usual values: none of the arrays, a friction of 0.3.
+/// Fills a body with the defaults: no arrays, a friction of 0.3.
 ///
-/// body: receives them.
+/// body: receives the defaults.
 /// size: sizeof(frz_body).
 ///
 /// Any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_body_init(body: *mut frz_body, size: usize) -> frz_status {
-    // SAFETY: the body is NULL or has so many bytes.
+    // SAFETY: the body is NULL or has `size` bytes.
     guard(|| unsafe { fill(body, Some(size), frz_body::USUAL) })
 }
 
 // SAFETY: views are numbers and pointers.
 unsafe impl crate::capi::ffi::views::Plain for frz_view {}
 
-/// Most poses between a step's beginning and end.
+/// Maximum number of poses between the beginning and the end of a step.
 const MOST_BETWEEN: usize = 4096;
 
-/// A body of a host: straight motion from pose to pose, the first at time 0, the last at the step's end.
+/// Motion of a host's body: straight from pose to pose, the first at time 0, the last at the step's end.
 struct HostMotion {
     triangles: Vec<[u32; 3]>,
     poses: Vec<Vec<Vec3>>,
@@ -106,7 +107,7 @@ struct HostMotion {
 }
 
 impl HostMotion {
-    /// Poses of all of the host's vertices, of which those that triangles name count.
+    /// Takes poses of all of the host's vertices; only those that triangles use count.
     fn new(triangles: Vec<[u32; 3]>, mut poses: Vec<Vec<Vec3>>, end: f64) -> Self {
         let Some(used) = used(poses[0].len(), &triangles) else { return Self { triangles, poses, end } };
         for pose in &mut poses {
@@ -128,7 +129,7 @@ impl Motion for HostMotion {
     fn pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         let steps = self.poses.len() - 1;
         let at = if self.end > 0.0 { (time / self.end).clamp(0.0, 1.0) * steps as f64 } else { 0.0 };
-        // Times of poses come from divisions: rounding must not need a neighbour.
+        // Times of poses come from divisions: rounding must not pull in the neighbouring pose.
         let at = if (at - at.round()).abs() < 1e-9 { at.round() } else { at };
         let (first, part) = (at.floor() as usize, at - at.floor());
         between(&self.poses[first], &self.poses[(first + 1).min(steps)], part, out);
@@ -151,7 +152,7 @@ struct Arrived {
     poses: Vec<Vec<Vec3>>,
 }
 
-/// What grains have of a body.
+/// Surface properties of a body, for grains.
 #[derive(Clone, Copy)]
 pub(in crate::capi) struct Surface {
     friction: f64,
@@ -166,13 +167,13 @@ impl Surface {
     }
 }
 
-/// Shapes of a host's bodies by their ids, kept from step to step.
+/// Shapes of a host's bodies by id, kept from step to step.
 pub(in crate::capi) type Shapes = HashMap<u64, Arc<Shape>>;
 
 /// What bodies do in a call.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(in crate::capi) enum Role {
-    /// What they sweep is taken.
+    /// Their swept volume is removed or built.
     Sweep,
     /// They push grains.
     Push,
@@ -180,10 +181,10 @@ pub(in crate::capi) enum Role {
     Bound,
 }
 
-/// Farthest from the origin (m) that a body that pushes grains or bounds the air may lie.
+/// Maximum distance from the origin (m) of a body that pushes grains or bounds the air.
 const FARTHEST: f32 = 1.0e6;
 
-/// Bodies from a host's arrays, checked, each with its surface; `shapes` are those of earlier calls, and are updated.
+/// Bodies from a host's arrays, checked, each with its surface. `shapes` holds the shapes of earlier calls, and is updated.
 ///
 /// # Safety
 /// The bodies must describe memory that can be read.
@@ -199,7 +200,7 @@ pub(in crate::capi) unsafe fn bodies(
     if dt < 0.0 {
         return Err(Failure::argument(format!("dt = {dt} is not 0 or more")));
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let arrived = unsafe { arrived(list, count, dt) }?;
     if role != Role::Sweep {
         for (at, body) in arrived.iter().enumerate() {
@@ -227,7 +228,7 @@ pub(in crate::capi) unsafe fn bodies(
     Ok(made.into_iter().map(|(_, body, surface)| (body, surface)).collect())
 }
 
-/// Warnings about a body, once for each set of faces.
+/// Logs warnings about a body, once for each set of faces.
 fn warn(ctx: &Context, role: Role, id: u64, body: &Body, known: Option<&Arc<Shape>>) {
     if known.is_some_and(|known| Arc::ptr_eq(known, body.shape())) {
         return;
@@ -240,7 +241,7 @@ fn warn(ctx: &Context, role: Role, id: u64, body: &Body, known: Option<&Arc<Shap
         ctx.warn(&format!("body {id}: the mesh has no inside: grains collide with both of its sides"));
         return;
     }
-    // Of small holes, which are closed, and of others, which are not, the air is told by a step.
+    // For the air a step itself reports small holes, which are closed, and large ones, which are not.
     if role == Role::Bound {
         return;
     }
@@ -273,12 +274,12 @@ unsafe fn arrived(list: *const frz_body, count: usize, dt: f64) -> Outcome<Vec<A
         return Ok(Vec::new());
     }
     let first = crate::capi::ffi::handle::required(list.cast_mut(), "bodies")?.cast_const();
-    // SAFETY: the caller's promise: the size of a body is there.
+    // SAFETY: guaranteed by the caller: at least the size of a body is there.
     let stride = unsafe { first.cast::<u32>().read_unaligned() } as usize;
-    // Checked before it is used: it is the stride of the bodies.
+    // Checked before use: it is the stride of the bodies.
     check_size::<frz_body>(stride).map_err(|failure| named(0, failure))?;
     let room = frz_view { data: first.cast(), count, stride };
-    // SAFETY: as above; the sizes must be the same for the bodies to lie one after another.
+    // SAFETY: as above; the sizes must be equal for the bodies to be contiguous.
     let sizes = unsafe { room.elements::<u32>("bodies") }?;
     if sizes.iter().any(|&size| size as usize != stride) {
         return Err(Failure::argument("bodies: their struct_size differs"));
@@ -286,7 +287,7 @@ unsafe fn arrived(list: *const frz_body, count: usize, dt: f64) -> Outcome<Vec<A
     let mut out: Vec<Arrived> = Vec::with_capacity(count);
     let mut ids = HashSet::with_capacity(count);
     for at in 0..count {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let body = unsafe { one(first.byte_add(at * stride), dt) }.map_err(|failure| named(at, failure))?;
         if !ids.insert(body.id) {
             return Err(Failure::argument(format!("body {at}: another one has the id {} too", body.id)));
@@ -296,7 +297,7 @@ unsafe fn arrived(list: *const frz_body, count: usize, dt: f64) -> Outcome<Vec<A
     Ok(out)
 }
 
-/// A failure of one body.
+/// Names the body in a failure.
 fn named(at: usize, failure: Failure) -> Failure {
     Failure { text: format!("body {at}: {}", failure.text), ..failure }
 }
@@ -304,7 +305,7 @@ fn named(at: usize, failure: Failure) -> Failure {
 /// # Safety
 /// As [`bodies`].
 unsafe fn one(body: *const frz_body, dt: f64) -> Outcome<Arrived> {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         let body = sized(body, frz_body::USUAL)?;
         no_flags(body.flags, FRZ_BODY_EXACT | FRZ_BODY_COMPRESSION)?;

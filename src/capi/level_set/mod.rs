@@ -1,6 +1,6 @@
-//! Moving bodies, and level sets of them and of meshes and particles.
+//! Moving bodies, and level sets of bodies, meshes and particles.
 
-// In the header's order.
+// In the order of the header.
 pub mod body;
 
 pub mod tools;

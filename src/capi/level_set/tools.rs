@@ -1,4 +1,4 @@
-//! Level sets: made from meshes, particles and motion, and changed.
+//! Level sets: from meshes, particles and motion, and tools that change them.
 
 use super::body::{Role, Shapes, bodies, frz_body};
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
@@ -20,9 +20,9 @@ use crate::vdb::{FloatGrid, GridClass, distances};
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_csg {
-    /// Points in one or the other.
+    /// Points in either one.
     FRZ_CSG_UNION = 0,
-    /// Points in the first and not in the second.
+    /// Points in the first but not in the second.
     FRZ_CSG_DIFFERENCE = 1,
     /// Points in both.
     FRZ_CSG_INTERSECTION = 2,
@@ -32,13 +32,13 @@ pub enum frz_csg {
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_smoothing {
-    /// Means over cubes.
+    /// Mean over cubes.
     FRZ_SMOOTH_MEAN = 0,
-    /// Means, four times in a row.
+    /// Mean over cubes, applied four times in a row.
     FRZ_SMOOTH_GAUSSIAN = 1,
 }
 
-/// Accuracy of the tools that make distances true again as they go.
+/// Accuracy of the tools that renormalise distances as they go.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_scheme {
@@ -52,19 +52,19 @@ pub enum frz_scheme {
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_noise {
-    /// Farthest displacement (m), 0 to 32 voxels; 0: none; -1: two voxels. So much that islands would be left is
-    /// refused, with the greatest that is not.
+    /// Maximum displacement (m), 0 to 32 voxels; 0: none; -1: two voxels. An amplitude that would cut off islands is refused, and the error
+    /// states the largest that would not.
     pub amplitude: f64,
     /// Size of the largest clumps (m), 2 to 10000 voxels; -1: eight voxels.
     pub size: f64,
-    /// Octaves, each of half the size and a quarter of the strength, 1 to 8.
+    /// Number of octaves, each of half the size and a quarter of the strength, 1 to 8.
     pub octaves: u32,
-    /// Seed of the pattern, which is fixed in the world.
+    /// Seed of the pattern, which is fixed in world space.
     pub seed: i32,
 }
 
 impl frz_noise {
-    /// The defaults of a host.
+    /// The defaults for hosts.
     pub(in crate::capi) const USUAL: Self = Self { amplitude: -1.0, size: -1.0, octaves: 3, seed: 0 };
 
     /// Refuses values that are not finite.
@@ -73,7 +73,7 @@ impl frz_noise {
         finite("noise size", self.size)
     }
 
-    /// The library's own parameters for voxels of a size (m); none for no noise.
+    /// The library's own parameters for voxels of a size (m); `None` for no noise.
     pub(in crate::capi) fn params(&self, cell: f64) -> Option<NoiseParams> {
         let defaults = NoiseParams::for_cell(cell);
         let or = |value: f64, defaults: f64| if value == -1.0 { defaults } else { value };
@@ -106,7 +106,7 @@ fn scheme_of(number: u32) -> Outcome<Scheme> {
 type Join = fn(&Context, &FloatGrid, &FloatGrid) -> Result<FloatGrid>;
 type Filter = fn(&Context, &mut FloatGrid, u32, u32, Scheme) -> Result<()>;
 
-/// Refuses a grid that is not a level set, and warns of one whose values are no distances in metres.
+/// Refuses a grid that is not a level set, and warns if its values are not distances in metres.
 fn level_set_of<'a>(ctx: &Context, grid: &'a FloatGrid) -> Outcome<&'a FloatGrid> {
     if grid.class() != GridClass::LevelSet {
         return Err(Failure::argument("the grid is not a level set"));
@@ -117,17 +117,17 @@ fn level_set_of<'a>(ctx: &Context, grid: &'a FloatGrid) -> Outcome<&'a FloatGrid
     Ok(grid)
 }
 
-/// A function of the interface that changes a level set of the caller.
+/// An interface function that changes a level set owned by the caller.
 ///
 /// # Safety
-/// The pointers must be NULL or those of handles that were not destroyed.
+/// The pointers must be NULL or handles that were not destroyed.
 unsafe fn changes(
     context: *const frz_context,
     inout: *mut frz_grid,
     work: impl FnOnce(&Context, &mut FloatGrid) -> Outcome,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe {
             let call = enter(context)?;
             let mut held = change(inout)?;
@@ -138,14 +138,14 @@ unsafe fn changes(
     })
 }
 
-/// Makes a level set of the solid that a mesh bounds: points that its faces wind around.
+/// Creates a level set of the solid that a mesh bounds: the points around which its faces wind.
 ///
-/// The mesh may be open (open loops are closed), cross itself, and have faces that are doubled or reversed: closed parts are turned
-/// outward, doubled faces count once, and what of that cannot be decided is a warning.
+/// The mesh may be open (open loops are closed), intersect itself, and have duplicate or reversed faces: closed parts are turned outward,
+/// duplicate faces count once, and ambiguous cases cause a warning.
 ///
 /// mesh: with at least one face.
 /// voxel_size: edge of a voxel (m), 1e-6 to 1000.
-/// half_width: of the band of distances on each side (voxels), 3 to 64.
+/// half_width: half width of the band of distances (voxels), 3 to 64.
 /// out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
 ///
 /// Any number of threads may read a mesh; one thread at a time for each context.
@@ -157,7 +157,7 @@ pub unsafe extern "C" fn frz_levelset_from_mesh(
     half_width: f32,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let mesh = read(mesh)?;
@@ -176,13 +176,13 @@ pub unsafe extern "C" fn frz_levelset_from_mesh(
     }
 }
 
-/// Makes a level set of the union of spheres.
+/// Creates a level set of the union of spheres.
 ///
 /// positions: float[3] for each sphere (m), finite.
-/// radii: float for each sphere (m), finite, above 0, as large as memory allows. Spheres smaller than a voxel and a half
-///     are left out: the grid cannot hold them.
+/// radii: float for each sphere (m), finite, above 0, as large as memory allows. Spheres smaller than one and a half voxels are left out:
+///     the grid cannot represent them.
 /// voxel_size: edge of a voxel (m), 1e-6 to 1000.
-/// half_width: of the band of distances on each side (voxels), 3 to 64.
+/// half_width: half width of the band of distances (voxels), 3 to 64.
 /// out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
 ///
 /// One thread at a time for each context.
@@ -195,7 +195,7 @@ pub unsafe extern "C" fn frz_levelset_from_particles(
     half_width: f32,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let settings = settings(voxel_size, half_width)?;
@@ -223,7 +223,7 @@ pub unsafe extern "C" fn frz_levelset_from_particles(
     }
 }
 
-/// Refuses spheres whose voxels have no number.
+/// Refuses spheres whose voxels are outside the range of coordinates.
 fn reachable(positions: &[[f32; 3]], radii: &[f32], voxel: f64) -> Outcome {
     let far = |(p, &radius): (&[f32; 3], &f32)| {
         p.iter().any(|&x| (f64::from(x).abs() + f64::from(radius)) / voxel > f64::from(1 << 29))
@@ -234,11 +234,11 @@ fn reachable(positions: &[[f32; 3]], radii: &[f32], voxel: f64) -> Outcome {
     }
 }
 
-/// Joins two level sets.
+/// Combines two level sets.
 ///
 /// operation: a frz_csg.
-/// inout: of the caller; becomes the result, and stays as it was after a failure.
-/// other: with voxels of the same size and position; it stays as it is.
+/// inout: owned by the caller; becomes the result, and is unchanged after a failure.
+/// other: with voxels of the same size and position; it is not modified.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -248,7 +248,7 @@ pub unsafe extern "C" fn frz_levelset_csg(
     inout: *mut frz_grid,
     other: *const frz_grid,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         changes(context, inout, |ctx, first| {
             let other = read(other)?;
@@ -270,7 +270,7 @@ pub unsafe extern "C" fn frz_levelset_csg(
 
 /// Moves the surface of a level set along its normals.
 ///
-/// inout: of the caller; stays as it was after a failure.
+/// inout: owned by the caller; unchanged after a failure.
 /// distance: outward (m), negative inward; at most 1000 voxels.
 /// scheme: a frz_scheme.
 ///
@@ -282,7 +282,7 @@ pub unsafe extern "C" fn frz_levelset_offset(
     distance: f32,
     scheme: u32,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         changes(context, inout, |ctx, grid| {
             let scheme = scheme_of(scheme)?;
@@ -297,7 +297,7 @@ pub unsafe extern "C" fn frz_levelset_offset(
     }
 }
 
-/// Memory (bytes) of a level set whose surface moved outward by some voxels: that of the box around it, at most.
+/// Upper bound of the memory (bytes) of a level set whose surface moved outward by some voxels: that of its bounding box.
 fn grown_bytes(grid: &FloatGrid, voxels: f64) -> u64 {
     let (low, high) = grid.active_bbox().unwrap_or_default();
     let size = [0, 1, 2].map(|a| f64::from(high[a]) - f64::from(low[a]) + 1.0 + 2.0 * voxels.max(0.0));
@@ -307,10 +307,10 @@ fn grown_bytes(grid: &FloatGrid, voxels: f64) -> u64 {
 
 /// Smooths a level set.
 ///
-/// inout: of the caller; stays as it was after a failure.
+/// inout: owned by the caller; unchanged after a failure.
 /// smoothing: a frz_smoothing.
 /// width: means are over cubes of 2 width + 1 voxels, 1 to 32.
-/// times: how often, 1 to 1000.
+/// times: number of passes, 1 to 1000.
 /// scheme: a frz_scheme.
 ///
 /// One thread at a time.
@@ -323,7 +323,7 @@ pub unsafe extern "C" fn frz_levelset_smooth(
     times: u32,
     scheme: u32,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         changes(context, inout, |ctx, grid| {
             let scheme = scheme_of(scheme)?;
@@ -345,8 +345,8 @@ pub unsafe extern "C" fn frz_levelset_smooth(
 
 /// Moves the surface of a level set outward by noise.
 ///
-/// inout: of the caller, with voxels fixed in the world; stays as it was after a failure.
-/// noise: how.
+/// inout: owned by the caller, with voxels fixed in world space; unchanged after a failure.
+/// noise: its parameters.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -355,7 +355,7 @@ pub unsafe extern "C" fn frz_levelset_displace(
     inout: *mut frz_grid,
     noise: *const frz_noise,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         changes(context, inout, |ctx, grid| {
             if !grid.is_world_fixed() {
@@ -373,15 +373,15 @@ pub unsafe extern "C" fn frz_levelset_displace(
     }
 }
 
-/// Makes a level set of all the space that bodies pass through in a step.
+/// Creates a level set of all the space that bodies pass through in a step.
 ///
-/// It is exact up to 0.02 voxel: no dents between poses, no ripples.
+/// It is exact to 0.02 voxel: no dents between poses, no ripples.
 ///
-/// bodies: count bodies, at least one. A vertex farther than 131064 voxels from the first vertex of the first body is out of
-///     reach: FRZ_ERROR_ARGUMENT names its body, counted from 0.
-/// dt: length of the step (s); 0: the bodies where they are at its beginning.
+/// bodies: count bodies, at least one. A vertex farther than 131064 voxels from the first vertex of the first body is out of reach:
+///     FRZ_ERROR_ARGUMENT names its body, counted from 0.
+/// dt: length of the step (s); 0: the bodies at their positions at its beginning.
 /// voxel_size: edge of a voxel (m), 1e-6 to 1000.
-/// half_width: of the band of distances on each side (voxels), 3 to 64.
+/// half_width: half width of the band of distances (voxels), 3 to 64.
 /// out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
 ///
 /// One thread at a time for each context.
@@ -395,7 +395,7 @@ pub unsafe extern "C" fn frz_levelset_sweep(
     half_width: f32,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let settings = settings(voxel_size, half_width)?;
@@ -408,10 +408,10 @@ pub unsafe extern "C" fn frz_levelset_sweep(
     }
 }
 
-/// Farthest a sweep reaches from its first vertex (voxels): the reach of the lattice, minus one block for its origin.
+/// Maximum distance of a sweep from its first vertex (voxels): the reach of the lattice, minus one block for its origin.
 const REACH: f64 = 131_064.0;
 
-/// Refuses bodies that go farther than a sweep's lattice reaches, by their number.
+/// Refuses bodies that move beyond the reach of a sweep's lattice, by their index.
 fn check_reach(bodies: &[Body], dt: f64, voxel: f64) -> Result<()> {
     let mut pose = Vec::new();
     let mut first = None;

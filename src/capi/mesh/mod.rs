@@ -1,6 +1,6 @@
 //! Meshes, and their repair.
 
-// In the header's order.
+// In the order of the header.
 pub mod triangles;
 
 pub mod repair;

@@ -1,4 +1,4 @@
-//! Meshes with faults become solids.
+//! Repair: meshes with faults become solids.
 
 use super::triangles::{Mesh, frz_mesh};
 use crate::capi::ffi::guard::{Outcome, frz_status, guard};
@@ -16,30 +16,30 @@ use crate::mesh_repair::{RepairReport, Repaired, carry_attributes, repair};
 pub struct frz_repair_report {
     /// sizeof(frz_repair_report), set by the caller.
     pub struct_size: u32,
-    /// How much more was rebuilt than the cells at fault, and what they need: 0 nothing, 1 a ring of cells around them, 2 the whole
-    /// parts of the mesh that pass through them, 3 everything.
+    /// Rebuild level: what was rebuilt beyond the cells at fault and those that they require: 0 nothing, 1 a ring of cells around them, 2
+    /// the whole parts of the mesh that pass through them, 3 everything.
     pub rung: u32,
-    /// Vertices joined with others that are the same corner: at the same position, or on open edges within rounding of it.
+    /// Vertices joined with others at the same corner: at the same position, or, on open edges, within rounding of it.
     pub joined_vertices: u64,
-    /// Triangles left out: without area, doubled or alone, and those of parts that lay on a part like them.
+    /// Triangles dropped: degenerate, duplicate or isolated ones, and those of parts that coincide with another part.
     pub dropped_triangles: u64,
-    /// Triangles turned round so that they agree with their neighbours.
+    /// Triangles reversed to agree with their neighbours.
     pub turned_triangles: u64,
-    /// Parts turned outward as a whole.
+    /// Parts reversed as a whole to face outward.
     pub turned_parts: u64,
-    /// Holes that were closed.
+    /// Holes closed.
     pub holes: u64,
     /// Triangles that close them.
     pub added_triangles: u64,
-    /// Cells in which the mesh was at fault.
+    /// Cells in which the mesh had faults.
     pub flagged_cells: u64,
-    /// Cells in which it was rebuilt.
+    /// Cells in which the mesh was rebuilt.
     pub rebuilt_cells: u64,
-    /// Triangles that are still there as they were.
+    /// Triangles kept unchanged.
     pub kept_triangles: u64,
-    /// Triangles that were made and have an altitude below 1e-4 of an edge.
+    /// New triangles with an altitude below 1e-4 of an edge.
     pub slivers: u64,
-    /// Edge of the cells (m): the one asked for, or a part of it where nothing would have been left.
+    /// Edge of the cells (m): the one requested, or a fraction of it if nothing would have been left.
     pub cell: f64,
 }
 
@@ -70,20 +70,20 @@ impl frz_repair_report {
     }
 }
 
-/// Makes a closed mesh of one that is open, crosses itself, or is inside out in parts: the solid where, with each part turned
-/// outward, a point lies inside of at least one. Parts that overlap become one, holes are closed, cavities are filled.
+/// Creates a closed mesh from one that is open, intersects itself, or is inside out in parts: the solid of all points that lie inside at
+/// least one part, with each part turned outward. Overlapping parts are united, holes are closed, cavities are filled.
 ///
-/// The mesh is rebuilt in the cells of a grid where it is at fault, and within a cell of that solid; all its other triangles stay as
-/// they are. Vertices that are still there keep their order and their attributes; attributes of those that were made are what the
-/// mesh had at the nearest position. All faces of the result are triangles, each edge has two of them that agree about which side is
-/// out, and each vertex one fan of them.
+/// The mesh is rebuilt in the cells of a grid where it has faults, and within a cell of that solid; all other triangles are kept unchanged.
+/// Remaining vertices keep their order and their attributes; new ones take the attributes that the mesh had at the nearest position. All
+/// faces of the result are triangles, each edge has two consistently oriented ones, and the triangles around each vertex form a single
+/// ring.
 ///
-/// mesh: it stays as it is.
-/// cell: edge of a cell (m), 1e-9 to 1e6, about as long as the mesh's edges: what is thinner may be lost where it is rebuilt.
-///     FRZ_ERROR_ARGUMENT where the mesh reaches farther than 131072 cells from its middle, encloses nothing, or nearly all of it would
-///     be lost. Where less is lost a warning says so: half of the volume, or a twentieth of its extent and two cells.
+/// mesh: not modified.
+/// cell: edge of a cell (m), 1e-9 to 1e6, about as long as the mesh's edges: where the mesh is rebuilt, thinner features may be lost.
+///     FRZ_ERROR_ARGUMENT if the mesh reaches farther than 131072 cells from its middle, encloses nothing, or would be lost almost
+///     entirely. Smaller losses cause a warning: half of the volume, or a twentieth of its extent and two cells.
 /// out: receives the new mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
-/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// report: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///
 /// Any number of threads may read a mesh; one thread at a time for each context.
 #[unsafe(no_mangle)]
@@ -95,7 +95,7 @@ pub unsafe extern "C" fn frz_mesh_repair(
     report: *mut frz_repair_report,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(out);
             if !report.is_null() {
@@ -112,13 +112,13 @@ pub unsafe extern "C" fn frz_mesh_repair(
     })
 }
 
-/// A repaired mesh with its attributes, and what was done.
+/// A repaired mesh with its attributes, and the report.
 fn repaired(ctx: &Context, mesh: &Mesh, cell: f64) -> Outcome<(Mesh, RepairReport)> {
     let Repaired { mesh: solid, vertices, sources, report } = repair(ctx, &mesh.triangles, cell)?;
     if let Some(what) = report.losses.warning(report.cell) {
         ctx.warn(&what);
     }
-    // One array for each component: they are carried one by one.
+    // One array for each component: they are carried separately.
     let arrays = mesh.attributes().flat_map(|(name, components, values)| {
         (0..components).map(move |component| {
             let values = values.iter().skip(component).step_by(components).map(|value| f64::from(*value));

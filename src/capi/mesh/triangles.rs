@@ -9,20 +9,20 @@ use crate::capi::runtime::context::{creates, frz_context};
 use crate::context::Context;
 use crate::geometry::{PolygonMesh, TriMesh, Vec3};
 
-/// A mesh of polygons with attributes of its vertices.
+/// A polygon mesh with vertex attributes.
 pub struct frz_mesh {
     _opaque: [u8; 0],
 }
 
-/// Numbers of each vertex under a name.
+/// A named vertex attribute.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_attribute {
     /// Name in UTF-8, not empty.
     pub name: *const c_char,
-    /// Floats of each vertex, 1 to 4.
+    /// Number of floats for each vertex, 1 to 4.
     pub components: u32,
-    /// So many floats for each vertex of the mesh, finite or not.
+    /// As many floats as components for each vertex of the mesh, finite or not.
     pub values: frz_view,
 }
 
@@ -32,14 +32,13 @@ pub struct frz_attribute {
 pub struct frz_mesh_desc {
     /// sizeof(frz_mesh_desc).
     pub struct_size: u32,
-    /// 0.
+    /// Must be 0.
     pub flags: u32,
     /// float[3] for each vertex (m), finite.
     pub positions: frz_view,
-    /// uint32_t for each face: its number of corners. data NULL: all faces are triangles. Faces of fewer than three
-    /// corners are passed over.
+    /// uint32_t for each face: its number of corners. data NULL: all faces are triangles. Faces of fewer than three corners are skipped.
     pub face_counts: frz_view,
-    /// uint32_t for each corner of each face, counter-clockwise seen from outside: a vertex.
+    /// uint32_t for each corner of each face: its vertex. Faces are counter-clockwise seen from outside.
     pub indices: frz_view,
     /// Attributes; NULL for none.
     pub attributes: *const frz_attribute,
@@ -47,7 +46,7 @@ pub struct frz_mesh_desc {
     pub attribute_count: usize,
 }
 
-// SAFETY: numbers and pointers; room between fields is never looked at.
+// SAFETY: numbers and pointers; padding between fields is never read.
 unsafe impl Plain for frz_attribute {}
 
 // SAFETY: numbers and pointers.
@@ -62,25 +61,25 @@ unsafe impl Sized32 for frz_mesh_desc {
 pub struct frz_mesh_info {
     /// sizeof(frz_mesh_info), set by the caller.
     pub struct_size: u32,
-    /// 1 when every edge is used as often in one direction as in the other, else 0.
+    /// 1 if every edge is used equally often in both directions, else 0.
     pub closed: u32,
-    /// Vertices.
+    /// Number of vertices.
     pub vertex_count: u64,
-    /// Faces.
+    /// Number of faces.
     pub face_count: u64,
-    /// Corners of all faces.
+    /// Number of corners of all faces.
     pub corner_count: u64,
-    /// Triangles that the faces are cut into.
+    /// Number of triangles into which the faces are divided.
     pub triangle_count: u64,
-    /// Attributes.
+    /// Number of attributes.
     pub attribute_count: u64,
-    /// Least corner of the box around the vertices (m).
+    /// Minimum corner of the vertices' bounding box (m).
     pub box_min: [f32; 3],
-    /// Greatest corner (m).
+    /// Maximum corner (m).
     pub box_max: [f32; 3],
-    /// Surface (m2).
+    /// Surface area (m2).
     pub area: f64,
-    /// Enclosed volume (m3); it means something for closed meshes only.
+    /// Enclosed volume (m3); meaningful for closed meshes only.
     pub volume: f64,
 }
 
@@ -90,7 +89,7 @@ unsafe impl Sized32 for frz_mesh_info {
     const NAME: &'static str = "frz_mesh_info";
 }
 
-/// Arrays that frz_mesh_read reads.
+/// Arrays that frz_mesh_read copies.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_mesh_part {
@@ -98,19 +97,18 @@ pub enum frz_mesh_part {
     FRZ_MESH_POSITIONS = 0,
     /// uint32_t for each face: its number of corners.
     FRZ_MESH_FACE_COUNTS = 1,
-    /// uint32_t for each corner: a vertex.
+    /// uint32_t for each corner: its vertex.
     FRZ_MESH_INDICES = 2,
-    /// uint32_t[3] for each triangle that the faces are cut into: vertices.
+    /// uint32_t[3] for each triangle into which the faces are divided: its vertices.
     FRZ_MESH_TRIANGLES = 3,
-    /// float[3] for each vertex: the outward unit normal, a mean over the triangles around it weighted by their areas;
-    /// zeroes where there is none.
+    /// float[3] for each vertex: the outward unit normal, an area-weighted mean over the triangles around it; zeroes where there is none.
     FRZ_MESH_NORMALS = 4,
 }
 
 /// The value of a mesh's handle.
 pub(in crate::capi) struct Mesh {
     polygons: PolygonMesh,
-    /// Its faces as triangles, cut once.
+    /// Its faces as triangles, triangulated once.
     pub triangles: TriMesh,
     attributes: Vec<Attribute>,
 }
@@ -128,25 +126,25 @@ impl Noun for frz_mesh {
 }
 
 impl Mesh {
-    /// A mesh that the library made.
+    /// A mesh made by the library.
     pub(in crate::capi) fn of_triangles(triangles: TriMesh) -> Self {
         let mut polygons = PolygonMesh { positions: triangles.positions.clone(), ..PolygonMesh::default() };
         triangles.triangles.iter().for_each(|triangle| polygons.push(*triangle));
         Self { polygons, triangles, attributes: Vec::new() }
     }
 
-    /// The numbers of an attribute with so many components; none without such a one.
+    /// The values of an attribute with this number of components; `None` if there is none.
     pub(in crate::capi) fn attribute(&self, name: &str, components: usize) -> Option<&[f32]> {
         let is_it = |attribute: &&Attribute| attribute.name == name && attribute.components == components;
         self.attributes.iter().find(is_it).map(|attribute| &attribute.values[..])
     }
 
-    /// Name, components and numbers of each attribute.
+    /// Name, components and values of each attribute.
     pub(in crate::capi) fn attributes(&self) -> impl Iterator<Item = (&str, usize, &[f32])> {
         self.attributes.iter().map(|one| (&*one.name, one.components, &one.values[..]))
     }
 
-    /// Adds an attribute, in the place of one of the same name.
+    /// Adds an attribute, replacing one of the same name.
     pub(in crate::capi) fn set_attribute(&mut self, name: &str, components: usize, values: Vec<f32>) {
         self.attributes.retain(|attribute| attribute.name != name);
         self.attributes.push(Attribute { name: name.into(), components, values });
@@ -162,7 +160,7 @@ pub(in crate::capi) unsafe fn polygons(
     counts: &frz_view,
     indices: &frz_view,
 ) -> Outcome<PolygonMesh> {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let (positions, counts, corners) = unsafe {
         (positions.finite("positions")?, face_counts(counts)?, indices.elements::<u32>("indices")?)
     };
@@ -179,7 +177,7 @@ pub(in crate::capi) unsafe fn polygons(
     Ok(mesh)
 }
 
-/// The corners of each face; none where all are triangles.
+/// The corner count of each face; `None` if all are triangles.
 ///
 /// # Safety
 /// As [`polygons`].
@@ -187,7 +185,7 @@ unsafe fn face_counts(counts: &frz_view) -> Outcome<Option<Vec<u32>>> {
     if counts.data.is_null() && counts.count == 0 {
         return Ok(None);
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { counts.elements::<u32>("face_counts") }.map(Some)
 }
 
@@ -229,13 +227,12 @@ fn push_faces(mesh: &mut PolygonMesh, corners: &[u32], counts: Vec<u32>) -> Outc
     Ok(())
 }
 
-/// Makes a mesh from a host's arrays, which are copied.
+/// Creates a mesh from a host's arrays, which are copied.
 ///
-/// Faces may have any number of corners, convex or not, and meshes may be open, cross themselves and repeat vertices;
-/// they are cut into triangles once.
+/// Faces may have any number of corners and may be concave; meshes may be open, intersect themselves and repeat vertices. The faces are
+/// divided into triangles once.
 ///
-/// desc: its description. Counts, strides, indices and positions are checked: the error names the first at fault,
-///     counted from 0.
+/// desc: its description. Counts, strides, indices and positions are checked: the error names the first invalid one, counted from 0.
 /// out: receives the mesh, to be destroyed with frz_mesh_destroy; NULL after a failure.
 ///
 /// One thread at a time for each context.
@@ -245,7 +242,7 @@ pub unsafe extern "C" fn frz_mesh_create(
     desc: *const frz_mesh_desc,
     out: *mut *mut frz_mesh,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let none = frz_view::NONE;
@@ -274,7 +271,7 @@ fn made(ctx: &Context, polygons: PolygonMesh, attributes: Vec<Attribute>) -> Out
     Ok(Mesh { polygons, triangles, attributes })
 }
 
-/// Refuses flags that have no meaning.
+/// Refuses unknown flags.
 pub(in crate::capi) fn no_flags(flags: u32, known: u32) -> Outcome {
     if flags & !known != 0 {
         return Err(Failure::argument(format!("flags = {flags:#x} has bits without a meaning")));
@@ -284,7 +281,7 @@ pub(in crate::capi) fn no_flags(flags: u32, known: u32) -> Outcome {
 
 unsafe fn attributes(desc: &frz_mesh_desc, vertices: usize) -> Outcome<Vec<Attribute>> {
     let view = frz_view { data: desc.attributes.cast(), count: desc.attribute_count, stride: 0 };
-    // SAFETY: the caller of `frz_mesh_create` promises so many attributes.
+    // SAFETY: the caller of `frz_mesh_create` guarantees `attribute_count` attributes.
     let list = unsafe { view.elements::<frz_attribute>("attributes") }?;
     let mut out: Vec<Attribute> = Vec::with_capacity(list.len());
     for attribute in list {
@@ -319,26 +316,26 @@ unsafe fn attributes(desc: &frz_mesh_desc, vertices: usize) -> Outcome<Vec<Attri
     Ok(out)
 }
 
-/// Destroys a mesh; NULL is fine.
+/// Destroys a mesh; NULL is ignored.
 ///
 /// mesh: may be NULL.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_mesh_destroy(mesh: *mut frz_mesh) {
-    // SAFETY: the mesh is NULL or was not destroyed.
+    // SAFETY: the mesh is NULL or alive.
     guard(|| unsafe { destroy(mesh) });
 }
 
-/// Reports the properties of a mesh: the counts that frz_mesh_read needs room for, its box, area and volume.
+/// Reports the properties of a mesh: the element counts for frz_mesh_read, its bounding box, area and volume.
 ///
-/// info: receives it; its struct_size says how much of it the caller knows.
+/// info: receives them. The caller sets its struct_size.
 ///
 /// Any number of threads may read a mesh.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_mesh_get_info(mesh: *const frz_mesh, info: *mut frz_mesh_info) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mesh = read(mesh)?;
             let triangles = &mesh.triangles;
@@ -364,22 +361,22 @@ pub unsafe extern "C" fn frz_mesh_get_info(mesh: *const frz_mesh, info: *mut frz
 /// # Safety
 /// The span must describe memory that can be written.
 unsafe fn triples(dst: &frz_span, triples: &[Vec3]) -> Outcome {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { dst.fill("dst", &triples.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>()) }
 }
 
-/// Copies a part of a mesh into the caller's memory.
+/// Copies an array of a mesh into the caller's memory.
 ///
 /// part: a frz_mesh_part.
-/// dst: room for as many elements as frz_mesh_get_info reports, of the type that the part has: FRZ_ERROR_CAPACITY when
-///     it is too small, and nothing is written.
+/// dst: room for as many elements as frz_mesh_get_info reports, of the type that the part states; FRZ_ERROR_CAPACITY if it is too small,
+///     and nothing is written.
 ///
 /// Any number of threads may read a mesh.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_mesh_read(mesh: *const frz_mesh, part: u32, dst: frz_span) -> frz_status {
     use frz_mesh_part::*;
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mesh = read(mesh)?;
             let known = [
@@ -406,9 +403,9 @@ pub unsafe extern "C" fn frz_mesh_read(mesh: *const frz_mesh, part: u32, dst: fr
 
 /// Copies an attribute of a mesh into the caller's memory.
 ///
-/// name: its name. FRZ_ERROR_ARGUMENT, with a list of the names, when there is none of this name.
-/// dst: room for an element of so many floats for each vertex; with data NULL only the number of floats is reported.
-/// components: receives the floats of each vertex, 1 to 4; 0 after a failure. May be NULL.
+/// name: its name. FRZ_ERROR_ARGUMENT, with a list of the existing names, if there is none of this name.
+/// dst: room for one element of that many floats for each vertex; with data NULL only components is reported.
+/// components: receives the number of floats for each vertex, 1 to 4; 0 after a failure. May be NULL.
 ///
 /// Any number of threads may read a mesh.
 #[unsafe(no_mangle)]
@@ -419,7 +416,7 @@ pub unsafe extern "C" fn frz_mesh_attribute(
     components: *mut u32,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let tell = |count: usize| {
                 if !components.is_null() {

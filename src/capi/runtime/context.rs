@@ -1,4 +1,4 @@
-//! One computation's side channel.
+//! Contexts: cancel, progress, warnings and times of a computation.
 
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,50 +14,50 @@ use crate::capi::ffi::views::{Plain, frz_span};
 use crate::context::{Context, PhaseTime, Phases, Progress, Running, machine_memory};
 use crate::error::Error;
 
-/// One computation: cancel flag, progress, polls, warnings, phase times. Cheap: make one for every cook.
+/// A computation: its cancel flag, progress, polls, warnings and phase times. Cheap: create one for every cook.
 pub struct frz_context {
     _opaque: [u8; 0],
 }
 
-/// What is being done.
+/// The progress of a call.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_progress {
-    /// The verb of the phase that runs, for instance "distance"; empty between phases. It ends with a zero.
+    /// Verb of the running phase, for instance "distance"; empty between phases. Zero-terminated.
     pub stage: [c_char; 32],
-    /// Phases finished since the context was made or reset.
+    /// Phases finished since the context was created or reset.
     pub stages_done: u64,
     /// Seconds since the running call began; 0 between calls.
     pub seconds: f64,
-    /// Fraction of the running phase that is done, 0 to 1; -1 where it is not known. Since interface 1.1: programs that
-    /// were compiled with a header of 1.0 have no such field, and it is not written.
+    /// Completed fraction of the running phase, 0 to 1; -1 if unknown. Since interface 1.1: programs compiled with a header of 1.0 do not
+    /// have this field, and it is not written.
     pub fraction: f64,
 }
 
 /// Bytes of frz_progress in the header of interface 1.0.
 const FIRST_PROGRESS: usize = std::mem::offset_of!(frz_progress, fraction);
 
-/// How long a phase took.
+/// The time that a phase took.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_stage_time {
-    /// The phase's verb. It ends with a zero.
+    /// Verb of the phase. Zero-terminated.
     pub stage: [c_char; 32],
-    /// Seconds; the sum of all its runs in the call.
+    /// Seconds; the sum over all of its runs in the call.
     pub seconds: f64,
 }
 
-/// Called while the library works; returning other than 0 cancels. It must return, not throw or jump.
+/// Called while the library works; a return value other than 0 cancels. It must return: no exception, no longjmp.
 ///
-/// user: what was given with it.
-/// progress: what is being done; it is the library's, and valid until the function returns.
+/// user: the pointer given to frz_context_set_poll.
+/// progress: what is being done; owned by the library, valid until the function returns.
 pub type frz_poll_function =
     Option<unsafe extern "C" fn(user: *mut c_void, progress: *const frz_progress) -> c_int>;
 
-/// Receives a warning. It must return, not throw or jump.
+/// Receives a warning. It must return: no exception, no longjmp.
 ///
-/// user: what was given with it.
-/// text: one sentence in UTF-8; it is the library's, and valid until the function returns.
+/// user: the pointer given to frz_context_set_log.
+/// text: one sentence in UTF-8; owned by the library, valid until the function returns.
 pub type frz_log_function = Option<unsafe extern "C" fn(user: *mut c_void, text: *const c_char)>;
 
 /// When the running call began.
@@ -82,7 +82,7 @@ unsafe impl Plain for frz_stage_time {}
 pub(in crate::capi) struct State {
     /// The library's own context.
     pub ctx: Context,
-    /// Dropped last: its threads.
+    /// Dropped last: the context's threads.
     _threads: Threads,
     /// Size of frz_progress in the caller's header (bytes).
     progress_room: usize,
@@ -98,7 +98,7 @@ impl Noun for frz_context {
     const TAG: u32 = 0x6672_7a02;
 }
 
-/// A call that has a context to itself, except for cancel, reset and progress; and its phases.
+/// A call with exclusive use of a context, except for cancel, reset and progress; and its phases.
 pub(in crate::capi) struct Call<'a>(Reading<'a, State>, Option<(Running, Phases)>);
 
 impl Call<'_> {
@@ -113,7 +113,7 @@ impl Call<'_> {
 /// # Safety
 /// The context must be NULL or not destroyed.
 pub(in crate::capi) unsafe fn enter<'a>(context: *const frz_context) -> Outcome<Call<'a>> {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let state = unsafe { read(context) }?;
     if state.entered.swap(true, Ordering::AcqRel) {
         return Err(Failure::new(FRZ_ERROR_BUSY, "the context is in use by another call"));
@@ -128,8 +128,8 @@ pub(in crate::capi) unsafe fn enter<'a>(context: *const frz_context) -> Outcome<
     Ok(call)
 }
 
-/// A call of a frame in real time, which has a context to itself as a [`Call`] has. It takes no lock, allocates nothing, asks no
-/// clock, and has no phases, polls or progress.
+/// A call of a real-time frame, with exclusive use of a context as a [`Call`] has. It takes no lock, allocates nothing, reads no clock, and
+/// has no phases, polls or progress.
 pub(in crate::capi) struct LightCall<'a>(Reading<'a, State>);
 
 impl LightCall<'_> {
@@ -139,12 +139,12 @@ impl LightCall<'_> {
     }
 }
 
-/// Begins a call of a frame in real time with a context, unless it is cancelled, which is looked at here only.
+/// Begins a call of a real-time frame with a context, unless it is cancelled; a cancel is read only here.
 ///
 /// # Safety
 /// As [`enter`].
 pub(in crate::capi) unsafe fn enter_light<'a>(context: *const frz_context) -> Outcome<LightCall<'a>> {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let state = unsafe { read(context) }?;
     if state.entered.swap(true, Ordering::AcqRel) {
         return Err(Failure::new(FRZ_ERROR_BUSY, "the context is in use by another call"));
@@ -169,7 +169,7 @@ impl Drop for LightCall<'_> {
     }
 }
 
-/// A function of the interface that makes an object: `out` receives it, or NULL after a failure.
+/// An interface function that creates an object: `out` receives it, or NULL after a failure.
 ///
 /// # Safety
 /// As [`enter`] and [`give`].
@@ -179,7 +179,7 @@ pub(in crate::capi) unsafe fn creates<N: Noun>(
     make: impl FnOnce(&Context) -> Outcome<N::Value>,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe {
             clear(out);
             let call = enter(context)?;
@@ -199,17 +199,17 @@ impl Drop for Call<'_> {
             *self.0.timings.lock().unwrap_or_else(PoisonError::into_inner) = timings;
         }
         self.0.began.set(None);
-        // The next call must not begin within this one: it would have its cancel.
+        // The next call must not begin within this one: it would inherit its cancel.
         self.1.take();
         self.0.entered.store(false, Ordering::Release);
     }
 }
 
-/// A host's pointer, which is only ever passed back to it.
+/// A host's pointer, which is only passed back to it.
 #[derive(Clone, Copy)]
 struct User(*mut c_void);
 
-// SAFETY: the library never dereferences it, and passes it back on the thread that called.
+// SAFETY: the library never dereferences it, and passes it back on the calling thread.
 unsafe impl Send for User {}
 
 impl User {
@@ -218,7 +218,7 @@ impl User {
     }
 }
 
-/// A verb in an array that ends with a zero.
+/// A verb as a zero-terminated array.
 fn letters(verb: &str) -> [c_char; 32] {
     let mut out = [0; 32];
     out.iter_mut().take(31).zip(verb.bytes()).for_each(|(to, from)| *to = from as c_char);
@@ -241,14 +241,13 @@ fn progress_of(progress: &Progress, began: &Began) -> frz_progress {
     }
 }
 
-/// Makes a context on a pool.
+/// Creates a context on a pool.
 ///
-/// abi: FRZ_ABI_VERSION, as the caller's header has it: FRZ_ERROR_VERSION when the major numbers differ, or the
-///     library is older than the header.
-/// pool: whose threads do the work; it may be destroyed before the context.
+/// abi: FRZ_ABI_VERSION of the caller's header. FRZ_ERROR_VERSION if the major numbers differ, or if the library is older than the header.
+/// pool: provides the threads; it may be destroyed before the context.
 /// out: receives the context, to be destroyed with frz_context_destroy; NULL after a failure.
 ///
-/// Any thread. A context serves one call at a time (FRZ_ERROR_BUSY), except frz_context_cancel, _reset and _progress.
+/// Any thread. A context serves one call at a time (FRZ_ERROR_BUSY), except frz_context_cancel, frz_context_reset and frz_context_progress.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_context_create(
     abi: u32,
@@ -256,7 +255,7 @@ pub unsafe extern "C" fn frz_context_create(
     out: *mut *mut frz_context,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(out);
             required(out, "out")?;
@@ -286,25 +285,25 @@ pub unsafe extern "C" fn frz_context_create(
     })
 }
 
-/// Destroys a context; NULL is fine.
+/// Destroys a context; NULL is ignored.
 ///
-/// context: may be NULL. Not while a call with it runs: it then stays.
+/// context: may be NULL. It is not destroyed while a call with it runs.
 ///
 /// Any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_context_destroy(context: *mut frz_context) {
-    // SAFETY: the context is NULL or was not destroyed.
+    // SAFETY: the context is NULL or alive.
     guard(|| unsafe { destroy(context) });
 }
 
 /// Sets the function that is called while the library works, for a progress bar and an escape key.
 ///
-/// It is called on the thread that called the library: at the beginning of each phase, then every 10 to 50 ms, also
-/// inside long phases. Without worker threads (a pool of 0) it is called between pieces of work, with no interval
-/// promised. Within it frz_context_cancel and frz_context_progress may be called, and nothing else with this context.
+/// It is called on the thread that called the library: at the beginning of each phase, then every 10 to 50 ms, also inside long phases.
+/// Without worker threads (a pool of 0 threads) it is called between pieces of work, at no guaranteed interval. The function may call
+/// frz_context_cancel and frz_context_progress, but nothing else with this context.
 ///
 /// poll: NULL for none.
-/// user: handed to it; may be NULL.
+/// user: passed to the function; may be NULL.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -314,14 +313,14 @@ pub unsafe extern "C" fn frz_context_set_poll(
     user: *mut c_void,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the context is NULL or was not destroyed.
+        // SAFETY: the context is NULL or alive.
         let call = unsafe { enter(context) }?;
         let user = User(user);
         let began = call.0.began.clone();
         call.ctx().set_poll(poll.map(|poll| {
             let ask = move |progress: &Progress| {
                 let told = progress_of(progress, &began);
-                // SAFETY: the host promised a function that takes these.
+                // SAFETY: the host guarantees a function that takes these.
                 unsafe { poll(user.pointer(), &told) != 0 }
             };
             Box::new(ask) as crate::context::Poll
@@ -330,14 +329,12 @@ pub unsafe extern "C" fn frz_context_set_poll(
     })
 }
 
-/// Sets the function that receives warnings: what a user should know though the call succeeds, for instance that a mesh
-/// is open.
+/// Sets the function that receives warnings: what a user should know although the call succeeds, for instance that a mesh is open.
 ///
-/// It is called on the thread that called the library. The library itself never prints. Within it nothing else may be
-/// called with this context.
+/// It is called on the thread that called the library. The library itself never prints. The function must call nothing with this context.
 ///
 /// log: NULL for none; warnings are then dropped.
-/// user: handed to it; may be NULL.
+/// user: passed to the function; may be NULL.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -347,13 +344,13 @@ pub unsafe extern "C" fn frz_context_set_log(
     user: *mut c_void,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the context is NULL or was not destroyed.
+        // SAFETY: the context is NULL or alive.
         let call = unsafe { enter(context) }?;
         let user = User(user);
         call.ctx().set_log(log.map(|log| {
             let tell = move |text: &str| {
                 let text = CString::new(text.replace('\0', "")).unwrap_or_default();
-                // SAFETY: the host promised a function that takes these.
+                // SAFETY: the host guarantees a function that takes these.
                 unsafe { log(user.pointer(), text.as_ptr()) };
             };
             Box::new(tell) as crate::context::Log
@@ -362,40 +359,40 @@ pub unsafe extern "C" fn frz_context_set_log(
     })
 }
 
-/// Sets how much memory an object may take that is made or changed with this context.
+/// Sets the memory limit of objects that are created or changed with this context.
 ///
-/// The need is estimated before memory is taken; a call that would need more returns FRZ_ERROR_MEMORY and changes
-/// nothing. It is a guard against a wrong voxel size, not an account of every byte.
+/// The memory of a call is estimated before any is allocated; a call that would need more returns FRZ_ERROR_MEMORY and changes nothing.
+/// This guards against a wrong voxel size; it does not account for every byte.
 ///
-/// bytes: 0 for the limit of a new context, the machine's memory; UINT64_MAX for none.
+/// bytes: 0 for the limit of a new context, the machine's memory; UINT64_MAX for no limit.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_context_set_memory_limit(context: *mut frz_context, bytes: u64) -> frz_status {
     guard(|| {
-        // SAFETY: the context is NULL or was not destroyed.
+        // SAFETY: the context is NULL or alive.
         let call = unsafe { enter(context) }?;
         call.ctx().set_memory_limit(if bytes == 0 { usual_limit() } else { bytes });
         Ok(())
     })
 }
 
-/// Cancels the call that runs with the context, and every later one until frz_context_reset: they return
-/// FRZ_CANCELLED and change nothing. A call whose work is done when the cancel comes returns as if there were none.
+/// Cancels the call that runs with the context, and every later one until frz_context_reset: they return FRZ_CANCELLED and change nothing.
+/// A call whose work is done when it is cancelled returns normally.
 ///
 /// context: may be NULL.
 ///
 /// Any thread, any time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_context_cancel(context: *mut frz_context) {
-    // SAFETY: the context is NULL or was not destroyed.
+    // SAFETY: the context is NULL or alive.
     if let Ok(state) = unsafe { read(context.cast_const()) } {
         state.ctx.cancel();
     }
 }
 
-/// Clears a cancel and restarts the count of phases, for the calls that follow. A call that runs meanwhile keeps its
-/// cancel: it never continues with half of its work left out.
+/// Clears a cancel and restarts the count of phases, for the calls that follow. A call that is running stays cancelled: it never continues
+/// with part of its work left out.
 ///
 /// context: may be NULL.
 ///
@@ -403,15 +400,15 @@ pub unsafe extern "C" fn frz_context_cancel(context: *mut frz_context) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_context_reset(context: *mut frz_context) {
     guard(|| {
-        // SAFETY: the context is NULL or was not destroyed.
+        // SAFETY: the context is NULL or alive.
         unsafe { read(context.cast_const()) }?.ctx.reset();
         Ok(())
     });
 }
 
-/// Reports what the context is doing.
+/// Reports the progress of the context's call.
 ///
-/// out: receives it; all zeroes after a failure, except the fraction.
+/// out: receives it; all zeroes after a failure, except fraction.
 ///
 /// Any thread, any time.
 #[unsafe(no_mangle)]
@@ -421,7 +418,7 @@ pub unsafe extern "C" fn frz_context_progress(
 ) -> frz_status {
     guard(|| {
         let out = required(out, "out")?.cast::<u8>();
-        // SAFETY: the pointers are NULL or the caller's, who has as much room as the header of its context says.
+        // SAFETY: the pointers are NULL or valid, and `out` has as much room as the header of the context's creator states.
         unsafe {
             out.write_bytes(0, FIRST_PROGRESS);
             let state = read(context)?;
@@ -432,10 +429,10 @@ pub unsafe extern "C" fn frz_context_progress(
     })
 }
 
-/// Reports how long the phases of the last call with phases took, in the order of their first runs; a phase that ran
-/// several times is one entry with the sum.
+/// Reports how long the phases of the last call that had phases took, in the order of their first runs; a phase that ran several times is
+/// one entry with the sum.
 ///
-/// dst: room for frz_stage_time; with data NULL only the count is reported. FRZ_ERROR_CAPACITY when it is too small.
+/// dst: room for elements of frz_stage_time; with data NULL only the count is reported. FRZ_ERROR_CAPACITY if it is too small.
 /// count: receives the number of phases; 0 after other failures.
 ///
 /// One thread at a time.
@@ -447,7 +444,7 @@ pub unsafe extern "C" fn frz_context_timings(
 ) -> frz_status {
     guard(|| {
         let count = required(count, "count")?;
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             count.write(0);
             let call = enter(context)?;

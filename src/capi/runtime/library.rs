@@ -6,14 +6,14 @@ use crate::capi::ffi::guard::last_error;
 
 /// Version of the interface that this header describes: major << 16 | minor.
 pub const FRZ_ABI_VERSION: u32 = 0x10008;
-/// Version of frazil that this header belongs to.
+/// Major version of frazil that this header belongs to.
 pub const FRZ_VERSION_MAJOR: u32 = 0;
-/// Second number of that version.
+/// Minor version of frazil.
 pub const FRZ_VERSION_MINOR: u32 = 1;
-/// Third number of that version.
+/// Patch version of frazil.
 pub const FRZ_VERSION_PATCH: u32 = 0;
 
-/// Reports the version of the library that is linked: major * 1000000 + minor * 1000 + patch.
+/// Returns the version of the linked library: major * 1000000 + minor * 1000 + patch.
 ///
 /// Any thread, any time.
 #[unsafe(no_mangle)]
@@ -21,9 +21,9 @@ pub extern "C" fn frz_version() -> u32 {
     FRZ_VERSION_MAJOR * 1_000_000 + FRZ_VERSION_MINOR * 1_000 + FRZ_VERSION_PATCH
 }
 
-/// Names a status: "FRZ_OK", "FRZ_ERROR_ARGUMENT" and so on; "unknown status" for other numbers.
+/// Returns the name of a status: "FRZ_OK", "FRZ_ERROR_ARGUMENT" and so on; "unknown status" for other numbers.
 ///
-/// Any thread, any time. The text is never to be freed.
+/// Any thread, any time. The text must not be freed.
 ///
 /// status: a frz_status.
 #[unsafe(no_mangle)]
@@ -46,11 +46,11 @@ pub extern "C" fn frz_status_name(status: u32) -> *const c_char {
     NAMES.get(status as usize).copied().unwrap_or(c"unknown status").as_ptr()
 }
 
-/// Returns the message of the last call of this thread that did not return FRZ_OK: one sentence in UTF-8 that names
-/// what is at fault; empty before the first.
+/// Returns the message of this thread's last call that did not return FRZ_OK: one sentence in UTF-8 that names what is at fault; empty
+/// before the first failure.
 ///
-/// Any thread, any time. The text is the library's, and stays until the next call of this thread that fails. Calls
-/// that succeed do not change it: query it only after a failure.
+/// Any thread, any time. The text is owned by the library and valid until the next failing call of this thread. Calls that succeed do not
+/// change it: query it only after a failure.
 #[unsafe(no_mangle)]
 pub extern "C" fn frz_last_error() -> *const c_char {
     last_error()

@@ -1,6 +1,6 @@
-//! The library, its threads, and contexts to call it with.
+//! The library, its threads, and the contexts of calls.
 
-// In the header's order.
+// In the order of the header.
 pub mod library;
 
 pub mod pool;

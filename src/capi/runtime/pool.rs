@@ -7,15 +7,15 @@ use crate::capi::ffi::guard::{Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{Noun, clear, destroy, give};
 use crate::context::Pool;
 
-/// Worker threads, shared by any number of contexts.
+/// Worker threads that any number of contexts may share.
 pub struct frz_pool {
     _opaque: [u8; 0],
 }
 
-/// A pool's threads, as long as the pool or one of its contexts exists.
+/// A pool's threads, which live as long as the pool or one of its contexts.
 pub(in crate::capi) struct Threads(pub Arc<Pool>, #[allow(dead_code, reason = "counts itself")] Arc<Alive>);
 
-/// Counts the pools that are alive: after the last one no thread of ours is left.
+/// Counts the pools that are alive: after the last one none of frazil's threads is left.
 pub(in crate::capi) struct Alive;
 
 static ALIVE: AtomicUsize = AtomicUsize::new(0);
@@ -50,17 +50,17 @@ impl Noun for frz_pool {
 
 /// Starts worker threads.
 ///
-/// Work of any number of contexts may share a pool. Results do not depend on the number of threads.
+/// Any number of contexts may share a pool. Results do not depend on the number of threads.
 ///
-/// threads: number of workers, 0 to 1024. 0: there are none, all work is done by the thread that calls; polls then
-///     fall between pieces of work, with no interval promised.
+/// threads: number of workers, 0 to 1024. 0: no workers; the calling thread does all the work, and polls fall between pieces of work, at no
+///     guaranteed interval.
 /// out: receives the pool, to be destroyed with frz_pool_destroy; NULL after a failure.
 ///
 /// Any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_pool_create(threads: u32, out: *mut *mut frz_pool) -> frz_status {
     guard(|| {
-        // SAFETY: `out` is NULL or the caller's.
+        // SAFETY: `out` is NULL or valid.
         unsafe {
             clear(out);
             crate::capi::ffi::handle::required(out, "out")?;
@@ -69,16 +69,16 @@ pub unsafe extern "C" fn frz_pool_create(threads: u32, out: *mut *mut frz_pool) 
     })
 }
 
-/// Gives a pool back; NULL is fine.
+/// Destroys a pool; NULL is ignored.
 ///
-/// Its threads end, and are joined, when the contexts that were made on it are destroyed too. At the end of the last
-/// pool OpenVDB's threads end as well, unless the host works with TBB itself: they are then left to the host.
+/// Its threads end, and are joined, once the contexts created on it are destroyed too. With the last pool OpenVDB's threads end as well,
+/// unless the host uses TBB itself: they are then left to the host.
 ///
-/// pool: may be NULL. Not within a poll or log function.
+/// pool: may be NULL. Must not be called within a poll or log function.
 ///
 /// Any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_pool_destroy(pool: *mut frz_pool) {
-    // SAFETY: the pool is NULL or was not destroyed.
+    // SAFETY: the pool is NULL or alive.
     guard(|| unsafe { destroy(pool) });
 }

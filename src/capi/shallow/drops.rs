@@ -1,4 +1,4 @@
-//! Shallow liquid in the air: its drops, and a mesh of them.
+//! Shallow liquid in the air: its drops, and their mesh.
 
 use super::liquid::{Spill, frz_shallow};
 use super::snapshot::{Taken, frz_shallow_snapshot};
@@ -13,7 +13,7 @@ use crate::shallow::free_fall::Droplet;
 use crate::shallow::free_fall::mesh::{Balls, Target, bound};
 use crate::shallow::surface::{Counts, Indices, Layout};
 
-/// Liquid in the air.
+/// A drop of liquid in the air.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_drop {
@@ -21,17 +21,17 @@ pub struct frz_shallow_drop {
     pub position: [f64; 3],
     /// Its velocity (m/s).
     pub velocity: [f64; 3],
-    /// How much it is (m3).
+    /// Its volume (m3).
     pub volume: f64,
-    /// Radius of a ball of its volume (m).
+    /// Radius of a sphere of its volume (m).
     pub radius: f64,
-    /// Seconds since it left the edge that it falls from.
+    /// Time since it left the edge that it falls from (s).
     pub age: f64,
-    /// That edge: the same number for all that come from one side of one column.
+    /// Id of that edge: the same for all drops from one side of one column.
     pub source: u64,
-    /// One more than that of the drop that left the same edge before it, if nothing interrupted the flow there.
+    /// Sequence number at its edge: one more than that of the previous drop, if nothing interrupted the flow there.
     pub number: u64,
-    /// Concentrations of the scalars that frz_shallow_set_scalars has set; 0 behind them.
+    /// Concentrations of the scalars of frz_shallow_set_scalars; 0 for the remaining elements.
     pub concentrations: [f32; 4],
 }
 
@@ -49,19 +49,19 @@ impl From<Droplet> for frz_shallow_drop {
 /// Lists drops, or only counts them.
 ///
 /// # Safety
-/// The span must describe memory that can be written, and `count` be NULL or the caller's.
+/// The span must describe memory that can be written, and `count` must be NULL or valid.
 unsafe fn list(drops: impl ExactSizeIterator<Item = Droplet>, dst: &frz_span, count: *mut usize) -> Outcome {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         required(count, "count")?.write_unaligned(drops.len());
         if dst.data.is_null() { Ok(()) } else { dst.put("dst", drops.map(frz_shallow_drop::from)) }
     }
 }
 
-/// Lists the liquid in the air, in the order in which it left its edges, in real time (frz_shallow).
+/// Lists the drops in the air, in the order in which they left their edges, in real time (frz_shallow).
 ///
-/// dst: room for a frz_shallow_drop for each, at most frz_shallow_params.falls_most. NULL: count receives their number, and nothing is written.
-///     FRZ_ERROR_CAPACITY when it is too little.
+/// dst: room for a frz_shallow_drop for each, at most frz_shallow_params.falls_most. With data NULL only the count is reported.
+///     FRZ_ERROR_CAPACITY if it is too small.
 /// count: receives their number; 0 after other failures.
 ///
 /// Any number of threads may read a shallow liquid.
@@ -72,7 +72,7 @@ pub unsafe extern "C" fn frz_shallow_drops(
     count: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             required(count, "count")?.write_unaligned(0);
             list(read(shallow)?.shallow.drops(), &dst, count)
@@ -80,10 +80,10 @@ pub unsafe extern "C" fn frz_shallow_drops(
     })
 }
 
-/// Lists the liquid that was in the air when a snapshot was taken, as frz_shallow_drops does, in real time (frz_shallow).
+/// Lists the drops that were in the air when a snapshot was taken, as frz_shallow_drops does, in real time (frz_shallow).
 ///
-/// dst: as there.
-/// count: as there.
+/// dst: as in frz_shallow_drops.
+/// count: as in frz_shallow_drops.
 ///
 /// Any number of threads may read a snapshot.
 #[unsafe(no_mangle)]
@@ -93,7 +93,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_drops(
     count: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             required(count, "count")?.write_unaligned(0);
             list(read(snapshot)?.snapshot.drops().iter().copied(), &dst, count)
@@ -101,7 +101,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_drops(
     })
 }
 
-/// Buffers that a mesh of drops is written into, as those of frz_shallow_target. It begins zeroed, and then struct_size.
+/// Buffers that a mesh of drops is written to, as in frz_shallow_target. Zero it, then set struct_size.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_drops_target {
@@ -109,15 +109,15 @@ pub struct frz_shallow_drops_target {
     pub struct_size: u32,
     /// Bits of an index: 16, for at most 65536 vertices, or 32. 0 without indices.
     pub index_bits: u32,
-    /// float[3] a vertex: where it is (m x scale).
+    /// float[3] for each vertex: its position (m x scale).
     pub positions: frz_span,
-    /// float[3] a vertex: a unit vector.
+    /// float[3] for each vertex: its unit normal.
     pub normals: frz_span,
-    /// float[3] a vertex: velocity of its drop (m/s x scale).
+    /// float[3] for each vertex: velocity of its drop (m/s x scale).
     pub velocities: frz_span,
-    /// uint32_t a vertex: its drop in the list of frz_shallow_drops.
+    /// uint32_t for each vertex: index of its drop in the list of frz_shallow_drops.
     pub drops: frz_span,
-    /// uint16_t or uint32_t for each corner of each triangle: a vertex. Triangles face outward.
+    /// uint16_t or uint32_t for each corner of each triangle: its vertex. Triangles face outward.
     pub indices: frz_span,
 }
 
@@ -154,7 +154,7 @@ impl frz_shallow_drops_target {
     /// The spans must describe memory that can be written and that nothing else uses, for `'a`.
     unsafe fn target<'a>(&self) -> Outcome<Target<'a>> {
         check_buffers(&self.buffers(), self.index_bits)?;
-        // SAFETY: the caller's promise, and they do not overlap.
+        // SAFETY: guaranteed by the caller, and they do not overlap.
         unsafe {
             let indices = match self.index_bits {
                 16 => self.indices.numbers("indices", 1)?.map_or(Indices::None, Indices::U16),
@@ -171,7 +171,7 @@ impl frz_shallow_drops_target {
     }
 }
 
-/// What a mesh of drops is made into.
+/// What a mesh of drops is made from and into.
 struct Wanted {
     layout: Layout,
     given: frz_shallow_drops_target,
@@ -179,16 +179,16 @@ struct Wanted {
 }
 
 impl Wanted {
-    /// What a host wants.
+    /// The request of a host.
     ///
     /// # Safety
-    /// The pointers must be NULL or the caller's.
+    /// The pointers must be NULL or valid.
     unsafe fn new(
         given: *const frz_shallow_layout,
         target: *const frz_shallow_drops_target,
         size: *mut frz_shallow_size,
     ) -> Outcome<Self> {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe {
             if !size.is_null() {
                 fill(size, None, Counts::default().into())?;
@@ -203,7 +203,7 @@ impl Wanted {
     /// # Safety
     /// As in [`Wanted::new`], and the spans must describe memory that can be written.
     unsafe fn write(&self, balls: &mut Balls, drops: &[Droplet]) -> Outcome {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe {
             let mut target = self.given.target()?;
             let counts = balls.count(drops);
@@ -217,7 +217,7 @@ impl Wanted {
     }
 }
 
-/// Reports the most that the mesh of the liquid in the air can have, so that buffers are made once.
+/// Reports the maximum size of the mesh of the liquid in the air, so that buffers can be allocated once.
 ///
 /// size: receives it, all zeroes after a failure. Its struct_size is set by the caller.
 ///
@@ -228,7 +228,7 @@ pub unsafe extern "C" fn frz_shallow_drops_bound(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             fill(size, None, Counts::default().into())?;
             let most = read(shallow)?.shallow.params().falls.map_or(0, |falls| falls.most);
@@ -237,12 +237,12 @@ pub unsafe extern "C" fn frz_shallow_drops_bound(
     })
 }
 
-/// Writes the liquid in the air as triangles, in real time (frz_shallow): a ball for each drop, and strands between drops that follow each other from one
-/// edge. The balls' vertices come first, in the order of their drops.
+/// Writes the liquid in the air as triangles, in real time (frz_shallow): a sphere for each drop, and strands between consecutive drops
+/// from one edge. The spheres' vertices come first, in the order of their drops.
 ///
-/// layout: NULL for the usual one; its depths and FRZ_SHALLOW_LIFTED are not looked at.
-/// target: the buffers. FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed. With all data
-///     NULL it is the size only that is asked for.
+/// layout: NULL for the defaults; its depths and FRZ_SHALLOW_LIFTED are ignored.
+/// target: the buffers. FRZ_ERROR_CAPACITY if one is too small: nothing is written, and size receives what is needed. With all data NULL
+///     only the size is reported.
 /// size: receives the size of the mesh, all zeroes after other failures; may be NULL. Its struct_size is set by the caller.
 ///
 /// One thread at a time.
@@ -255,7 +255,7 @@ pub unsafe extern "C" fn frz_shallow_drops_mesh(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so is what the spans describe.
+        // SAFETY: the pointers are NULL or valid, and so are the spans.
         unsafe {
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;
@@ -270,10 +270,10 @@ pub unsafe extern "C" fn frz_shallow_drops_mesh(
 
 /// Writes the liquid that was in the air when a snapshot was taken, as frz_shallow_drops_mesh does, in real time (frz_shallow).
 ///
-/// context: another one than that of the thread that computes.
-/// layout: NULL for the usual one.
-/// target: the buffers, as there.
-/// size: receives the size of the mesh, as there; may be NULL. Its struct_size is set by the caller.
+/// context: not the one of the thread that computes.
+/// layout: NULL for the defaults.
+/// target: the buffers, as in frz_shallow_drops_mesh.
+/// size: receives the size of the mesh, as in frz_shallow_drops_mesh; may be NULL. Its struct_size is set by the caller.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -285,7 +285,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_drops_mesh(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so is what the spans describe.
+        // SAFETY: the pointers are NULL or valid, and so are the spans.
         unsafe {
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;

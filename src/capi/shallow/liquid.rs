@@ -24,17 +24,17 @@ use crate::shallow::{Load, Params, Report, Shallow};
 
 /// A small amount of liquid on a ground: blood, coffee or paint in a fraction of a frame.
 ///
-/// In real time: what a host calls in each frame keeps to stricter manners than all other calls. These are frz_shallow_step, _replay,
-/// _update_terrain, _update_heights, _set_bodies, _loads, _save, _restore, _surface, _find_lifts, _find_ledges, _drops, _drops_mesh, _read_scalar and _probe,
-/// frz_shallow_stains_update, _read and _soaked, and frz_shallow_snapshot_take, _surface, _drops, _drops_mesh and _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
-/// system call but that for the thread's clock where a step has a budget. Only where there is more than ever before, more columns because
-/// a body uncovers another layer, say, memory grows; so may what fails.
+/// In real time: calls that a host makes in each frame follow stricter rules than all others. These calls are frz_shallow_step, _replay,
+/// _update_terrain, _update_heights, _set_bodies, _loads, _save, _restore, _surface, _find_lifts, _find_ledges, _drops, _drops_mesh,
+/// _read_scalar and _probe, frz_shallow_stains_update, _read and _soaked, and frz_shallow_snapshot_take, _surface, _drops, _drops_mesh and
+/// _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
+/// system call except to read the thread's clock when a step has a budget. Memory grows only when more is needed than ever before, for
+/// instance more columns because a body uncovers another layer; failing calls may allocate too.
 ///
-/// A cancel is looked at at the beginning of such a call, and in the course of a frame that may take long: one of exact steps, of over some two million columns
-/// times steps, or with many full columns. Such a frame begins with a copy of what it changes, and is as if it had not begun when it is cancelled. None of these calls
-/// has phases, which all other work has: frz_context_progress and
-/// frz_context_timings do not see them. Phases take locks and memory, and a poll between them may take longer than the few milliseconds
-/// that a frame has.
+/// A cancel takes effect at the beginning of such a call, and also during a frame that may take long: one with exact steps, with over some
+/// two million columns times steps, or with many full columns. Such a frame first copies what it changes, so that a cancel leaves the
+/// liquid as it was. None of these calls has phases, which all other work has: frz_context_progress and frz_context_timings do not see
+/// them. Phases take locks and memory, and a poll between them may take longer than the few milliseconds of a frame.
 pub struct frz_shallow {
     _opaque: [u8; 0],
 }
@@ -45,20 +45,20 @@ pub struct frz_shallow {
 pub struct frz_shallow_report {
     /// sizeof(frz_shallow_report), set by the caller.
     pub struct_size: u32,
-    /// Count of steps that the frame was divided into.
+    /// Number of steps into which the frame was divided.
     pub steps: u32,
-    /// Simulated time (s): dt, or less where the budget ran out.
+    /// Simulated time (s): dt, or less if the budget ran out.
     pub seconds: f64,
-    /// Time that the budget left out (s): dt less seconds. No liquid is lost with it.
+    /// Time that was dropped because the budget ran out (s): dt minus seconds. No liquid is lost with it.
     pub dropped: f64,
-    /// Greatest depth (m), or somewhat over it.
+    /// Maximum depth (m), or slightly more.
     pub deepest: f64,
-    /// Rows of cells, summed over steps, in which columns would have given more liquid than they had, and gave what they had.
+    /// Rows of cells, summed over steps, in which columns would have given more liquid than they had, and were limited to what they had.
     pub emptied: u64,
-    /// Rows of cells, summed over steps, in which columns would have taken more than they had room for, and took what fitted.
+    /// Rows of cells, summed over steps, in which columns would have taken more than they had room for, and were limited to what fitted.
     pub filled: u64,
-    /// Rows of cells, summed over steps, in which films on slopes would have been too fast for steps of this length, and were held back: shorter steps let
-    /// them go.
+    /// Rows of cells, summed over steps, in which films on slopes would have been too fast for steps of this length, and were slowed down:
+    /// shorter steps do not limit them.
     pub slowed: u64,
 }
 
@@ -89,25 +89,25 @@ pub(in crate::capi) struct Spill {
     pub shallow: Shallow,
     /// What it flows over.
     pub terrain: Terrain,
-    /// Flow points of the host, in its order.
+    /// The host's flow points, in its order.
     pub flows: Vec<Attached>,
-    /// Obstacles of the last call.
+    /// The bodies of the last call.
     pub shapes: Vec<Shape>,
-    /// Makes surfaces.
+    /// Builds surfaces.
     pub surface: Surface,
-    /// Minimum heights, once they were found.
+    /// Minimum heights, once found.
     pub lifted: Lifted,
-    /// Ledges, once they were found.
+    /// Ledges, once found.
     pub ledged: Ledged,
-    /// Mean velocities of all column indices (m/s), when a surface wants them.
+    /// Mean velocities of all column indices (m/s), if a surface needs them.
     pub velocities: Vec<[f32; 2]>,
-    /// Concentrations of scalars by column index, when a surface wants them.
+    /// Concentrations of scalars by column index, if a surface needs them.
     pub concentrations: [Vec<f32>; MOST],
-    /// Makes meshes of what is in the air, and that.
+    /// Builds and holds meshes of the liquid in the air.
     pub balls: Balls,
     /// Drops of the last such mesh.
     pub drops: Vec<Droplet>,
-    /// Velocities of the bodies (m/s), and what the liquid did to them, as last asked for.
+    /// Velocities of the bodies (m/s), and their loads, as last requested.
     pub velocities_of_bodies: Vec<[f64; 3]>,
     pub loads: Vec<Load>,
     /// Steps of a replay (s).
@@ -148,15 +148,15 @@ impl Spill {
     }
 }
 
-/// Makes a liquid on a mesh: dry at first.
+/// Creates a liquid on a mesh, initially dry.
 ///
-/// The vertical line through the middle of a cell is solid where it is inside of the mesh: closed parts that overlap are one
-/// solid. Where the mesh is open, all below a face that faces up is solid, and a face that faces down is nothing; a warning says
-/// that it is open. Liquid stands on each solid of a cell, up to the underside of the next one.
+/// The vertical line through the centre of a cell is solid where it is inside the mesh: overlapping closed parts form one solid. Where the
+/// mesh is open, everything below a face that faces up is solid, and a face that faces down is ignored; a warning says that the mesh is
+/// open. Liquid stands on each solid of a cell, up to the underside of the next one.
 ///
-/// params: NULL for the usual ones.
+/// params: NULL for the defaults.
 /// domain: where liquid can be.
-/// mesh: it is copied. FRZ_ERROR_ARGUMENT where no face of it within the domain faces up.
+/// mesh: it is copied. FRZ_ERROR_ARGUMENT if no face of it within the domain faces up.
 /// out: receives the liquid, to be destroyed with frz_shallow_destroy; NULL after a failure.
 ///
 /// Any number of threads may read a mesh; one thread at a time for each context.
@@ -168,7 +168,7 @@ pub unsafe extern "C" fn frz_shallow_create(
     mesh: *const frz_mesh,
     out: *mut *mut frz_shallow,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let params = self::params(params)?;
@@ -180,12 +180,12 @@ pub unsafe extern "C" fn frz_shallow_create(
     }
 }
 
-/// Makes a liquid on a height field: dry at first.
+/// Creates a liquid on a height field, initially dry.
 ///
-/// params: NULL for the usual ones.
+/// params: NULL for the defaults.
 /// domain: where liquid can be.
-/// heights: float for each cell (m), finite: the height of the ground in its middle, row by row along x from the least z. Heights
-///     beyond those of the domain become its ends.
+/// heights: float for each cell (m), finite: the height of the ground at its centre, row by row along x from the minimum z. Heights outside
+///     the range of the domain are clamped to it.
 /// out: receives the liquid, to be destroyed with frz_shallow_destroy; NULL after a failure.
 ///
 /// One thread at a time for each context.
@@ -197,7 +197,7 @@ pub unsafe extern "C" fn frz_shallow_create_heights(
     heights: frz_view,
     out: *mut *mut frz_shallow,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let params = self::params(params)?;
@@ -209,12 +209,12 @@ pub unsafe extern "C" fn frz_shallow_create_heights(
     }
 }
 
-/// Makes a liquid on a level set: dry at first.
+/// Creates a liquid on a level set, initially dry.
 ///
-/// params: NULL for the usual ones.
+/// params: NULL for the defaults.
 /// domain: where liquid can be.
-/// level_set: a grid of distances (m), negative inside; it is sampled at each voxel of the height of the domain. What is solid at
-///     the least height is so for ever below. The ground cannot move afterwards.
+/// level_set: a grid of distances (m), negative inside; it is sampled at each voxel over the height of the domain. What is solid at the
+///     minimum height is solid all the way down. The ground cannot move afterwards.
 /// out: receives the liquid, to be destroyed with frz_shallow_destroy; NULL after a failure.
 ///
 /// Any number of threads may read a grid; one thread at a time for each context.
@@ -227,7 +227,7 @@ pub unsafe extern "C" fn frz_shallow_create_grid(
     level_set: *const frz_grid,
     out: *mut *mut frz_shallow,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let params = self::params(params)?;
@@ -239,20 +239,20 @@ pub unsafe extern "C" fn frz_shallow_create_grid(
     }
 }
 
-/// Destroys a liquid; NULL is fine. Its snapshots stay.
+/// Destroys a liquid; NULL is ignored. Its snapshots remain.
 ///
-/// shallow: may be NULL. Not while a call uses it: it then stays.
+/// shallow: may be NULL. It is not destroyed while a call uses it.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_destroy(shallow: *mut frz_shallow) {
-    // SAFETY: the liquid is NULL or was not destroyed.
+    // SAFETY: the liquid is NULL or alive.
     guard(|| unsafe { destroy(shallow) });
 }
 
-/// Sets what flows, and how, from the next frame on. The border, falls and friction must stay.
+/// Sets the parameters from the next frame on. border, friction and the falls_ fields cannot change.
 ///
-/// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+/// params: the new parameters. FRZ_ERROR_ARGUMENT names a field that is out of range, and its range; the old ones are then kept.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -261,7 +261,7 @@ pub unsafe extern "C" fn frz_shallow_set_params(
     params: *const frz_shallow_params,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut spill = change(shallow)?;
             required(params.cast_mut(), frz_shallow_params::NAME)?;
@@ -270,13 +270,13 @@ pub unsafe extern "C" fn frz_shallow_set_params(
     })
 }
 
-/// Computes a frame, in real time (frz_shallow). It is divided into steps as frz_shallow_params.pace says.
+/// Computes a frame, in real time (frz_shallow), in steps as frz_shallow_params.pace states.
 ///
-/// dt: length of the frame (s), 1e-12 to 1e6. FRZ_ERROR_ARGUMENT, too, where it would take over a million steps: the liquid is then as it was.
-/// budget_seconds: CPU time of this thread (s), or time where several threads work, after which no step begins, 0 to 1e6; 0: as much as
-///     it takes. The rest of the frame is then left out (frz_shallow_report.dropped), never any liquid. At least one step is made. With
-///     frz_shallow_last_steps and frz_shallow_replay such a frame can be made again.
-/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// dt: length of the frame (s), 1e-12 to 1e6. FRZ_ERROR_ARGUMENT also if it would take over a million steps: the liquid is then as it was.
+/// budget_seconds: CPU time of this thread (s), or elapsed time if several threads work, after which no step begins, 0 to 1e6; 0: no limit.
+///     The rest of the frame is then dropped (frz_shallow_report.dropped), but never any liquid. At least one step is made.
+///     frz_shallow_last_steps and frz_shallow_replay reproduce such a frame.
+/// report: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -288,7 +288,7 @@ pub unsafe extern "C" fn frz_shallow_step(
     report: *mut frz_shallow_report,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             computes(context, shallow, report, |ctx, spill| {
                 within("budget_seconds", budget_seconds, 0.0..=1e6, " s")?;
@@ -302,11 +302,12 @@ pub unsafe extern "C" fn frz_shallow_step(
     })
 }
 
-/// Computes a frame of given steps, in real time (frz_shallow): from the same state, with the same parameters, flow points and
-/// bodies it becomes the same bytes as the frame that they were reported of.
+/// Computes a frame with given steps, in real time (frz_shallow): from the same state, with the same parameters, flow points and bodies,
+/// the result has the same bytes as the frame that the steps were reported for.
 ///
-/// steps: double for each step, its length (s), 1e-12 to 1e6, as frz_shallow_last_steps has listed them: 1 to 1000000, together up to 1e6 s.
-/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// steps: double for each step, its length (s), 1e-12 to 1e6, as frz_shallow_last_steps listed them: 1 to 1000000 steps, together up to 1e6
+///     s.
+/// report: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -317,7 +318,7 @@ pub unsafe extern "C" fn frz_shallow_replay(
     report: *mut frz_shallow_report,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             computes(context, shallow, report, |ctx, spill| {
                 let Spill { shallow, steps: own, .. } = spill;
@@ -335,14 +336,14 @@ pub unsafe extern "C" fn frz_shallow_replay(
 /// A call that computes a frame and reports it.
 ///
 /// # Safety
-/// The pointers must be NULL or the caller's.
+/// The pointers must be NULL or valid.
 unsafe fn computes(
     context: *mut frz_context,
     shallow: *mut frz_shallow,
     report: *mut frz_shallow_report,
     compute: impl FnOnce(&Context, &mut Spill) -> Outcome<(Report, f64)>,
 ) -> Outcome {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         if !report.is_null() {
             fill(report, None, frz_shallow_report::of(&Report::default(), 0.0))?;
@@ -353,10 +354,9 @@ unsafe fn computes(
     }
 }
 
-/// Lists the steps of the last frame: with them frz_shallow_replay makes it again.
+/// Lists the steps of the last frame: frz_shallow_replay reproduces it from them.
 ///
-/// dst: room for a double for each step, its length (s). NULL: count receives their number, and nothing is written.
-///     FRZ_ERROR_CAPACITY when it is too little.
+/// dst: room for a double for each step, its length (s). With data NULL only the count is reported. FRZ_ERROR_CAPACITY if it is too small.
 /// count: receives their number; 0 after other failures.
 ///
 /// Any number of threads may read a shallow liquid.
@@ -367,7 +367,7 @@ pub unsafe extern "C" fn frz_shallow_last_steps(
     count: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let count = required(count, "count")?;
             count.write_unaligned(0);

@@ -1,13 +1,13 @@
-//! Lists of structs that a host describes something with.
+//! Arrays of structs from a host.
 
 use crate::capi::ffi::guard::{Failure, Outcome};
 use crate::capi::ffi::views::{Sized32, check_size, frz_view, sized};
 
-/// Hands over the structs of a host that lie one after another, all of one version; `nouns` name one and all of them in an error. Fields
-/// that the host's header does not have are the `usual` ones. Nothing is allocated, unless it fails.
+/// Passes on the structs of a host's array, all of one version; `nouns` name one and all of them in an error. Fields that the host's header
+/// does not have take their values from `usual`. Nothing is allocated, except on failure.
 ///
 /// # Safety
-/// `list` must be NULL or point to so many structs.
+/// `list` must be NULL or point to `count` structs.
 pub(in crate::capi) unsafe fn each_sized<T: Sized32>(
     list: *const T,
     count: usize,
@@ -22,14 +22,14 @@ pub(in crate::capi) unsafe fn each_sized<T: Sized32>(
     if list.is_null() {
         return Err(Failure::argument(format!("{all}: the data is NULL, but the count is {count}")));
     }
-    // SAFETY: the caller's promise: the size of one is there.
+    // SAFETY: guaranteed by the caller: at least the size of one is there.
     let stride = unsafe { list.cast::<u32>().read_unaligned() } as usize;
     let named =
         |at: usize, failure: Failure| Failure { text: format!("{noun} {at}: {}", failure.text), ..failure };
-    // Checked before it is used: it is the stride.
+    // Checked before use: it is the stride.
     check_size::<T>(stride).map_err(|failure| named(0, failure))?;
     let sizes = frz_view { data: list.cast(), count, stride };
-    // SAFETY: as above; the sizes must be the same for the structs to lie one after another.
+    // SAFETY: as above; the sizes must be equal for the structs to be contiguous.
     let mut sizes = unsafe { sizes.in_place::<u32>(all) }?;
     if sizes.any(|size| size as usize != stride) {
         return Err(Failure::argument(format!("{all}: their struct_size differs")));

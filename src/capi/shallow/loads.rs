@@ -1,4 +1,4 @@
-//! What shallow liquid does to the bodies in it.
+//! Loads of shallow liquid on the bodies in it.
 
 use super::liquid::{Spill, frz_shallow};
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
@@ -6,19 +6,19 @@ use crate::capi::ffi::handle::change;
 use crate::capi::ffi::views::{Sized32, check_size, fill, frz_view};
 use crate::shallow::Load;
 
-/// What a liquid does to a body.
+/// The load of a liquid on a body.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_load {
     /// sizeof(frz_shallow_load), set by the caller, the same in all loads of a call.
     pub struct_size: u32,
-    /// Nothing.
+    /// Reserved.
     pub reserved: u32,
-    /// Force (N) of the liquid's weight: buoyancy, and what deeper liquid on one side does.
+    /// Force (N) of the liquid's weight: buoyancy, and the push of deeper liquid on one side.
     pub pressure: [f64; 3],
-    /// Force (N) of its motion over the body, an estimate.
+    /// Force (N) of its motion relative to the body, an estimate.
     pub drag: [f64; 3],
-    /// Torque (N m) of both about the body's middle.
+    /// Torque (N m) of both forces about the body's centre.
     pub torque: [f64; 3],
     /// Volume (m3) of the body below the surface of the liquid.
     pub displaced: f64,
@@ -39,10 +39,10 @@ impl From<Load> for frz_shallow_load {
     }
 }
 
-/// Writes a host's loads, which lie one after another and are all of one size.
+/// Writes a host's loads, which are contiguous and all of one size.
 ///
 /// # Safety
-/// `dst` must be NULL or point to so many structs.
+/// `dst` must be NULL or point to as many structs as there are loads.
 unsafe fn put(dst: *mut frz_shallow_load, loads: impl ExactSizeIterator<Item = Load>) -> Outcome {
     if loads.len() == 0 {
         return Ok(());
@@ -50,11 +50,11 @@ unsafe fn put(dst: *mut frz_shallow_load, loads: impl ExactSizeIterator<Item = L
     if dst.is_null() {
         return Err(Failure::argument(format!("loads: the data is NULL, but the count is {}", loads.len())));
     }
-    // SAFETY: the caller's promise: the size of one is there.
+    // SAFETY: guaranteed by the caller: at least the size of one is there.
     let stride = unsafe { dst.cast::<u32>().read_unaligned() } as usize;
     check_size::<frz_shallow_load>(stride)?;
     let sizes = frz_view { data: dst.cast_const().cast(), count: loads.len(), stride };
-    // SAFETY: as above; the sizes must be the same for the structs to lie one after another.
+    // SAFETY: as above; the sizes must be equal for the structs to be contiguous.
     if unsafe { sizes.in_place::<u32>("loads") }?.any(|size| size as usize != stride) {
         return Err(Failure::argument("loads: their struct_size differs"));
     }
@@ -65,9 +65,9 @@ unsafe fn put(dst: *mut frz_shallow_load, loads: impl ExactSizeIterator<Item = L
     Ok(())
 }
 
-/// Reports what the liquid does to each body of frz_shallow_set_bodies now, in real time (frz_shallow): the weight that buoys or pushes it, the drag of
-/// what flows over it and of its own motion, and how much of it is under. What stands below a body is as the last step has found it: after
-/// frz_shallow_set_bodies a step comes first.
+/// Reports the current load of the liquid on each body of frz_shallow_set_bodies, in real time (frz_shallow): the weight that buoys or
+/// pushes it, the drag of the flow over it and of its own motion, and how much of it is submerged. The liquid below a body is that found by
+/// the last step: make a step after frz_shallow_set_bodies first.
 ///
 /// density: of the liquid (kg/m3), over 0, finite: blood 1060, water 1000.
 /// velocities: double[3] for each body (m/s), finite, in their order; data NULL with a count of 0: none of them moves.
@@ -84,7 +84,7 @@ pub unsafe extern "C" fn frz_shallow_loads(
     count: usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so is what the view describes.
+        // SAFETY: the pointers are NULL or valid, and so is the view.
         unsafe {
             put(loads, (0..count).map(|_| Load::default()))?;
             let mut spill = change(shallow)?;

@@ -1,6 +1,6 @@
 //! Small amounts of liquid on a terrain.
 
-// In the header's order.
+// In the order of the header.
 pub mod params;
 
 pub mod liquid;

@@ -1,4 +1,4 @@
-//! What flows, how, and where, in C's terms.
+//! The liquid, its parameters and its domain, in C.
 
 use crate::capi::ffi::guard::{Outcome, frz_status, guard};
 use crate::capi::ffi::views::{Sized32, fill, meaning, sized, within};
@@ -17,13 +17,13 @@ use crate::shallow::{Params, Thickening};
 pub enum frz_liquid {
     /// Water at 20 C: 1e-6 m2/s.
     FRZ_LIQUID_WATER = 0,
-    /// Blood that does not thin: 4e-6 m2/s.
+    /// Blood, without shear thinning: 4e-6 m2/s.
     FRZ_LIQUID_BLOOD = 1,
     /// Paint: 4e-5 m2/s.
     FRZ_LIQUID_PAINT = 2,
     /// Honey at 20 C: 7e-3 m2/s.
     FRZ_LIQUID_HONEY = 3,
-    /// Blood that thins under shear: from 5.28e-5 m2/s at rest to 3.25e-6 m2/s.
+    /// Blood with shear thinning: from 5.28e-5 m2/s at rest to 3.25e-6 m2/s.
     FRZ_LIQUID_THINNING_BLOOD = 4,
 }
 
@@ -31,10 +31,10 @@ pub enum frz_liquid {
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_shallow_pace {
-    /// Steps of at most frz_shallow_params.longest_step: where liquid is too deep for that, its waves slow down, and films on slopes that are too
-    /// fast are held back.
+    /// Steps of at most frz_shallow_params.longest_step: where liquid is too deep for that its waves slow down, and films on slopes that
+    /// are too fast are slowed down.
     FRZ_SHALLOW_REALTIME = 0,
-    /// As many steps as stability needs.
+    /// As many steps as stability requires.
     FRZ_SHALLOW_EXACT = 1,
 }
 
@@ -44,33 +44,33 @@ pub enum frz_shallow_pace {
 pub enum frz_shallow_border {
     /// A wall.
     FRZ_SHALLOW_CLOSED = 0,
-    /// Nothing: liquid flows off as the ground near the border leads it, and is lost.
+    /// Nothing: liquid flows off along the slope of the ground near the border, and is lost.
     FRZ_SHALLOW_OPEN = 1,
-    /// Liquid at rest, at the level that it has at the border at first: waves leave, and do not come back.
+    /// Liquid at rest, at the initial level of the liquid at the border: waves leave, and do not come back.
     FRZ_SHALLOW_ABSORBING = 2,
 }
 
-/// The section of a pipe between two columns.
+/// The cross-section of a pipe between two columns.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_shallow_section {
-    /// What is wet of it: films flow as fast as theory says.
+    /// Its wetted part: films flow as fast as theory says.
     FRZ_SHALLOW_WETTED = 0,
     /// The whole cell, as in the thesis: for comparison.
     FRZ_SHALLOW_WHOLE = 1,
 }
 
-/// Where viscosity holds the liquid back.
+/// Where viscous drag acts.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_shallow_friction {
-    /// At the ground: right where the liquid is far wider than deep.
+    /// At the ground: accurate where the liquid is far wider than deep.
     FRZ_SHALLOW_GROUND = 0,
-    /// Also at walls and ceilings, and between liquids that flow beside each other: ducts and channels carry what theory says. It takes longer.
+    /// Also at walls and ceilings, and between liquids that flow side by side: ducts and channels carry what theory says. Slower.
     FRZ_SHALLOW_WALLS = 1,
 }
 
-/// No scalar, where one may be named.
+/// No scalar, where a scalar may be given.
 pub const FRZ_SHALLOW_NO_SCALAR: u32 = 0xFFFF_FFFF;
 
 use frz_liquid::*;
@@ -102,63 +102,64 @@ const SECTIONS: [(u32, Section); 2] =
 const FRICTIONS: [(u32, Friction); 2] =
     [(FRZ_SHALLOW_GROUND as u32, Friction::Ground), (FRZ_SHALLOW_WALLS as u32, Friction::Walls)];
 
-/// What flows, and how. All of it but the border, falls and friction may change between frames.
+/// Parameters of a liquid. All but border, friction and the falls_ fields may change between frames.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_params {
     /// sizeof(frz_shallow_params).
     pub struct_size: u32,
-    /// 0.
+    /// Must be 0.
     pub flags: u32,
-    /// Kinematic viscosity (m2/s), 0 to 1e6; of a liquid that thins, at rest. That of blood, 4e-6, is usual: see
-    /// frz_shallow_params_liquid.
+    /// Kinematic viscosity (m2/s), 0 to 1e6; with shear thinning, at rest. Default 4e-6, that of blood: see frz_shallow_params_liquid.
     pub viscosity: f64,
     /// Viscosity under strong shear (m2/s), 0 to viscosity, by Carreau's law; only with a thinning_time.
     pub thinnest: f64,
-    /// Time of Carreau's law (s), 1e-9 to 1e9; 0, as is usual: the liquid does not thin.
+    /// Time of Carreau's law (s), 1e-9 to 1e9; default 0: no shear thinning.
     pub thinning_time: f64,
     /// Power of Carreau's law, 0 to 1; only with a thinning_time.
     pub thinning_power: f64,
-    /// Gravity (m/s2), which may turn from frame to frame: it points down by 0.001 to 1000, and leans by at most 45 degrees.
-    /// (0, -9.81, 0) is usual.
+    /// Gravity (m/s2), default (0, -9.81, 0). It may rotate from frame to frame: it points down by 0.001 to 1000, and leans by at most 45
+    /// degrees.
     pub gravity: [f64; 3],
-    /// Share of the flow that is kept in a second, 0 to 1; 0.5 is usual. At 1 nothing is lost but by viscosity.
+    /// Share of the flux that is kept in a second, 0 to 1; default 0.5. At 1 only viscosity slows the flow.
     pub kept: f64,
-    /// Longest step (s), 1e-6 to 1; only with FRZ_SHALLOW_REALTIME. 0.003 is usual.
+    /// Maximum length of a step (s), 1e-6 to 1; only with FRZ_SHALLOW_REALTIME. Default 0.003.
     pub longest_step: f64,
-    /// A frz_shallow_pace; FRZ_SHALLOW_REALTIME is usual.
+    /// A frz_shallow_pace; default FRZ_SHALLOW_REALTIME.
     pub pace: u32,
-    /// A frz_shallow_border, which cannot change; FRZ_SHALLOW_CLOSED is usual.
+    /// A frz_shallow_border; default FRZ_SHALLOW_CLOSED. It cannot change.
     pub border: u32,
-    /// A frz_shallow_section; FRZ_SHALLOW_WETTED is usual.
+    /// A frz_shallow_section; default FRZ_SHALLOW_WETTED.
     pub section: u32,
-    /// 0.
+    /// Must be 0.
     pub reserved: u32,
-    /// Height (m) from which on liquid falls freely over an edge, 0 or more, an edge of a cell at least; 0.01 is usual. This and what follows,
-    /// which cannot change, is for falls_most over 0 only.
+    /// Height (m) from which liquid falls freely over an edge, 0 or more; default 0.01. Steps lower than the edge of a cell are never
+    /// falls. This and the following falls_ fields apply only if falls_most is over 0, and cannot change.
     pub falls_height: f64,
-    /// Time between the drops that leave one position (s), 0.0001 to 1; 1/120 is usual.
+    /// Time between the drops that leave one position (s), 0.0001 to 1; default 1/120.
     pub falls_interval: f64,
-    /// Volume of a drop (m3), 0 or more; 6.5e-11, a ball of half a millimetre, is usual. Where it takes longer than 8 intervals liquid drips.
+    /// Volume of a drop (m3), 0 or more; default 6.5e-11, a sphere of half a millimetre. Where a drop takes longer than 8 intervals to
+    /// fill, liquid drips.
     pub falls_drop: f64,
-    /// Most drops in the air, up to 1048576, for which there is room from the beginning; 8192 will do. 0, as is usual: nothing falls freely, and
-    /// what goes over an edge is below at once.
+    /// Maximum number of drops in the air, up to 1048576, for which memory is allocated at the start; 8192 is a good value. Default 0:
+    /// nothing falls freely, and liquid that goes over an edge is below at once.
     pub falls_most: u32,
-    /// 0.
+    /// Must be 0.
     pub reserved2: u32,
-    /// Velocity (m/s) below which liquid whose surface is level comes to rest, and then takes no time, 0 to 0.01; 0 is usual: never. 1e-6
-    /// does well.
+    /// Velocity (m/s) below which liquid with a level surface comes to rest, and then costs no time, 0 to 0.01; default 0: never. 1e-6 is a
+    /// good value.
     pub rest: f64,
-    /// A frz_shallow_friction, which cannot change; FRZ_SHALLOW_GROUND is usual.
+    /// A frz_shallow_friction; default FRZ_SHALLOW_GROUND. It cannot change.
     pub friction: u32,
-    /// The scalar that viscosity depends on (frz_shallow_set_scalars), counted from 0: of blood that clots its age. It must be there when a frame
-    /// begins. FRZ_SHALLOW_NO_SCALAR is usual, and what follows is then not looked at.
+    /// Index of the scalar that viscosity depends on (frz_shallow_set_scalars), from 0: for clotting blood its age. It must exist when a
+    /// frame begins. Default FRZ_SHALLOW_NO_SCALAR: the following fields are ignored.
     pub thickening_scalar: u32,
-    /// Concentration up to which viscosity is the liquid's own, finite.
+    /// Concentration up to which viscosity is that of the liquid, finite.
     pub thickening_from: f64,
-    /// Concentration from which on it is thickening_times that, and linear between them; finite, not thickening_from, and it may be the lesser one.
+    /// Concentration from which viscosity is thickening_times that, linear in between; finite, not equal to thickening_from, but it may be
+    /// less.
     pub thickening_to: f64,
-    /// 1e-6 to 1e9.
+    /// Factor on viscosity, 1e-6 to 1e9.
     pub thickening_times: f64,
 }
 
@@ -212,7 +213,7 @@ impl frz_shallow_params {
         self.thinning_power = law.power;
     }
 
-    /// The library's own parameters; what is out of range is named.
+    /// The library's own parameters; an error names a field that is out of range.
     pub(in crate::capi) fn params(&self) -> Outcome<Params> {
         no_flags(self.flags, 0)?;
         within("reserved", f64::from(self.reserved), 0.0..=0.0, "")?;
@@ -257,7 +258,7 @@ impl frz_shallow_params {
     }
 }
 
-/// The library's own parameters from a host's; the usual ones for NULL.
+/// The library's own parameters from a host's; the defaults for NULL.
 ///
 /// # Safety
 /// As [`sized`].
@@ -265,25 +266,25 @@ pub(in crate::capi) unsafe fn params(pointer: *const frz_shallow_params) -> Outc
     if pointer.is_null() {
         return Ok(Params::default());
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { sized(pointer, frz_shallow_params::defaults()) }?.params()
 }
 
-/// Fills parameters with the usual values: blood, in real time.
+/// Fills parameters with the defaults: blood, in real time.
 ///
-/// params: receives them.
+/// params: receives the defaults.
 /// size: sizeof(frz_shallow_params).
 ///
 /// Any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_params_init(params: *mut frz_shallow_params, size: usize) -> frz_status {
-    // SAFETY: the parameters are NULL or have so many bytes.
+    // SAFETY: the parameters are NULL or have `size` bytes.
     guard(|| unsafe { fill(params, Some(size), frz_shallow_params::defaults()) })
 }
 
-/// Sets the viscosity of parameters, and how it thins, to those of a known liquid; the rest stays.
+/// Sets the viscosity of parameters, and its shear thinning, to those of a known liquid; the other fields stay.
 ///
-/// params: filled before, by frz_shallow_params_init for instance.
+/// params: filled before, for instance by frz_shallow_params_init.
 /// liquid: a frz_liquid.
 ///
 /// Any thread.
@@ -293,7 +294,7 @@ pub unsafe extern "C" fn frz_shallow_params_liquid(
     liquid: u32,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the parameters are NULL or have as many bytes as they say.
+        // SAFETY: the parameters are NULL or have as many bytes as they state.
         unsafe {
             let mut changed = sized(params.cast_const(), frz_shallow_params::defaults())?;
             changed.set_liquid(&meaning("liquid", "frz_liquid", liquid, &LIQUIDS)?);
@@ -302,24 +303,24 @@ pub unsafe extern "C" fn frz_shallow_params_liquid(
     })
 }
 
-/// Where liquid can be: square cells on the ground, and a range of heights. Heights and depths are integers in it, of a unit
-/// that is 2^-30 of the range.
+/// Where liquid can be: square cells on the ground, and a range of heights. Heights and depths are stored as integers, in units of 2^-30 of
+/// this range.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_domain {
     /// sizeof(frz_shallow_domain).
     pub struct_size: u32,
-    /// 0.
+    /// Must be 0.
     pub flags: u32,
     /// Edge of a cell (m), 1e-9 to 1e9.
     pub cell: f64,
-    /// The corner with the least x and z (m).
+    /// The corner with the minimum x and z (m).
     pub origin: [f64; 2],
-    /// Count of cells along x and along z, 1 to 65536 each.
+    /// Number of cells along x and along z, 1 to 65536 each.
     pub cells: [u32; 2],
-    /// The least height (m): ground below is taken to lie there.
+    /// The minimum height (m): lower ground is clamped to it.
     pub low: f64,
-    /// The greatest height (m), above low; no liquid stands higher.
+    /// The maximum height (m), above low; no liquid stands higher.
     pub high: f64,
 }
 
@@ -329,10 +330,10 @@ unsafe impl Sized32 for frz_shallow_domain {
     const NAME: &'static str = "frz_shallow_domain";
 }
 
-/// Bytes of a cell with one solid while a terrain is made: solids and crossings, then columns, pipes and the surface.
+/// Memory (bytes) for a cell with one solid while a terrain is made: solids and crossings, then columns, pipes and the surface.
 const CELL_BYTES: u64 = 160;
 
-/// The cells and heights of a host's domain, and whether the context allows them.
+/// The cells and heights of a host's domain; an error if the context does not allow them.
 ///
 /// # Safety
 /// As [`sized`].
@@ -349,7 +350,7 @@ pub(in crate::capi) unsafe fn domain(
         low: 0.0,
         high: 0.0,
     };
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let given = unsafe { sized(pointer, none) }?;
     no_flags(given.flags, 0)?;
     let grid = Grid { cell: given.cell, origin: given.origin, size: given.cells.map(|count| count as usize) };

@@ -1,4 +1,4 @@
-//! Shallow liquid as numbers: of its columns, at points, in boxes.
+//! Shallow liquid as numbers: its columns, at points, in boxes.
 
 use super::liquid::frz_shallow;
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
@@ -6,10 +6,10 @@ use crate::capi::ffi::handle::{clear, read, required};
 use crate::capi::ffi::views::{Plain, Sized32, fill, frz_span, frz_view, meaning};
 use crate::shallow::{Shallow, View};
 
-/// Layer of a volume: all of them.
+/// Layer of a volume: all layers.
 pub const FRZ_SHALLOW_ALL_LAYERS: u32 = 0xffff_ffff;
 
-/// Column of a sample: there is none.
+/// Column of a sample: there is no column.
 pub const FRZ_SHALLOW_NO_COLUMN: u32 = 0xffff_ffff;
 
 /// Properties of a shallow liquid.
@@ -18,11 +18,11 @@ pub const FRZ_SHALLOW_NO_COLUMN: u32 = 0xffff_ffff;
 pub struct frz_shallow_info {
     /// sizeof(frz_shallow_info), set by the caller.
     pub struct_size: u32,
-    /// Most columns above each other in a cell.
+    /// Maximum number of columns above each other in a cell.
     pub layers: u32,
-    /// Column indices: 16 for each strip of 16 cells along x that has a column of a layer. Some of them may have no column.
+    /// Number of column indices: 16 for each strip of 16 cells along x that has a column of a layer. Some indices may have no column.
     pub index_count: u64,
-    /// Columns.
+    /// Number of columns.
     pub column_count: u64,
     /// Edge of a cell (m).
     pub cell: f64,
@@ -32,7 +32,7 @@ pub struct frz_shallow_info {
     pub unit: f64,
     /// Simulated time since the start (s).
     pub time: f64,
-    /// Length of the last step (s), in which fluxes of frz_shallow_lend are measured.
+    /// Length of the last step (s), in which the fluxes of frz_shallow_lend are measured.
     pub last_step: f64,
 }
 
@@ -42,7 +42,7 @@ unsafe impl Sized32 for frz_shallow_info {
     const NAME: &'static str = "frz_shallow_info";
 }
 
-/// What frz_shallow_read reads of columns. An index without a column has the cell (-1, -1), no depth, and a ceiling on its base.
+/// Column arrays that frz_shallow_read copies. An index without a column has the cell (-1, -1), no depth, and a ceiling at its base.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_shallow_array {
@@ -50,21 +50,21 @@ pub enum frz_shallow_array {
     FRZ_SHALLOW_DEPTH = 0,
     /// float: height of the ground below it (m).
     FRZ_SHALLOW_BASE = 1,
-    /// float: height of the underside of the next solid above (m), or the greatest height of the domain.
+    /// float: height of the underside of the next solid above (m), or the maximum height of the domain.
     FRZ_SHALLOW_CEILING = 2,
     /// int32_t[2]: its cell along x and along z.
     FRZ_SHALLOW_CELL = 3,
     /// uint32_t: its layer, 0 for the lowest column of a cell.
     FRZ_SHALLOW_LAYER = 4,
-    /// float: what flows to the cell behind along x (m3/s), in the same layer.
+    /// float: flux to the next cell along x (m3/s), in the same layer.
     FRZ_SHALLOW_FLUX_EAST = 5,
-    /// float: what flows to the cell behind along z (m3/s), in the same layer.
+    /// float: flux to the next cell along z (m3/s), in the same layer.
     FRZ_SHALLOW_FLUX_SOUTH = 6,
-    /// float[2]: mean velocity over the depth along x and z (m/s): at the surface it is 1.5 times as much.
+    /// float[2]: mean velocity over the depth along x and z (m/s): at the surface it is 1.5 times as fast.
     FRZ_SHALLOW_VELOCITY = 7,
 }
 
-/// Arrays of all column indices that frz_shallow_lend lends. A height is frz_shallow_info.low + units x unit.
+/// Arrays over all column indices that frz_shallow_lend lends. A height is frz_shallow_info.low + units x unit.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_shallow_lent {
@@ -74,9 +74,9 @@ pub enum frz_shallow_lent {
     FRZ_SHALLOW_LENT_BASE = 1,
     /// int32_t: height of the underside of the next solid above (units).
     FRZ_SHALLOW_LENT_CEILING = 2,
-    /// float: what flows to the east (units of depth in a step of frz_shallow_info.last_step).
+    /// float: flux to the east, +x (units of depth in a step of frz_shallow_info.last_step).
     FRZ_SHALLOW_LENT_EAST = 3,
-    /// float: what flows to the south (units of depth in a step of frz_shallow_info.last_step).
+    /// float: flux to the south, +z (units of depth in a step of frz_shallow_info.last_step).
     FRZ_SHALLOW_LENT_SOUTH = 4,
 }
 
@@ -102,9 +102,9 @@ const LENT: [(u32, frz_shallow_lent); 5] = [
     (4, FRZ_SHALLOW_LENT_SOUTH),
 ];
 
-/// Reports the properties of a liquid: the counts that frz_shallow_read needs room for, and its measures.
+/// Reports the properties of a liquid: the element counts for frz_shallow_read, and its dimensions.
 ///
-/// info: receives it, all zeroes after a failure. Its struct_size is set by the caller.
+/// info: receives them, all zeroes after a failure. Its struct_size is set by the caller.
 ///
 /// Any number of threads may read a shallow liquid.
 #[unsafe(no_mangle)]
@@ -113,7 +113,7 @@ pub unsafe extern "C" fn frz_shallow_get_info(
     info: *mut frz_shallow_info,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut value = frz_shallow_info {
                 struct_size: 0,
@@ -142,11 +142,11 @@ pub unsafe extern "C" fn frz_shallow_get_info(
     })
 }
 
-/// Copies numbers of columns.
+/// Copies an array of columns.
 ///
-/// array: a frz_shallow_array; it says of what type the elements are.
-/// columns: uint32_t for each column that is wanted, its index; data NULL with a count of 0: all indices, in order.
-/// dst: room for as many elements; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+/// array: a frz_shallow_array, which states the type of the elements.
+/// columns: uint32_t for each requested column, its index; data NULL with a count of 0: all indices, in order.
+/// dst: room for as many elements; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
 ///
 /// Any number of threads may read a shallow liquid.
 #[unsafe(no_mangle)]
@@ -158,7 +158,7 @@ pub unsafe extern "C" fn frz_shallow_read(
 ) -> frz_status {
     guard(|| {
         let array = meaning("array", "frz_shallow_array", array, &ARRAYS)?;
-        // SAFETY: the liquid is NULL or was not destroyed; view and span are the caller's.
+        // SAFETY: the liquid is NULL or alive; view and span are valid.
         unsafe {
             let spill = read(shallow)?;
             let count = spill.shallow.columns().len();
@@ -196,7 +196,7 @@ unsafe fn copy(
         true => columns.cell(index).map(|at| at as i32),
         false => [-1; 2],
     };
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         match array {
             FRZ_SHALLOW_DEPTH => dst.put("dst", indices.map(|index| length(shallow.depths()[index]))),
@@ -215,11 +215,11 @@ unsafe fn copy(
     }
 }
 
-/// Lends an array of all column indices, as it is computed with: nothing is copied.
+/// Lends an array over all column indices, as the solver holds it: nothing is copied.
 ///
-/// array: a frz_shallow_lent; it says of what type the elements are.
-/// out: receives where they are, packed; data NULL with a count of 0 after a failure. The memory is the liquid's, and may be read until
-///     frz_shallow_update_terrain, _update_heights, _set_bodies or _destroy; its contents change with whatever changes the liquid.
+/// array: a frz_shallow_lent, which states the type of the elements.
+/// out: receives a view of the packed elements; data NULL with a count of 0 after a failure. The liquid owns the memory, which may be read
+///     until frz_shallow_update_terrain, _update_heights, _set_bodies or _destroy; its contents change with whatever changes the liquid.
 ///
 /// Any number of threads may read a shallow liquid.
 #[unsafe(no_mangle)]
@@ -229,7 +229,7 @@ pub unsafe extern "C" fn frz_shallow_lend(
     out: *mut frz_view,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(out);
             let out = required(out, "out")?;
@@ -253,7 +253,7 @@ pub unsafe extern "C" fn frz_shallow_lend(
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_sample {
-    /// Height of its surface (m); of the ground, where it is dry; NaN without a column.
+    /// Height of its surface (m); that of the ground if dry; NaN without a column.
     pub height: f64,
     /// Its depth (m).
     pub depth: f64,
@@ -261,7 +261,8 @@ pub struct frz_shallow_sample {
     pub velocity: [f32; 2],
     /// Velocity at the surface along x and z (m/s): 1.5 times the mean one.
     pub surface_velocity: [f32; 2],
-    /// Index of the column; FRZ_SHALLOW_NO_COLUMN outside of the domain and where there is no ground: all else is 0 then.
+    /// Index of the column. FRZ_SHALLOW_NO_COLUMN outside the domain and where there is no ground: the other fields are then 0, except
+    /// height.
     pub column: u32,
     /// Its layer.
     pub layer: u32,
@@ -270,10 +271,11 @@ pub struct frz_shallow_sample {
 // SAFETY: numbers, without padding.
 unsafe impl Plain for frz_shallow_sample {}
 
-/// Reads the liquid at points, in real time (frz_shallow): of the column that a point lies in, or else is nearest to above or below it.
+/// Reads the liquid at points, in real time (frz_shallow): from the column that contains a point, or else the nearest one above or below
+/// it.
 ///
 /// points: double[3] for each (m).
-/// dst: room for a frz_shallow_sample for each; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+/// dst: room for a frz_shallow_sample for each; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
 ///
 /// Any number of threads may read a shallow liquid.
 #[unsafe(no_mangle)]
@@ -282,14 +284,14 @@ pub unsafe extern "C" fn frz_shallow_probe(
     points: frz_view,
     dst: frz_span,
 ) -> frz_status {
-    // SAFETY: the liquid is NULL or was not destroyed; view and span are the caller's.
+    // SAFETY: the liquid is NULL or alive; view and span are valid.
     guard(|| unsafe { probe(&read(shallow)?.shallow.view(), &points, &dst) })
 }
 
-/// Reads a liquid at points of a host.
+/// Reads a liquid at a host's points.
 ///
 /// # Safety
-/// The view must describe memory that can be read, the span such that can be written.
+/// The view must describe memory that can be read, the span memory that can be written.
 pub(in crate::capi) unsafe fn probe(view: &View<'_>, points: &frz_view, dst: &frz_span) -> Outcome {
     let sample = |point: [f64; 3]| match view.at(point) {
         None => frz_shallow_sample {
@@ -309,16 +311,15 @@ pub(in crate::capi) unsafe fn probe(view: &View<'_>, points: &frz_view, dst: &fr
             layer: there.layer as u32,
         },
     };
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { dst.put("dst", points.in_place::<[f64; 3]>("points")?.map(sample)) }
 }
 
-/// Reports how much liquid there is in a box: of the cells whose middles lie within, what is between both heights; or on a
-/// layer.
+/// Reports the volume of liquid in a box: in the cells whose centres lie within it, between its two heights; or on a layer.
 ///
-/// low: double[3], the least corner (m), which may be infinite; NULL with high NULL: everywhere.
-/// high: double[3], the greatest corner (m).
-/// layer: 0 for the lowest columns of all cells, and so on: with a layer, low and high are NULL. FRZ_SHALLOW_ALL_LAYERS.
+/// low: double[3], the minimum corner (m), which may be infinite; NULL with high NULL: everywhere.
+/// high: double[3], the maximum corner (m).
+/// layer: 0 for the lowest columns of all cells, and so on, with low and high NULL; or FRZ_SHALLOW_ALL_LAYERS.
 /// volume: receives it (m3; 1 ml is 1e-6); 0 after a failure.
 ///
 /// Any number of threads may read a shallow liquid.
@@ -331,7 +332,7 @@ pub unsafe extern "C" fn frz_shallow_volume(
     volume: *mut f64,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(volume);
             let volume = required(volume, "volume")?;

@@ -1,4 +1,4 @@
-//! What shallow liquid carries: dyes, ages, and what decays.
+//! Scalars that shallow liquid carries: dyes, ages, and quantities that decay.
 
 use std::ffi::c_char;
 
@@ -9,20 +9,20 @@ use crate::capi::ffi::handle::{change, read};
 use crate::capi::ffi::views::{Sized32, fill, frz_span, frz_view, meaning, required_text};
 use crate::shallow::{Law, Scalar, ScalarBalance, Shallow};
 
-/// Most scalars that a liquid carries.
+/// Maximum number of scalars that a liquid carries.
 pub const FRZ_SHALLOW_MOST_SCALARS: u32 = 4;
 
 const _: () = assert!(FRZ_SHALLOW_MOST_SCALARS as usize == crate::shallow::scalars::MOST);
 
-/// What becomes of a scalar but for being carried.
+/// How a scalar changes, besides being carried.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_shallow_law {
-    /// Nothing: dye, salt, heat.
+    /// It does not: dye, salt, heat.
     FRZ_SHALLOW_DYE = 0,
-    /// Half of it goes in each frz_shallow_scalar.half_life.
+    /// It decays by half in each frz_shallow_scalar.half_life.
     FRZ_SHALLOW_DECAYS = 1,
-    /// It is the time (s) since the liquid came in, in the mean over a column, up to frz_shallow_scalar.range.
+    /// It is the time (s) since the liquid came in, averaged over a column, up to frz_shallow_scalar.range.
     FRZ_SHALLOW_AGES = 2,
 }
 
@@ -34,7 +34,7 @@ const LAWS: [(u32, frz_shallow_law); 3] = [
     (FRZ_SHALLOW_AGES as u32, FRZ_SHALLOW_AGES),
 ];
 
-/// Something that the liquid carries. It begins zeroed, and then struct_size.
+/// A scalar that the liquid carries. Zero it, then set struct_size.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_scalar {
@@ -42,12 +42,12 @@ pub struct frz_shallow_scalar {
     pub struct_size: u32,
     /// A frz_shallow_law.
     pub law: u32,
-    /// Its name in messages, not empty, and not that of another one; it is copied.
+    /// Its name in messages, not empty and different from those of the other scalars; it is copied.
     pub name: *const c_char,
-    /// Concentrations are within -range to range, in the scalar's own measure, and are kept to a 2^20th of it: 1e-9 to 1e9. Of a dye 1, of an
-    /// age 3600 (s).
+    /// Concentrations are within -range to range, in the scalar's own unit, with a resolution of 2^-20 of it: 1e-9 to 1e9. For a dye 1, for
+    /// an age 3600 (s).
     pub range: f64,
-    /// Of one that decays: 1e-6 to 1e12 (s); of others it is not looked at.
+    /// Half-life of a scalar that decays: 1e-6 to 1e12 (s); otherwise ignored.
     pub half_life: f64,
 }
 
@@ -61,14 +61,14 @@ impl frz_shallow_scalar {
     const NONE: Self = Self { struct_size: 0, law: 0, name: std::ptr::null(), range: 0.0, half_life: 0.0 };
 
     /// # Safety
-    /// The name must be NULL or a text that ends with a zero.
+    /// The name must be NULL or a zero-terminated text.
     unsafe fn scalar(&self) -> Outcome<Scalar> {
         let law = match meaning("law", "frz_shallow_law", self.law, &LAWS)? {
             FRZ_SHALLOW_DYE => Law::Dye,
             FRZ_SHALLOW_DECAYS => Law::Decays(self.half_life),
             FRZ_SHALLOW_AGES => Law::Ages,
         };
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let name = unsafe { required_text(self.name, "name") }?.to_string();
         let scalar = Scalar { name, law, range: self.range };
         scalar.validate()?;
@@ -79,7 +79,7 @@ impl frz_shallow_scalar {
 /// Reads the scalars of a host.
 ///
 /// # Safety
-/// As [`each_sized`]; names must be NULL or texts that end with a zero.
+/// As [`each_sized`]; names must be NULL or zero-terminated texts.
 pub(in crate::capi) unsafe fn read_scalars(
     scalars: *const frz_shallow_scalar,
     count: usize,
@@ -89,7 +89,7 @@ pub(in crate::capi) unsafe fn read_scalars(
         return Err(Failure::argument(text));
     }
     let mut given = Vec::with_capacity(count);
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         each_sized(scalars, count, ["scalar", "scalars"], frz_shallow_scalar::NONE, |scalar| {
             given.push(scalar.scalar()?);
@@ -99,11 +99,11 @@ pub(in crate::capi) unsafe fn read_scalars(
     Ok(given)
 }
 
-/// Sets what the liquid carries, in place of what it carried before. Of each scalar there is nothing yet, and what is poured and what comes through
-/// sources has none until frz_shallow_set_poured and _set_sourced. The frame after it may allocate.
+/// Sets the scalars that the liquid carries, replacing those before. They are 0 everywhere at first, and 0 in what is poured and what comes
+/// through sources until frz_shallow_set_poured and frz_shallow_set_sourced. The next frame may allocate.
 ///
-/// scalars: count scalars; NULL with a count of 0: there is none. FRZ_ERROR_ARGUMENT names one that is out of range, counted from 0; the old ones
-///     then stay.
+/// scalars: count scalars; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names one that is out of range, counted from 0; the old ones
+///     are then kept.
 /// count: number of scalars, up to FRZ_SHALLOW_MOST_SCALARS.
 ///
 /// One thread at a time.
@@ -114,7 +114,7 @@ pub unsafe extern "C" fn frz_shallow_set_scalars(
     count: usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut spill = change(shallow)?;
             let given = read_scalars(scalars, count)?;
@@ -123,7 +123,7 @@ pub unsafe extern "C" fn frz_shallow_set_scalars(
     })
 }
 
-/// Sets the concentrations of scalars in what frz_shallow_pour, _fill and _set_depths add from now on; 0 at first.
+/// Sets the concentrations of scalars in liquid that frz_shallow_pour, _fill and _set_depths add from now on; initially 0.
 ///
 /// concentrations: double for each scalar, in their order, within its range.
 ///
@@ -134,7 +134,7 @@ pub unsafe extern "C" fn frz_shallow_set_poured(
     concentrations: frz_view,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the liquid is NULL or was not destroyed; the view is the caller's.
+        // SAFETY: the liquid is NULL or alive; the view is valid.
         unsafe {
             let mut spill = change(shallow)?;
             let given = of_scalars(spill.shallow.scalars().len(), &concentrations)?;
@@ -143,9 +143,9 @@ pub unsafe extern "C" fn frz_shallow_set_poured(
     })
 }
 
-/// Sets the concentrations of scalars in what comes through a source; 0 after frz_shallow_set_flows.
+/// Sets the concentrations of scalars in liquid from a source; 0 after frz_shallow_set_flows.
 ///
-/// flow: which flow point, counted from 0.
+/// flow: index of the flow point, from 0.
 /// concentrations: double for each scalar, in their order, within its range.
 ///
 /// One thread at a time.
@@ -156,7 +156,7 @@ pub unsafe extern "C" fn frz_shallow_set_sourced(
     concentrations: frz_view,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the liquid is NULL or was not destroyed; the view is the caller's.
+        // SAFETY: the liquid is NULL or alive; the view is valid.
         unsafe {
             let mut spill = change(shallow)?;
             let given = of_scalars(spill.shallow.scalars().len(), &concentrations)?;
@@ -173,7 +173,7 @@ pub(in crate::capi) unsafe fn of_scalars(
     count: usize,
     numbers: &frz_view,
 ) -> Outcome<[f64; FRZ_SHALLOW_MOST_SCALARS as usize]> {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let given = unsafe { numbers.in_place::<f64>("concentrations") }?;
     if given.len() != count {
         let text = format!("concentrations: {} elements, but there are {count} scalars", given.len());
@@ -186,9 +186,9 @@ pub(in crate::capi) unsafe fn of_scalars(
 
 /// Copies the concentrations of a scalar, in real time (frz_shallow); 0 where it is dry.
 ///
-/// scalar: which, counted from 0.
-/// columns: uint32_t for each column that is wanted, its index; data NULL with a count of 0: all indices, in order.
-/// dst: room for a float for each; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+/// scalar: its index, from 0.
+/// columns: uint32_t for each requested column, its index; data NULL with a count of 0: all indices, in order.
+/// dst: room for a float for each; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
 ///
 /// Any number of threads may read a shallow liquid.
 #[unsafe(no_mangle)]
@@ -199,7 +199,7 @@ pub unsafe extern "C" fn frz_shallow_read_scalar(
     dst: frz_span,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the liquid is NULL or was not destroyed; view and span are the caller's.
+        // SAFETY: the liquid is NULL or alive; view and span are valid.
         unsafe {
             let spill = read(shallow)?;
             let (own, scalar) = (&spill.shallow, check_scalar(&spill.shallow, scalar)?);
@@ -220,7 +220,7 @@ pub unsafe extern "C" fn frz_shallow_read_scalar(
     })
 }
 
-/// A scalar's number, if there is such a scalar.
+/// A scalar's index, if the scalar exists.
 pub(in crate::capi) fn check_scalar(shallow: &Shallow, scalar: u32) -> Outcome<usize> {
     let count = shallow.scalars().len();
     match (scalar as usize) < count {
@@ -229,30 +229,30 @@ pub(in crate::capi) fn check_scalar(shallow: &Shallow, scalar: u32) -> Outcome<u
     }
 }
 
-/// Where all of a scalar is, and came from: concentration x volume (its own measure x m3). inside + held + falling = poured + sourced + gained + grown
-/// - drained - absorbed - lost - dried.
+/// Where all of a scalar is, and where it came from: concentration x volume (its own unit x m3). inside + held + falling = poured + sourced
+/// + gained + grown - drained - absorbed - lost - dried.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_scalar_balance {
     /// sizeof(frz_shallow_scalar_balance), set by the caller.
     pub struct_size: u32,
-    /// Nothing.
+    /// Reserved.
     pub reserved: u32,
     /// In the columns.
     pub inside: f64,
-    /// Poured in so far, less what was taken.
+    /// Poured in so far, minus what was taken out.
     pub poured: f64,
-    /// Came in through sources.
+    /// From sources.
     pub sourced: f64,
-    /// Went out through drains.
+    /// To drains.
     pub drained: f64,
-    /// Went into absorbers.
+    /// To absorbers.
     pub absorbed: f64,
-    /// Went over the border, or fell where there is no ground.
+    /// Lost over the border, or where there is no ground.
     pub lost: f64,
-    /// Came in over a border that absorbs waves.
+    /// From beyond an absorbing border.
     pub gained: f64,
-    /// Waits for room, where ground or a body has swallowed it.
+    /// Waiting for room, where ground or a body displaced it.
     pub held: f64,
     /// In the air.
     pub falling: f64,
@@ -260,7 +260,7 @@ pub struct frz_shallow_scalar_balance {
     pub grown: f64,
     /// Left by rounding in columns that ran dry.
     pub dried: f64,
-    /// The smallest amounts that the sum above is off: 0, as all are integers.
+    /// Error of the sum above, in the smallest amounts: 0, as all are integers.
     pub error: i64,
 }
 
@@ -291,9 +291,9 @@ impl From<ScalarBalance> for frz_shallow_scalar_balance {
     }
 }
 
-/// Reports where all of a scalar is.
+/// Reports where all of a scalar is, and where it came from.
 ///
-/// scalar: which, counted from 0.
+/// scalar: its index, from 0.
 /// balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
 ///
 /// Any number of threads may read a shallow liquid.
@@ -304,7 +304,7 @@ pub unsafe extern "C" fn frz_shallow_get_scalar_balance(
     balance: *mut frz_shallow_scalar_balance,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             fill(balance, None, ScalarBalance::default().into())?;
             let spill = read(shallow)?;

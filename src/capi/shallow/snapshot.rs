@@ -13,8 +13,8 @@ use crate::shallow::Snapshot;
 use crate::shallow::free_fall::mesh::Balls;
 use crate::shallow::surface::{Depths, Surface};
 
-/// A liquid as it was after a frame, copied: another thread may draw it while the next frame is computed. A host has two of them: one
-/// that is taken, and one that is drawn.
+/// A copy of a liquid as it was after a frame: another thread may draw it while the next frame is computed. A host has two: one being
+/// taken, and one being drawn.
 pub struct frz_shallow_snapshot {
     _opaque: [u8; 0],
 }
@@ -23,17 +23,17 @@ pub struct frz_shallow_snapshot {
 pub(in crate::capi) struct Taken {
     pub snapshot: Snapshot,
     surface: Surface,
-    /// Makes meshes of what is in the air.
+    /// Builds meshes of the liquid in the air.
     pub balls: Balls,
-    /// Minimum heights, where there were some.
+    /// Minimum heights, if there were any.
     least: Vec<i32>,
     sunk: Vec<i32>,
-    /// Ledges, where there were some.
+    /// Ledges, if there were any.
     ledged: Ledged,
 }
 
 impl Taken {
-    /// Takes the minimum heights and the ledges of a liquid, if they are of its ground as it is.
+    /// Takes the minimum heights and the ledges of a liquid, if they match its current ground.
     fn fit(&mut self, spill: &Spill) {
         self.ledged.copy_from(&spill.ledged);
         let (least, sunk) = spill.lifted.known().unwrap_or_default();
@@ -50,9 +50,9 @@ impl Noun for frz_shallow_snapshot {
     const TAG: u32 = 0x6672_7a0a;
 }
 
-/// Makes a snapshot of a liquid as it is now.
+/// Creates a snapshot of a liquid in its current state.
 ///
-/// out: receives the snapshot, to be destroyed with frz_shallow_snapshot_destroy; NULL after a failure. It does not need the liquid.
+/// out: receives the snapshot, to be destroyed with frz_shallow_snapshot_destroy; NULL after a failure. It may outlive the liquid.
 ///
 /// Any number of threads may read a shallow liquid; one thread at a time for each context.
 #[unsafe(no_mangle)]
@@ -61,7 +61,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_create(
     shallow: *const frz_shallow,
     out: *mut *mut frz_shallow_snapshot,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let spill = read(shallow)?;
@@ -85,12 +85,13 @@ pub unsafe extern "C" fn frz_shallow_snapshot_create(
     }
 }
 
-/// Bytes of a snapshot for each column index: bases, ceilings, undersides, depth, velocity, scalars, minimum heights, and for a surface.
+/// Memory (bytes) of a snapshot for each column index: bases, ceilings, undersides, depth, velocity, scalars, minimum heights, and for a
+/// surface.
 const BYTES: u64 = 72;
 
-/// Takes a liquid as it is now in place of what a snapshot had, in real time (frz_shallow).
+/// Replaces the contents of a snapshot by a liquid's current state, in real time (frz_shallow).
 ///
-/// snapshot: of this liquid or any other. While another thread draws it: FRZ_ERROR_BUSY.
+/// snapshot: of this liquid or any other. FRZ_ERROR_BUSY while another thread draws it.
 ///
 /// One thread at a time; any number may read a shallow liquid.
 #[unsafe(no_mangle)]
@@ -99,7 +100,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_take(
     shallow: *const frz_shallow,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut taken = change(snapshot)?;
             let spill = read(shallow)?;
@@ -110,23 +111,23 @@ pub unsafe extern "C" fn frz_shallow_snapshot_take(
     })
 }
 
-/// Destroys a snapshot; NULL is fine.
+/// Destroys a snapshot; NULL is ignored.
 ///
-/// snapshot: may be NULL. Not while a call uses it: it then stays.
+/// snapshot: may be NULL. It is not destroyed while a call uses it.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_snapshot_destroy(snapshot: *mut frz_shallow_snapshot) {
-    // SAFETY: the snapshot is NULL or was not destroyed.
+    // SAFETY: the snapshot is NULL or alive.
     guard(|| unsafe { destroy(snapshot) });
 }
 
 /// Writes the surface that the liquid had when the snapshot was taken, as frz_shallow_surface does, in real time (frz_shallow).
 ///
-/// context: another one than that of the thread that computes.
-/// layout: NULL for the usual one.
-/// target: the buffers, as those of frz_shallow_surface; their bound is that of the liquid at that time.
-/// size: receives the size of the surface, as there; may be NULL. Its struct_size is set by the caller.
+/// context: not the one of the thread that computes.
+/// layout: NULL for the defaults.
+/// target: the buffers, as in frz_shallow_surface; their bound is that of the liquid at that time.
+/// size: receives the size of the surface, as in frz_shallow_surface; may be NULL. Its struct_size is set by the caller.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -138,7 +139,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_surface(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so is what the spans describe.
+        // SAFETY: the pointers are NULL or valid, and so are the spans.
         unsafe {
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;
@@ -166,7 +167,7 @@ pub unsafe extern "C" fn frz_shallow_snapshot_surface(
 /// Reads the liquid at points as it was when the snapshot was taken, as frz_shallow_probe does, in real time (frz_shallow).
 ///
 /// points: double[3] for each (m).
-/// dst: room for a frz_shallow_sample for each; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+/// dst: room for a frz_shallow_sample for each; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
 ///
 /// Any number of threads may read a snapshot.
 #[unsafe(no_mangle)]
@@ -175,6 +176,6 @@ pub unsafe extern "C" fn frz_shallow_snapshot_probe(
     points: frz_view,
     dst: frz_span,
 ) -> frz_status {
-    // SAFETY: the snapshot is NULL or was not destroyed; view and span are the caller's.
+    // SAFETY: the snapshot is NULL or alive; view and span are valid.
     guard(|| unsafe { probe(&read(snapshot)?.snapshot.view(), &points, &dst) })
 }

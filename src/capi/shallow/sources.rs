@@ -1,4 +1,4 @@
-//! Where shallow liquid comes in and goes out, and where all of it is.
+//! Where shallow liquid enters and leaves, and the balance of its volume.
 
 use super::liquid::{Spill, frz_shallow};
 use super::lists::each_sized;
@@ -10,21 +10,21 @@ use crate::capi::mesh::triangles::no_flags;
 use crate::shallow::Balance;
 use crate::shallow::sources::{FlowPoint, Kind, Pulse};
 
-/// Flag of a flow point: it lies on a triangle of the mesh that the liquid was made with, and moves with it.
+/// Flag of a flow point: it lies on a triangle of the mesh that the liquid was created with, and moves with it.
 pub const FRZ_SHALLOW_ON_TRIANGLE: u32 = 1;
 
-/// What a flow point does.
+/// Kinds of flow points.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_shallow_flow_kind {
-    /// Liquid comes in.
+    /// Liquid enters.
     FRZ_SHALLOW_SOURCE = 0,
-    /// Liquid goes out, as long as there is some below it: suction.
+    /// Liquid leaves, as long as there is some below: suction.
     FRZ_SHALLOW_DRAIN = 1,
-    /// As a drain, until it has taken frz_shallow_flow.capacity: gauze.
+    /// A drain that stops once it has taken frz_shallow_flow.capacity: gauze.
     FRZ_SHALLOW_ABSORBER = 2,
-    /// A hole in the ground, through which liquid runs out by its own weight: frz_shallow_flow.opening times (2 g H)^(1/2) a second, of the mean depth H
-    /// in its circle (Torricelli's law), at most its rate.
+    /// A hole in the ground, through which liquid runs out by its own weight: frz_shallow_flow.opening times (2 g H)^(1/2) per second, H
+    /// being the mean depth in its circle (Torricelli's law), but at most its rate.
     FRZ_SHALLOW_ORIFICE = 3,
 }
 
@@ -37,7 +37,7 @@ const KINDS: [(u32, frz_shallow_flow_kind); 4] = [
     (FRZ_SHALLOW_ORIFICE as u32, FRZ_SHALLOW_ORIFICE),
 ];
 
-/// A position where liquid comes in or goes out. It begins zeroed, and then struct_size.
+/// A flow point, where liquid enters or leaves. Zero it, then set struct_size.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_flow {
@@ -47,24 +47,24 @@ pub struct frz_shallow_flow {
     pub flags: u32,
     /// A frz_shallow_flow_kind.
     pub kind: u32,
-    /// With FRZ_SHALLOW_ON_TRIANGLE: the triangle, of those that frz_mesh_read lists as FRZ_MESH_TRIANGLES; else 0.
+    /// With FRZ_SHALLOW_ON_TRIANGLE: index of the triangle, among those that frz_mesh_read lists as FRZ_MESH_TRIANGLES; else 0.
     pub triangle: u32,
-    /// With FRZ_SHALLOW_ON_TRIANGLE: shares of its three vertices in the place, finite, whose sum is 1; else they are not looked at.
+    /// With FRZ_SHALLOW_ON_TRIANGLE: barycentric coordinates of the position on the triangle, finite, with a sum of 1; otherwise ignored.
     pub shares: [f64; 3],
-    /// Without: the position (m). It acts on the ground that is nearest above or below it.
+    /// Without FRZ_SHALLOW_ON_TRIANGLE: the position (m). It acts on the nearest ground above or below it.
     pub at: [f64; 3],
-    /// It acts on cells whose middles lie within so much of the position, seen from above (m), 0 or more; on the nearest one, if none
-    /// does.
+    /// It acts on cells whose centres lie within this distance of the position, seen from above (m), 0 or more; on the nearest cell if
+    /// there are none.
     pub radius: f64,
-    /// Volume in a second (m3/s), 0 or more: 1 ml/s is 1e-6. Of an orifice the most that goes out.
+    /// Volume per second (m3/s), 0 or more: 1 ml/s is 1e-6. For an orifice the maximum.
     pub rate: f64,
-    /// Volume that an absorber takes (m3), 0 or more; of others it is not looked at.
+    /// Volume that an absorber takes (m3), 0 or more; otherwise ignored.
     pub capacity: f64,
-    /// How often in a second the rate swings, 0 or more; 0: it does not.
+    /// Frequency at which the rate pulses (Hz), 0 or more; 0: it does not.
     pub pulse_frequency: f64,
-    /// By which share of itself the rate swings up and down, 0 to 1, in a sine from the start of the simulated time.
+    /// Amplitude of the pulse as a share of the rate, 0 to 1: a sine from the start of the simulated time.
     pub pulse_share: f64,
-    /// Of an orifice: its area (m2) times the share of it that the jet fills, 0.6 to 0.65 for a sharp edge, 0 or more; of others it is not looked at.
+    /// For an orifice: its area (m2) times the share of it that the jet fills, 0.6 to 0.65 for a sharp edge, 0 or more; otherwise ignored.
     pub opening: f64,
 }
 
@@ -91,11 +91,11 @@ impl frz_shallow_flow {
     };
 }
 
-/// A flow point, and the triangle with which it moves.
+/// A flow point, and the triangle that it moves with.
 pub(in crate::capi) struct Attached {
-    /// The flow point where it is now.
+    /// The flow point at its current position.
     pub point: FlowPoint,
-    /// Index of the triangle, and the shares of its corners.
+    /// Index of the triangle, and the barycentric coordinates on it.
     pub on: Option<(u32, [f64; 3])>,
 }
 
@@ -114,7 +114,7 @@ impl Attached {
             attached.push(Self::of(&given, terrain)?);
             Ok(())
         };
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { each_sized(flows, count, ["flow", "flows"], frz_shallow_flow::NONE, take) }?;
         Ok(attached)
     }
@@ -145,11 +145,11 @@ impl Attached {
     }
 }
 
-/// Sets sources, drains and absorbers, in place of those before; what these have moved stays in frz_shallow_balance. An absorber
-/// that is set again is dry. The frame after it may allocate.
+/// Sets sources, drains and absorbers, replacing those before; what those have moved remains in frz_shallow_balance. An absorber that is
+/// set again is dry. The next frame may allocate.
 ///
-/// flows: count flow points; NULL with a count of 0: there is none. FRZ_ERROR_ARGUMENT names one that is out of range, lies inside of
-///     solid or outside of the domain, counted from 0; the old ones then stay.
+/// flows: count flow points; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names one that is out of range, or lies inside a solid or
+///     outside the domain, counted from 0; the old ones are then kept.
 /// count: number of flow points.
 ///
 /// One thread at a time.
@@ -160,7 +160,7 @@ pub unsafe extern "C" fn frz_shallow_set_flows(
     count: usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut spill = change(shallow)?;
             let attached = Attached::all(flows, count, &spill.terrain)?;
@@ -172,9 +172,9 @@ pub unsafe extern "C" fn frz_shallow_set_flows(
     })
 }
 
-/// Reports how much a flow point has moved since it was set: what came in, or went out.
+/// Reports the volume that entered or left through a flow point since it was set.
 ///
-/// flow: which, counted from 0.
+/// flow: its index, from 0.
 /// volume: receives it (m3); 0 after a failure.
 ///
 /// Any number of threads may read a shallow liquid.
@@ -185,7 +185,7 @@ pub unsafe extern "C" fn frz_shallow_flow_moved(
     volume: *mut f64,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(volume);
             let volume = required(volume, "volume")?;
@@ -203,10 +203,10 @@ pub unsafe extern "C" fn frz_shallow_flow_moved(
 /// Pours a volume at a position, shared by the columns that a flow point there would act on; each takes what it has room for, or gives what
 /// it has.
 ///
-/// at: double[3], the position (m): FRZ_ERROR_ARGUMENT where it lies inside of solid or outside of the domain.
+/// at: double[3], the position (m): FRZ_ERROR_ARGUMENT if it lies inside a solid or outside the domain.
 /// radius: as in frz_shallow_flow (m).
-/// volume: what to pour (m3); negative: what to take.
-/// poured: receives what came in (m3), or went out (negative); 0 after a failure. May be NULL.
+/// volume: volume to pour in (m3); negative: to take out.
+/// poured: receives the volume poured in (m3), negative if taken out; 0 after a failure. May be NULL.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -218,7 +218,7 @@ pub unsafe extern "C" fn frz_shallow_pour(
     poured: *mut f64,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(poured);
             let mut spill = change(shallow)?;
@@ -233,15 +233,15 @@ pub unsafe extern "C" fn frz_shallow_pour(
     })
 }
 
-/// Fills all columns up to a height, or their ceiling; those that are fuller stay as they are.
+/// Fills all columns up to a height, or to their ceiling; fuller ones are unchanged.
 ///
-/// height: where the surface is to be (m).
+/// height: height of the surface (m).
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_fill(shallow: *mut frz_shallow, height: f64) -> frz_status {
     guard(|| {
-        // SAFETY: the liquid is NULL or was not destroyed.
+        // SAFETY: the liquid is NULL or alive.
         let mut spill = unsafe { change(shallow) }?;
         finite("height", height)?;
         spill.shallow.fill(height);
@@ -249,17 +249,17 @@ pub unsafe extern "C" fn frz_shallow_fill(shallow: *mut frz_shallow, height: f64
     })
 }
 
-/// Sets the depths of all columns: a first state that a host has made, or the liquid of a solver of its own, of which a surface is wanted.
-/// What it adds and takes counts as poured; what flows stays as it is.
+/// Sets the depths of all columns: an initial state from a host, or the liquid of the host's own solver, for its surface. What this adds
+/// and removes counts as poured; fluxes are unchanged.
 ///
-/// depths: float for each column index (m), as frz_shallow_read lists them: 0 or more, finite; beyond a ceiling the column is full. Of an
-///     index without a column it is not looked at.
+/// depths: float for each column index (m), in the order of frz_shallow_read: 0 or more, finite; above its ceiling a column is full.
+///     Ignored for an index without a column.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_set_depths(shallow: *mut frz_shallow, depths: frz_view) -> frz_status {
     guard(|| {
-        // SAFETY: the liquid is NULL or was not destroyed; the view is the caller's.
+        // SAFETY: the liquid is NULL or alive; the view is valid.
         unsafe {
             let mut spill = change(shallow)?;
             let count = spill.shallow.columns().len();
@@ -291,32 +291,32 @@ fn set_depths(spill: &mut Spill, wanted: impl Iterator<Item = f32>) {
     }
 }
 
-/// Where all liquid is, and came from (m3; 1 ml is 1e-6). inside + held + falling = poured + sourced + gained - drained - absorbed -
-/// lost.
+/// Where all liquid is, and where it came from (m3; 1 ml is 1e-6). inside + held + falling = poured + sourced + gained - drained - absorbed
+/// - lost.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_balance {
     /// sizeof(frz_shallow_balance), set by the caller.
     pub struct_size: u32,
-    /// Nothing.
+    /// Reserved.
     pub reserved: u32,
     /// In the columns.
     pub inside: f64,
-    /// Poured in so far, less what was taken.
+    /// Poured in so far, minus what was taken out.
     pub poured: f64,
-    /// Came in through sources.
+    /// From sources.
     pub sourced: f64,
-    /// Went out through drains.
+    /// To drains.
     pub drained: f64,
-    /// Went into absorbers.
+    /// To absorbers.
     pub absorbed: f64,
-    /// Went over the border, or fell where there is no ground.
+    /// Lost over the border, or where there is no ground.
     pub lost: f64,
-    /// Came in over a border that absorbs waves.
+    /// From beyond an absorbing border.
     pub gained: f64,
-    /// Waits for room, where ground or a body has swallowed it.
+    /// Waiting for room, where ground or a body displaced it.
     pub held: f64,
-    /// Units (2^-30 of the range of heights, of a cell) that the sum above is off: 0, as all are integers.
+    /// Error of the sum above, in units (2^-30 of the range of heights, of a cell): 0, as all are integers.
     pub error: i64,
     /// In the air.
     pub falling: f64,
@@ -347,7 +347,7 @@ impl From<Balance> for frz_shallow_balance {
     }
 }
 
-/// Reports where all liquid is.
+/// Reports where all liquid is, and where it came from.
 ///
 /// balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
 ///
@@ -358,7 +358,7 @@ pub unsafe extern "C" fn frz_shallow_get_balance(
     balance: *mut frz_shallow_balance,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             fill(balance, None, Balance::default().into())?;
             fill(balance, None, read(shallow)?.shallow.balance().into())

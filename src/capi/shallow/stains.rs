@@ -19,22 +19,22 @@ use crate::shallow::{Staining, Stains};
 pub struct frz_shallow_staining {
     /// sizeof(frz_shallow_staining).
     pub struct_size: u32,
-    /// 0.
+    /// Must be 0.
     pub flags: u32,
-    /// The scalar that stains (frz_shallow_set_scalars), counted from 0, by its concentration over its range, from 0 to 1: clear liquid washes it off.
-    /// FRZ_SHALLOW_NO_SCALAR, as is usual: any liquid stains, fully.
+    /// Index of the scalar that stains (frz_shallow_set_scalars), from 0, by its concentration over its range, clamped to 0 to 1: clear
+    /// liquid washes stains off. Default FRZ_SHALLOW_NO_SCALAR: any liquid stains, fully.
     pub scalar: u32,
-    /// 0.
+    /// Must be 0.
     pub reserved: u32,
-    /// Depth (m) from which liquid wets the ground, 0 or more; 1e-5 is usual.
+    /// Depth (m) from which liquid wets the ground, 0 or more; default 1e-5.
     pub film: f64,
-    /// Time (s) in which 63 % of a stain comes or is washed off, 0 or more; 0.2 is usual.
+    /// Time (s) in which 63 % of a stain forms or is washed off, 0 or more; default 0.2.
     pub takes: f64,
-    /// Time (s) in which half of a stain on dry ground fades, 0.001 or more; 60 is usual. Infinity: it stays.
+    /// Time (s) in which half of a stain on dry ground fades, 0.001 or more; infinity: it stays. Default 60.
     pub half_life: f64,
-    /// The most that ground absorbs (m: m3 for each m2 of its mesh), 0 to 1000: gauze some 1e-3. 0, as is usual: nothing.
+    /// Maximum that the ground absorbs (m: m3 for each m2 of its mesh), 0 to 1000: gauze some 1e-3. Default 0: nothing.
     pub capacity: f64,
-    /// How fast dry ground absorbs (m/s), 0 or more; as it fills, less. Only with a capacity.
+    /// Rate at which dry ground absorbs (m/s), 0 or more; it decreases as the ground fills. Only with a capacity.
     pub rate: f64,
 }
 
@@ -78,9 +78,9 @@ impl frz_shallow_staining {
     }
 }
 
-/// Fills a description of stains with the usual values.
+/// Fills a description of stains with the defaults.
 ///
-/// staining: receives them.
+/// staining: receives the defaults.
 /// size: sizeof(frz_shallow_staining).
 ///
 /// Any thread.
@@ -89,12 +89,12 @@ pub unsafe extern "C" fn frz_shallow_staining_init(
     staining: *mut frz_shallow_staining,
     size: usize,
 ) -> frz_status {
-    // SAFETY: the description is NULL or has so many bytes.
+    // SAFETY: the description is NULL or has `size` bytes.
     guard(|| unsafe { fill(staining, Some(size), frz_shallow_staining::defaults()) })
 }
 
-/// Stains on the vertices of a mesh, and what it has absorbed: they go with ground that deforms. The mesh need not be the one that the liquid was made
-/// with, but lies where its ground is.
+/// Stains on the vertices of a mesh, and the liquid that it has absorbed: they move with ground that deforms. The mesh need not be the one
+/// that the liquid was created with, but it lies where the liquid's ground is.
 pub struct frz_shallow_stains {
     _opaque: [u8; 0],
 }
@@ -102,7 +102,7 @@ pub struct frz_shallow_stains {
 /// The value of the handle of stains.
 pub(in crate::capi) struct Stained {
     stains: Stains,
-    /// Positions on their way in.
+    /// Incoming positions.
     positions: Vec<Vec3>,
 }
 
@@ -112,12 +112,12 @@ impl Noun for frz_shallow_stains {
     const TAG: u32 = 0x6672_7a0b;
 }
 
-/// Makes stains: none yet, and nothing is absorbed.
+/// Creates stains: none yet, and nothing absorbed.
 ///
-/// shallow: the liquid that will stain; it is only read, and need not outlive them.
+/// shallow: the liquid that will stain; it is only read, and need not outlive the stains.
 /// positions: float[3] for each vertex (m), finite.
-/// triangles: uint32_t[3] for each triangle: its vertices. They stay, and a state knows them.
-/// staining: NULL for the usual one; FRZ_ERROR_ARGUMENT names a field that is out of range.
+/// triangles: uint32_t[3] for each triangle: its vertices. They cannot change, and a saved state is tied to them.
+/// staining: NULL for the defaults; FRZ_ERROR_ARGUMENT names a field that is out of range.
 /// out: receives the stains, to be destroyed with frz_shallow_stains_destroy; NULL after a failure.
 ///
 /// Any number of threads may read a shallow liquid; one thread at a time for each context.
@@ -130,7 +130,7 @@ pub unsafe extern "C" fn frz_shallow_stains_create(
     staining: *const frz_shallow_staining,
     out: *mut *mut frz_shallow_stains,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's; so is what the views describe.
+    // SAFETY: the pointers are NULL or valid, and so are the views.
     unsafe {
         creates(context, out, |ctx| {
             let staining = match staining.is_null() {
@@ -149,14 +149,15 @@ pub unsafe extern "C" fn frz_shallow_stains_create(
     }
 }
 
-/// Bytes of a vertex: its stain, when it was wet, what it holds and may hold, and its position, twice while it is read.
+/// Memory (bytes) of a vertex: its stain, when it was wet, its content and capacity, and its position, twice while it is read.
 const BYTES: u64 = 52;
 
-/// Lets the liquid stain the ground, and the ground absorb it, for the time since the last call: once a frame, in real time (frz_shallow).
+/// Lets the liquid stain the ground, and the ground absorb liquid, for the time since the last call: once a frame, in real time
+/// (frz_shallow).
 ///
-/// shallow: the liquid, after its frame; only ground with a capacity changes it. What it absorbs is a part of frz_shallow_balance.absorbed.
-/// positions: float[3] for each vertex (m), finite, where they are now. After a failure all is as it was.
-/// absorbed: receives the volume (m3) that the ground has absorbed in this call, 0 after a failure; may be NULL.
+/// shallow: the liquid, after its frame; only ground with a capacity changes it. What it absorbs is part of frz_shallow_balance.absorbed.
+/// positions: float[3] for each vertex (m), finite: the current ones. After a failure all is as it was.
+/// absorbed: receives the volume (m3) that the ground absorbed in this call, 0 after a failure; may be NULL.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -168,7 +169,7 @@ pub unsafe extern "C" fn frz_shallow_stains_update(
     absorbed: *mut f64,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so is what the view describes.
+        // SAFETY: the pointers are NULL or valid, and so is the view.
         unsafe {
             if !absorbed.is_null() {
                 absorbed.write_unaligned(0.0);
@@ -199,7 +200,7 @@ pub unsafe extern "C" fn frz_shallow_stains_update(
 
 /// Copies how stained each vertex is, 0 to 1, in real time (frz_shallow).
 ///
-/// dst: room for a float for each vertex; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+/// dst: room for a float for each vertex; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
 ///
 /// Any number of threads may read stains.
 #[unsafe(no_mangle)]
@@ -207,11 +208,11 @@ pub unsafe extern "C" fn frz_shallow_stains_read(
     stains: *const frz_shallow_stains,
     dst: frz_span,
 ) -> frz_status {
-    // SAFETY: the stains are NULL or were not destroyed; the span is the caller's.
+    // SAFETY: the stains are NULL or alive; the span is valid.
     guard(|| unsafe { dst.put("dst", read(stains)?.stains.each()) })
 }
 
-/// Copies how soaked each vertex is, 0 to 1 of its capacity, in real time (frz_shallow); 0 where the ground does not absorb.
+/// Copies how soaked each vertex is, as a fraction of its capacity, 0 to 1, in real time (frz_shallow); 0 where the ground does not absorb.
 ///
 /// dst: as in frz_shallow_stains_read.
 ///
@@ -221,11 +222,11 @@ pub unsafe extern "C" fn frz_shallow_stains_soaked(
     stains: *const frz_shallow_stains,
     dst: frz_span,
 ) -> frz_status {
-    // SAFETY: the stains are NULL or were not destroyed; the span is the caller's.
+    // SAFETY: the stains are NULL or alive; the span is valid.
     guard(|| unsafe { dst.put("dst", read(stains)?.stains.each_soaked()) })
 }
 
-/// Reports how much the ground has absorbed in all.
+/// Reports the total volume that the ground has absorbed.
 ///
 /// volume: receives it (m3); 0 after a failure.
 ///
@@ -236,7 +237,7 @@ pub unsafe extern "C" fn frz_shallow_stains_absorbed(
     volume: *mut f64,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let volume = required(volume, "volume")?;
             volume.write_unaligned(0.0);
@@ -246,11 +247,12 @@ pub unsafe extern "C" fn frz_shallow_stains_absorbed(
     })
 }
 
-/// Writes stains as bytes, for frz_shallow_stains_restore. How liquid stains is not part of them, nor is the liquid (frz_shallow_save).
+/// Saves stains as bytes, for frz_shallow_stains_restore. The frz_shallow_staining parameters are not part of them, nor is the liquid
+/// (frz_shallow_save).
 ///
-/// dst: room for capacity bytes. NULL: size receives how many are needed, and nothing is written.
-/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
-/// size: receives the bytes that were written, or are needed; 0 after other failures.
+/// dst: room for capacity bytes. NULL: only the size is reported.
+/// capacity: size of dst (bytes). FRZ_ERROR_CAPACITY if it is too small.
+/// size: receives the number of bytes written, or needed; 0 after other failures.
 ///
 /// One thread at a time for each context; any number may read stains.
 #[unsafe(no_mangle)]
@@ -262,7 +264,7 @@ pub unsafe extern "C" fn frz_shallow_stains_save(
     size: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so is the room at dst.
+        // SAFETY: the pointers are NULL or valid, and so is the memory at dst.
         unsafe {
             required(size, "size")?.write_unaligned(0);
             let _call = enter_light(context)?;
@@ -272,11 +274,11 @@ pub unsafe extern "C" fn frz_shallow_stains_save(
     })
 }
 
-/// Puts saved stains in place: with the liquid's state of the same frame everything goes on to the same bytes.
+/// Restores saved stains: with the liquid's state of the same frame everything continues to the same bytes.
 ///
-/// state: bytes bytes of frz_shallow_stains_save. FRZ_ERROR_FILE, and the stains are as they were, where they are damaged, of other triangles, of a
-///     liquid with other cells or heights, or of ground that absorbs where this does not.
-/// bytes: their number.
+/// state: bytes bytes of frz_shallow_stains_save. FRZ_ERROR_FILE, with the stains unchanged, if they are damaged, or of other triangles, of
+///     a liquid with other cells or heights, or of ground that absorbs where this does not.
+/// bytes: size of state.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -287,7 +289,7 @@ pub unsafe extern "C" fn frz_shallow_stains_restore(
     bytes: usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so are the bytes.
+        // SAFETY: the pointers are NULL or valid, and so are the bytes.
         unsafe {
             let _call = enter_light(context)?;
             let mut stained = change(stains)?;
@@ -298,13 +300,13 @@ pub unsafe extern "C" fn frz_shallow_stains_restore(
     })
 }
 
-/// Destroys stains; NULL is fine.
+/// Destroys stains; NULL is ignored.
 ///
-/// stains: may be NULL. Not while a call uses them: they then stay.
+/// stains: may be NULL. They are not destroyed while a call uses them.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_stains_destroy(stains: *mut frz_shallow_stains) {
-    // SAFETY: the stains are NULL or were not destroyed.
+    // SAFETY: the stains are NULL or alive.
     guard(|| unsafe { destroy(stains) });
 }

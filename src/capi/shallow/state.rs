@@ -1,4 +1,4 @@
-//! States of shallow liquid that a host saves, and brings back in place.
+//! States of shallow liquid that a host saves and restores in place.
 
 use std::ffi::c_void;
 
@@ -9,13 +9,12 @@ use crate::capi::ffi::handle::{change, clear, read, required};
 use crate::capi::ffi::views::{frz_span, frz_view};
 use crate::capi::runtime::context::{enter_light, frz_context};
 
-/// Writes all that the next frame depends on, besides the ground, the parameters, the flow points and the bodies, in real time
-/// (frz_shallow): for a replay, an undo, a host's own cache. The bytes are the same on any number of threads.
+/// Saves all that the next frame depends on besides the ground, the parameters, the flow points and the bodies, in real time (frz_shallow):
+/// for a replay, an undo, a host's own cache. The bytes are the same on any number of threads.
 ///
-/// dst: room for capacity bytes. NULL: size receives how many are needed now, and nothing is written. A state has more of them the more
-///     of the ground is wet.
-/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
-/// size: receives the bytes that were written, or are needed; 0 after other failures.
+/// dst: room for capacity bytes. NULL: only the current size is reported; it grows with the wet area of the ground.
+/// capacity: size of dst (bytes). FRZ_ERROR_CAPACITY if it is too small.
+/// size: receives the number of bytes written, or needed; 0 after other failures.
 ///
 /// One thread at a time for each context; any number may read a shallow liquid.
 #[unsafe(no_mangle)]
@@ -27,7 +26,7 @@ pub unsafe extern "C" fn frz_shallow_save(
     size: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so is the room at dst.
+        // SAFETY: the pointers are NULL or valid, and so is the memory at dst.
         unsafe {
             clear(size);
             let size = required(size, "size")?;
@@ -38,12 +37,12 @@ pub unsafe extern "C" fn frz_shallow_save(
     })
 }
 
-/// Puts a saved state in place of the liquid's, in real time (frz_shallow): from there it flows as the saved one did, to the same
-/// bytes, with the same parameters, flow points and bodies, which are set before. What flow points have moved comes back with it.
+/// Replaces the liquid's state by a saved one, in real time (frz_shallow): from there it flows as the saved one did, to the same bytes,
+/// with the same parameters, flow points and bodies, which must be set before. The volumes moved by flow points are restored too.
 ///
-/// state: bytes bytes of frz_shallow_save. FRZ_ERROR_FILE, and the liquid is as it was, where they are damaged, of another version, of
-///     another ground or border, or of other kinds of flow points.
-/// bytes: their number.
+/// state: bytes bytes of frz_shallow_save. FRZ_ERROR_FILE, with the liquid unchanged, if they are damaged, or of another version, another
+///     ground or border, or other kinds of flow points.
+/// bytes: size of state.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -54,7 +53,7 @@ pub unsafe extern "C" fn frz_shallow_restore(
     bytes: usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so are the bytes.
+        // SAFETY: the pointers are NULL or valid, and so are the bytes.
         unsafe {
             let _call = enter_light(context)?;
             let mut spill = change(shallow)?;
@@ -64,7 +63,7 @@ pub unsafe extern "C" fn frz_shallow_restore(
     })
 }
 
-/// Writes a state of so many bytes to a host's room, if it gives any.
+/// Writes a state of a given size to a host's memory, unless that is NULL.
 ///
 /// # Safety
 /// There must be room for `capacity` bytes at `dst`, unless it is NULL.
@@ -76,7 +75,7 @@ pub(in crate::capi) unsafe fn put_state(
     save_to: impl FnOnce(&mut [u8]) -> crate::Result<usize>,
 ) -> Outcome {
     let room = frz_span { data: dst, count: capacity, stride: 0 };
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let room = unsafe {
         size.write_unaligned(needed);
         room.numbers::<u8>("dst", 1)?
@@ -93,9 +92,9 @@ pub(in crate::capi) unsafe fn put_state(
 /// The bytes of a host's state.
 ///
 /// # Safety
-/// The pointer must be NULL or point to so many bytes, for `'a`.
+/// The pointer must be NULL or point to that many bytes, for `'a`.
 pub(in crate::capi) unsafe fn taken_state<'a>(state: *const c_void, bytes: usize) -> Outcome<&'a [u8]> {
     required(state.cast_mut(), "state")?;
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { frz_view { data: state, count: bytes, stride: 0 }.bytes("state") }
 }

@@ -1,4 +1,4 @@
-//! What shallow liquid flows over: made once, and moved.
+//! The ground below shallow liquid: made once, then moved.
 
 use std::ops::Range;
 
@@ -22,7 +22,7 @@ use crate::shallow::terrain::{Solids, height};
 #[cfg(feature = "vdb")]
 use crate::vdb::FloatGrid;
 
-/// What the ground was made from, to be made from it again.
+/// What the ground was made from, so that it can be made again.
 pub(in crate::capi) enum Terrain {
     /// A mesh.
     Mesh(Box<Moving>),
@@ -36,17 +36,17 @@ pub(in crate::capi) enum Terrain {
 /// A mesh whose vertices move.
 pub(in crate::capi) struct Moving {
     pub(in crate::capi) positions: Vec<Vec3>,
-    /// Positions on their way in.
+    /// Incoming positions.
     coming: Vec<Vec3>,
-    /// Closed parts outward, without doubled ones.
+    /// Triangles with closed parts outward, without duplicates.
     pub(in crate::capi) triangles: Vec<[u32; 3]>,
-    /// As the host gave them, where that is not the same.
+    /// Triangles as the host gave them, if that differs.
     own: Option<Vec<[u32; 3]>>,
     caster: Caster,
 }
 
 impl Terrain {
-    /// The ground that a mesh is, and its solids.
+    /// The ground of a mesh, and its solids.
     pub(in crate::capi) fn of_mesh(
         ctx: &Context,
         mesh: &TriMesh,
@@ -74,7 +74,7 @@ impl Terrain {
         Ok((Self::Mesh(Box::new(Moving { positions, coming, triangles, own, caster })), solids))
     }
 
-    /// The ground that a height of each cell (m) is, and its solids.
+    /// The ground of a height for each cell (m), and its solids.
     pub(in crate::capi) fn of_heights(
         tops: impl ExactSizeIterator<Item = f32>,
         grid: Grid,
@@ -84,7 +84,7 @@ impl Terrain {
         Ok((Self::Heights(Vec::with_capacity(grid.cells())), solids))
     }
 
-    /// The ground that a level set is, and its solids.
+    /// The ground of a level set, and its solids.
     #[cfg(feature = "vdb")]
     pub(in crate::capi) fn of_level_set(
         ctx: &Context,
@@ -102,7 +102,7 @@ impl Terrain {
         Ok((Self::LevelSet, solids))
     }
 
-    /// The position (m) on a triangle of which its corners have these shares.
+    /// The position (m) on a triangle with these barycentric coordinates.
     pub(in crate::capi) fn position(&self, (triangle, shares): &(u32, [f64; 3])) -> Outcome<[f64; 3]> {
         let Self::Mesh(mesh) = self else {
             return Err(Failure::argument("the liquid was not made with a mesh: there is no triangle"));
@@ -122,10 +122,10 @@ fn all_cells(grid: &Grid) -> [Range<usize>; 2] {
     grid.size.map(|count| 0..count)
 }
 
-/// By how much a cell's middle may lie outside of a box that it is taken to lie within (cells).
+/// How far (cells) a cell's centre may lie outside a box and still count as inside.
 const ROUNDING: f64 = 1e-6;
 
-/// The cells whose middles lie within a host's box; all of them for NULL.
+/// The cells whose centres lie within a host's box; all cells for NULL.
 ///
 /// # Safety
 /// The pointer must be NULL or point to four numbers.
@@ -133,16 +133,16 @@ pub(in crate::capi) unsafe fn cells_in(grid: &Grid, bounds: *const f64) -> Outco
     if bounds.is_null() {
         return Ok(all_cells(grid));
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let bounds = unsafe { bounds.cast::<[f64; 4]>().read_unaligned() };
     let [x0, z0, x1, z1] = bounds;
-    // Also where one is NaN.
+    // Negated, so that NaN is refused too.
     if !(x0 <= x1 && z0 <= z1) {
         return Err(Failure::argument(format!("bounds = {bounds:?} m have no inside")));
     }
     let range = |axis: usize, low: f64, high: f64| {
         let count = grid.size[axis] as f64;
-        // In cells, from the middle of the first; rounding leaves none out.
+        // In cells, from the centre of the first; rounding excludes none.
         let [low, high] = [low, high].map(|position| (position - grid.origin[axis]) / grid.cell - 0.5);
         let first = (low - ROUNDING).ceil().clamp(0.0, count);
         let end = ((high + ROUNDING).floor() + 1.0).clamp(first, count);
@@ -151,22 +151,22 @@ pub(in crate::capi) unsafe fn cells_in(grid: &Grid, bounds: *const f64) -> Outco
     Ok([range(0, x0, x1), range(1, z0, z1)])
 }
 
-/// What a change of the ground did to the liquid.
+/// How a change of the ground affected the liquid.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_moved {
     /// sizeof(frz_shallow_moved), set by the caller.
     pub struct_size: u32,
-    /// Nothing.
+    /// Reserved.
     pub reserved: u32,
-    /// Cells whose columns were made anew.
+    /// Cells whose columns were rebuilt.
     pub cells: u64,
-    /// Liquid (m3) that could not stay in its column, and went to others of its cell or of those beside it.
+    /// Liquid (m3) that could not stay in its column, and moved to others of its cell or of adjacent cells.
     pub displaced: f64,
-    /// Liquid (m3) that waits for room now, in all: the ground has swallowed it, and gives it back where there is room again. It is
-    /// part of frz_shallow_balance.held.
+    /// All liquid (m3) that now waits for room: the ground has displaced it, and returns it where there is room again. It is part of
+    /// frz_shallow_balance.held.
     pub held: f64,
-    /// Liquid (m3) that fell where there is no ground any more: it is part of frz_shallow_balance.lost.
+    /// Liquid (m3) that fell where there is no longer any ground: it is part of frz_shallow_balance.lost.
     pub fallen: f64,
 }
 
@@ -189,17 +189,17 @@ impl From<Moved> for frz_shallow_moved {
     }
 }
 
-/// A call that changes the ground and reports what that did.
+/// A call that changes the ground and reports the effect.
 ///
 /// # Safety
-/// The pointers must be NULL or the caller's.
+/// The pointers must be NULL or valid.
 unsafe fn moves(
     context: *mut frz_context,
     shallow: *mut frz_shallow,
     moved: *mut frz_shallow_moved,
     make: impl FnOnce(&mut Spill) -> Outcome<Moved>,
 ) -> Outcome {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         if !moved.is_null() {
             fill(moved, None, Moved::default().into())?;
@@ -215,13 +215,13 @@ unsafe fn moves(
     }
 }
 
-/// Moves the vertices of the mesh that the liquid was made with, in real time (frz_shallow): bones and organs move, or are deformed. The
-/// liquid is taken along, and none of it is lost; flow points on triangles move with them. After a failure all is as it was.
+/// Moves the vertices of the mesh that the liquid was created with, in real time (frz_shallow): bones and organs move or deform. The liquid
+/// is carried along, and none of it is lost; flow points on triangles move with them. After a failure all is as it was.
 ///
 /// positions: float[3] for each vertex (m), finite, in the mesh's order.
-/// bounds: double[4], least x, least z, greatest x and greatest z (m) of all triangles that move, where they were and where they are: the
-///     ground is made anew there only. NULL: everywhere.
-/// moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// bounds: double[4], minimum x, minimum z, maximum x and maximum z (m) of all triangles that move, at their old and their new positions:
+///     the ground is rebuilt only there. NULL: everywhere.
+/// moved: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -233,7 +233,7 @@ pub unsafe extern "C" fn frz_shallow_update_terrain(
     moved: *mut frz_shallow_moved,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so is what the view describes.
+        // SAFETY: the pointers are NULL or valid, and so is the view.
         unsafe {
             moves(context, shallow, moved, |spill| {
                 let Spill { shallow, terrain, flows, .. } = spill;
@@ -259,7 +259,7 @@ pub unsafe extern "C" fn frz_shallow_update_terrain(
 }
 
 impl Moving {
-    /// The solids of all cells with the vertices on their way in.
+    /// The solids of all cells with the incoming vertices.
     pub(in crate::capi) fn cast(&mut self, grid: Grid, heights: Heights) -> Outcome<Solids> {
         self.caster.cast(&self.coming, &self.triangles, all_cells(&grid))?;
         let mut solids = Solids::empty(grid, heights);
@@ -267,17 +267,17 @@ impl Moving {
         Ok(solids)
     }
 
-    /// They have come.
+    /// Adopts the incoming vertices.
     pub(in crate::capi) fn come(&mut self) {
         std::mem::swap(&mut self.positions, &mut self.coming);
     }
 
-    /// Reads where vertices come to lie.
+    /// Reads the new positions of the vertices.
     ///
     /// # Safety
     /// The view must describe memory that can be read.
     pub(in crate::capi) unsafe fn take(&mut self, positions: &frz_view) -> Outcome {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let given = unsafe { positions.in_place::<[f32; 3]>("positions") }?;
         let count = self.positions.len();
         if given.len() != count {
@@ -294,12 +294,12 @@ impl Moving {
     }
 }
 
-/// Changes the heights of the height field that the liquid was made on, in real time (frz_shallow). The liquid is taken along, and none
-/// of it is lost. After a failure all is as it was.
+/// Changes the heights of the height field that the liquid was created with, in real time (frz_shallow). The liquid is carried along, and
+/// none of it is lost. After a failure all is as it was.
 ///
 /// heights: float for each cell of the domain (m), finite, as in frz_shallow_create_heights.
-/// bounds: as in frz_shallow_update_terrain: heights elsewhere are taken to be as they were.
-/// moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// bounds: as in frz_shallow_update_terrain: heights outside it are assumed unchanged.
+/// moved: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -311,7 +311,7 @@ pub unsafe extern "C" fn frz_shallow_update_heights(
     moved: *mut frz_shallow_moved,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so is what the view describes.
+        // SAFETY: the pointers are NULL or valid, and so is the view.
         unsafe {
             moves(context, shallow, moved, |spill| {
                 let Spill { shallow, terrain, .. } = spill;
@@ -329,7 +329,7 @@ pub unsafe extern "C" fn frz_shallow_update_heights(
     })
 }
 
-/// Reads the solids that a host's heights of all cells make of some.
+/// The solids of some cells, from a host's heights of all cells.
 ///
 /// # Safety
 /// The view must describe memory that can be read.
@@ -340,7 +340,7 @@ pub(in crate::capi) unsafe fn read_heights(
     [across, rows]: [Range<usize>; 2],
     solids: &mut Vec<[Solid; 1]>,
 ) -> Outcome {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let tops = unsafe { heights.in_place::<f32>("heights") }?;
     if tops.len() != grid.cells() {
         let text = format!("heights: {} elements, but there are {} cells", tops.len(), grid.cells());
@@ -365,7 +365,7 @@ pub(in crate::capi) unsafe fn read_heights(
 pub enum frz_shallow_shape {
     /// A sphere.
     FRZ_SHALLOW_SPHERE = 0,
-    /// All positions within a distance of a line: a sphere on its way from end to end.
+    /// All points within a distance of a line segment.
     FRZ_SHALLOW_CAPSULE = 1,
     /// A box in any orientation.
     FRZ_SHALLOW_BOX = 2,
@@ -379,7 +379,7 @@ const SHAPES: [(u32, frz_shallow_shape); 3] = [
     (FRZ_SHALLOW_BOX as u32, FRZ_SHALLOW_BOX),
 ];
 
-/// A solid that moves over the ground: a tool, a finger. It begins zeroed, and then struct_size.
+/// A solid that moves over the ground: a tool, a finger. Zero it, then set struct_size.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_body {
@@ -387,15 +387,15 @@ pub struct frz_shallow_body {
     pub struct_size: u32,
     /// A frz_shallow_shape.
     pub shape: u32,
-    /// Its middle, or one end of a capsule's line (m).
+    /// Its centre, or one end of a capsule's segment (m).
     pub at: [f64; 3],
-    /// The other end of a capsule's line (m); of others it is not looked at.
+    /// The other end of a capsule's segment (m); otherwise ignored.
     pub end: [f64; 3],
-    /// Radius of a sphere or capsule (m), over 0; of a box it is not looked at.
+    /// Radius of a sphere or capsule (m), over 0; ignored for a box.
     pub radius: f64,
-    /// Half of a box's length along each of its axes (m), over 0; of others it is not looked at.
+    /// Half of a box's length along each of its axes (m), over 0; otherwise ignored.
     pub half: [f64; 3],
-    /// Unit vectors along a box's axes, perpendicular to each other; all zeroes: those of the world. Of others they are not looked at.
+    /// Unit vectors along a box's axes, perpendicular to each other; all zeroes: those of the world. Otherwise ignored.
     pub axes: [[f64; 3]; 3],
 }
 
@@ -443,7 +443,7 @@ pub(in crate::capi) unsafe fn read_bodies(
     shapes: &mut Vec<Shape>,
 ) -> Outcome {
     shapes.clear();
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         each_sized(bodies, count, ["body", "bodies"], frz_shallow_body::NONE, |body| {
             shapes.push(body.shape()?);
@@ -452,14 +452,14 @@ pub(in crate::capi) unsafe fn read_bodies(
     }
 }
 
-/// Sets the solids that move over the ground, in place of those before, in real time (frz_shallow): the ground is made anew where one moves,
-/// and no triangle is looked at. The liquid makes way, and none of it is lost. After a failure all is as it was.
+/// Sets the solids that move over the ground, replacing those before, in real time (frz_shallow): the ground is rebuilt where one moves,
+/// and no triangle is visited. The liquid is displaced, and none of it is lost. After a failure all is as it was.
 ///
-/// A body moves from call to call: give it the same position in the list. What does not move costs nothing.
+/// A body is identified by its index: keep it at the same one from call to call. Bodies that do not move cost nothing.
 ///
-/// bodies: count bodies; NULL with a count of 0: there is none. FRZ_ERROR_ARGUMENT names one that is out of range, counted from 0.
+/// bodies: count bodies; NULL with a count of 0: none. FRZ_ERROR_ARGUMENT names one that is out of range, counted from 0.
 /// count: number of bodies.
-/// moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// moved: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -471,7 +471,7 @@ pub unsafe extern "C" fn frz_shallow_set_bodies(
     moved: *mut frz_shallow_moved,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             moves(context, shallow, moved, |spill| {
                 let Spill { shallow, shapes, .. } = spill;

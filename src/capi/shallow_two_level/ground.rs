@@ -18,17 +18,17 @@ use crate::shallow::surface::{Counts, Depths};
 use crate::shallow::terrain::Solids;
 use crate::shallow::two_level::surface;
 
-/// A call that changes the ground and reports what that did.
+/// A call that changes the ground and reports the effect.
 ///
 /// # Safety
-/// The pointers must be NULL or the caller's.
+/// The pointers must be NULL or valid.
 unsafe fn moves(
     context: *mut frz_context,
     detail: *mut frz_shallow_detail,
     moved: *mut frz_shallow_moved,
     make: impl FnOnce(&mut Spread) -> Outcome<Moved>,
 ) -> Outcome {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         if !moved.is_null() {
             fill(moved, None, Moved::default().into())?;
@@ -40,10 +40,11 @@ unsafe fn moves(
     }
 }
 
-/// Moves the vertices of the mesh that the liquid was made with, as frz_shallow_update_terrain does, everywhere. After a failure all is as it was.
+/// Moves the vertices of the mesh that the liquid was created with, as frz_shallow_update_terrain does, everywhere. After a failure all is
+/// as it was.
 ///
 /// positions: float[3] for each vertex (m), finite, in the mesh's order.
-/// moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// moved: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -54,7 +55,7 @@ pub unsafe extern "C" fn frz_shallow_detail_update_terrain(
     moved: *mut frz_shallow_moved,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so is what the view describes.
+        // SAFETY: the pointers are NULL or valid, and so is the view.
         unsafe {
             moves(context, detail, moved, |spread| {
                 let Spread { detail, terrain, flows, .. } = spread;
@@ -78,10 +79,11 @@ pub unsafe extern "C" fn frz_shallow_detail_update_terrain(
     })
 }
 
-/// Changes the heights of the height field that the liquid was made on, as frz_shallow_update_heights does, everywhere. After a failure all is as it was.
+/// Changes the heights of the height field that the liquid was created with, as frz_shallow_update_heights does, everywhere. After a
+/// failure all is as it was.
 ///
 /// heights: float for each cell of the domain (m), finite, as in frz_shallow_create_heights.
-/// moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// moved: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -92,7 +94,7 @@ pub unsafe extern "C" fn frz_shallow_detail_update_heights(
     moved: *mut frz_shallow_moved,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so is what the view describes.
+        // SAFETY: the pointers are NULL or valid, and so is the view.
         unsafe {
             moves(context, detail, moved, |spread| {
                 let Spread { detail, terrain, .. } = spread;
@@ -111,12 +113,12 @@ pub unsafe extern "C" fn frz_shallow_detail_update_heights(
     })
 }
 
-/// Sets the solids that move over the ground, as frz_shallow_set_bodies does, in real time (frz_shallow_detail). They may cross the edge of the box. After a
-/// failure all is as it was.
+/// Sets the solids that move over the ground, as frz_shallow_set_bodies does, in real time (frz_shallow_detail). They may cross the edge of
+/// the box. After a failure all is as it was.
 ///
-/// bodies: count bodies; NULL with a count of 0: there is none.
+/// bodies: count bodies; NULL with a count of 0: none.
 /// count: number of bodies.
-/// moved: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// moved: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -128,7 +130,7 @@ pub unsafe extern "C" fn frz_shallow_detail_set_bodies(
     moved: *mut frz_shallow_moved,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             moves(context, detail, moved, |spread| {
                 let Spread { detail, shapes, .. } = spread;
@@ -139,8 +141,8 @@ pub unsafe extern "C" fn frz_shallow_detail_set_bodies(
     })
 }
 
-/// Reports the most that the surface of any liquid can have, as frz_shallow_surface_bound does. It holds until the ground, a body or the box of small
-/// cells moves.
+/// Reports the maximum size of the surface of any liquid, as frz_shallow_surface_bound does. It holds until the ground, a body or the box
+/// of small cells moves.
 ///
 /// size: receives it, all zeroes after a failure. Its struct_size is set by the caller.
 ///
@@ -151,7 +153,7 @@ pub unsafe extern "C" fn frz_shallow_detail_surface_bound(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             fill(size, None, Counts::default().into())?;
             fill(size, None, surface::bound(&read(detail)?.detail).into())
@@ -159,12 +161,12 @@ pub unsafe extern "C" fn frz_shallow_detail_surface_bound(
     })
 }
 
-/// Writes the surface of all liquid as triangles, in real time (frz_shallow_detail): one mesh, without a crack between small and large cells. It ends at the
-/// middles of the outermost cells. The first one after the box of small cells has moved may allocate.
+/// Writes the surface of all liquid as triangles, in real time (frz_shallow_detail): one mesh, without a crack between small and large
+/// cells. It ends at the centres of the outermost cells. The first call after the box of small cells has moved may allocate.
 ///
-/// layout: NULL for the usual one. Without FRZ_SHALLOW_LIFTED and FRZ_SHALLOW_SKIRTED.
-/// target: the buffers, as in frz_shallow_surface. In frz_shallow_target.columns those of large cells follow those of small ones.
-///     FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed.
+/// layout: NULL for the defaults. Without FRZ_SHALLOW_LIFTED and FRZ_SHALLOW_SKIRTED.
+/// target: the buffers, as in frz_shallow_surface. In frz_shallow_target.columns the indices of large cells follow those of small ones.
+///     FRZ_ERROR_CAPACITY if one is too small: nothing is written, and size receives what is needed.
 /// size: receives the size of the surface, all zeroes after other failures; may be NULL. Its struct_size is set by the caller.
 ///
 /// One thread at a time.
@@ -177,7 +179,7 @@ pub unsafe extern "C" fn frz_shallow_detail_surface(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so is what the spans describe.
+        // SAFETY: the pointers are NULL or valid, and so are the spans.
         unsafe {
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;
@@ -228,11 +230,12 @@ pub unsafe extern "C" fn frz_shallow_detail_surface(
     })
 }
 
-/// Writes all that the next frame depends on, as frz_shallow_save does, in real time (frz_shallow_detail). The box of small cells is part of it.
+/// Saves all that the next frame depends on, as frz_shallow_save does, in real time (frz_shallow_detail). The box of small cells is part of
+/// it.
 ///
-/// dst: room for capacity bytes. NULL: size receives how many are needed now, and nothing is written.
-/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
-/// size: receives the bytes that were written, or are needed; 0 after other failures.
+/// dst: room for capacity bytes. NULL: only the current size is reported.
+/// capacity: size of dst (bytes). FRZ_ERROR_CAPACITY if it is too small.
+/// size: receives the number of bytes written, or needed; 0 after other failures.
 ///
 /// One thread at a time for each context; any number may read a shallow liquid in cells of two sizes.
 #[unsafe(no_mangle)]
@@ -244,7 +247,7 @@ pub unsafe extern "C" fn frz_shallow_detail_save(
     size: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so is the room at dst.
+        // SAFETY: the pointers are NULL or valid, and so is the memory at dst.
         unsafe {
             clear(size);
             let size = required(size, "size")?;
@@ -255,11 +258,11 @@ pub unsafe extern "C" fn frz_shallow_detail_save(
     })
 }
 
-/// Puts a saved state in place of the liquid's, as frz_shallow_restore does, and moves the box of small cells to where it was.
+/// Replaces the liquid's state by a saved one, as frz_shallow_restore does, and moves the box of small cells to where it was.
 ///
-/// state: bytes bytes of frz_shallow_detail_save. FRZ_ERROR_FILE, and the liquid is as it was, where they are damaged, of another version, of
-///     another ground or border, or of other kinds of flow points.
-/// bytes: their number.
+/// state: bytes bytes of frz_shallow_detail_save. FRZ_ERROR_FILE, with the liquid unchanged, if they are damaged, or of another version,
+///     another ground or border, or other kinds of flow points.
+/// bytes: size of state.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -270,7 +273,7 @@ pub unsafe extern "C" fn frz_shallow_detail_restore(
     bytes: usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so are the bytes.
+        // SAFETY: the pointers are NULL or valid, and so are the bytes.
         unsafe {
             let _call = enter_light(context)?;
             let mut spread = change(detail)?;

@@ -1,4 +1,4 @@
-//! Shallow liquid in cells of two sizes: small near what matters.
+//! Shallow liquid in cells of two sizes: small ones near what matters.
 
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{Noun, change, clear, destroy, read, required};
@@ -18,11 +18,11 @@ use crate::shallow::two_level::cells_around;
 use crate::shallow::two_level::surface::Surface;
 use crate::shallow::{Balance, Detail, Params, Report};
 
-/// Shallow liquid in cells of two sizes: those of its domain in a box that may move, around an instrument or a player, and of twice the length everywhere
-/// else, where a frame takes a quarter of the time. No liquid is lost between them.
+/// Shallow liquid in cells of two sizes: those of its domain in a box that may move, around an instrument or a player, and cells of twice
+/// the length everywhere else, where a frame takes a quarter of the time. No liquid is lost between them.
 ///
-/// It has no falls and no thickening. In real time, as frz_shallow says, are frz_shallow_detail_step, _surface, _save and _set_bodies;
-/// _set_near, _update_terrain and _update_heights may allocate, and so may _restore where it moves the box.
+/// It has no falls and no thickening. frz_shallow_detail_step, _surface, _save and _set_bodies work in real time, as frz_shallow defines
+/// it; _set_near, _update_terrain and _update_heights may allocate, and so may _restore if it moves the box.
 pub struct frz_shallow_detail {
     _opaque: [u8; 0],
 }
@@ -32,16 +32,16 @@ pub(in crate::capi) struct Spread {
     pub detail: Detail,
     /// What it flows over.
     pub terrain: Terrain,
-    /// Flow points of the host, in its order.
+    /// The host's flow points, in its order.
     pub flows: Vec<Attached>,
-    /// Obstacles of the last call.
+    /// The bodies of the last call.
     pub shapes: Vec<Shape>,
-    /// Makes surfaces; whether it has room for what the columns are now.
+    /// Builds surfaces; whether it has room for the current columns.
     pub surface: Surface,
     pub is_reserved: bool,
-    /// Mean velocities of all column indices of both sizes (m/s), when a surface wants them.
+    /// Mean velocities of all column indices of both sizes (m/s), if a surface needs them.
     pub velocities: [Vec<[f32; 2]>; 2],
-    /// Concentrations of scalars by column index of both, when a surface wants them.
+    /// Concentrations of scalars by column index of both sizes, if a surface needs them.
     pub concentrations: [[Vec<f32>; MOST]; 2],
 }
 
@@ -63,7 +63,7 @@ impl Spread {
         solids: &Solids,
         near: *const f64,
     ) -> Outcome<Self> {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let near = cells_around(&solids.grid, unsafe { bounds(near) }?)?;
         let detail = ctx.phase("columns", || Detail::new(ctx, solids, params, near))?;
         let mut surface = Surface::default();
@@ -81,23 +81,23 @@ impl Spread {
     }
 }
 
-/// A box of a host.
+/// A host's box.
 ///
 /// # Safety
 /// The pointer must be NULL or point to four numbers.
 unsafe fn bounds(near: *const f64) -> Outcome<[f64; 4]> {
     let near = required(near.cast_mut(), "near")?;
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     Ok(unsafe { near.cast::<[f64; 4]>().read_unaligned() })
 }
 
-/// Makes a liquid in cells of two sizes on a mesh, as frz_shallow_create does: dry at first.
+/// Creates a liquid in cells of two sizes on a mesh, as frz_shallow_create does, initially dry.
 ///
-/// params: NULL for the usual ones. Without falls and thickening.
-/// domain: where liquid can be. Its counts of cells are even.
+/// params: NULL for the defaults. Without falls and thickening.
+/// domain: where liquid can be. Its numbers of cells are even.
 /// mesh: it is copied.
-/// near: double[4], least x, least z, greatest x and greatest z (m): the small cells are those of the smallest box of pairs of cells that has
-///     it, as far as the domain goes; all of them may be small. FRZ_ERROR_ARGUMENT where it lies outside.
+/// near: double[4], minimum x, minimum z, maximum x and maximum z (m): the small cells are those of the smallest box of pairs of cells that
+///     contains it, within the domain; all cells may be small. FRZ_ERROR_ARGUMENT if it lies outside.
 /// out: receives the liquid, to be destroyed with frz_shallow_detail_destroy; NULL after a failure.
 ///
 /// Any number of threads may read a mesh; one thread at a time for each context.
@@ -110,7 +110,7 @@ pub unsafe extern "C" fn frz_shallow_detail_create(
     near: *const f64,
     out: *mut *mut frz_shallow_detail,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let params = self::params(params)?;
@@ -122,7 +122,7 @@ pub unsafe extern "C" fn frz_shallow_detail_create(
     }
 }
 
-/// Makes a liquid in cells of two sizes on a height field, as frz_shallow_create_heights does: dry at first.
+/// Creates a liquid in cells of two sizes on a height field, as frz_shallow_create_heights does, initially dry.
 ///
 /// params: as in frz_shallow_detail_create.
 /// domain: as in frz_shallow_detail_create.
@@ -140,7 +140,7 @@ pub unsafe extern "C" fn frz_shallow_detail_create_heights(
     near: *const f64,
     out: *mut *mut frz_shallow_detail,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let params = self::params(params)?;
@@ -152,20 +152,20 @@ pub unsafe extern "C" fn frz_shallow_detail_create_heights(
     }
 }
 
-/// Destroys a liquid in cells of two sizes; NULL is fine.
+/// Destroys a liquid in cells of two sizes; NULL is ignored.
 ///
-/// detail: may be NULL. Not while a call uses it: it then stays.
+/// detail: may be NULL. It is not destroyed while a call uses it.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_detail_destroy(detail: *mut frz_shallow_detail) {
-    // SAFETY: the liquid is NULL or was not destroyed.
+    // SAFETY: the liquid is NULL or alive.
     guard(|| unsafe { destroy(detail) });
 }
 
-/// Sets what flows, and how, as frz_shallow_set_params does.
+/// Sets the parameters, as frz_shallow_set_params does.
 ///
-/// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+/// params: the new parameters. FRZ_ERROR_ARGUMENT names a field that is out of range, and its range; the old ones are then kept.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -174,7 +174,7 @@ pub unsafe extern "C" fn frz_shallow_detail_set_params(
     params: *const frz_shallow_params,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut spread = change(detail)?;
             required(params.cast_mut(), frz_shallow_params::NAME)?;
@@ -183,8 +183,8 @@ pub unsafe extern "C" fn frz_shallow_detail_set_params(
     })
 }
 
-/// Moves the box of small cells. Liquid keeps its volume and what flows, and its surface stays level where it was. A box of the same cells costs
-/// nothing, and so a host may call it in each frame.
+/// Moves the box of small cells. The liquid keeps its volume and fluxes, and a level surface stays level. If the box covers the same cells
+/// the call costs nothing, so a host may make it in each frame.
 ///
 /// near: double[4], as in frz_shallow_detail_create. After a failure all is as it was.
 ///
@@ -195,7 +195,7 @@ pub unsafe extern "C" fn frz_shallow_detail_set_near(
     near: *const f64,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut spread = change(detail)?;
             let cells = cells_around(&spread.detail.fine().columns().grid, bounds(near)?)?;
@@ -209,7 +209,7 @@ pub unsafe extern "C" fn frz_shallow_detail_set_near(
 
 /// Reports the box of small cells.
 ///
-/// near: receives double[4]: least x, least z, greatest x and greatest z (m); all zeroes after a failure.
+/// near: receives double[4]: minimum x, minimum z, maximum x and maximum z (m); all zeroes after a failure.
 ///
 /// Any number of threads may read a shallow liquid in cells of two sizes.
 #[unsafe(no_mangle)]
@@ -218,7 +218,7 @@ pub unsafe extern "C" fn frz_shallow_detail_get_near(
     near: *mut f64,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let near = near.cast::<[f64; 4]>();
             clear(near);
@@ -234,8 +234,8 @@ pub unsafe extern "C" fn frz_shallow_detail_get_near(
 
 /// Computes a frame, in real time (frz_shallow_detail), as frz_shallow_step does without a budget.
 ///
-/// dt: as there.
-/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// dt: as in frz_shallow_step.
+/// report: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -246,7 +246,7 @@ pub unsafe extern "C" fn frz_shallow_detail_step(
     report: *mut frz_shallow_report,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             if !report.is_null() {
                 fill(report, None, frz_shallow_report::of(&Report::default(), 0.0))?;
@@ -258,9 +258,9 @@ pub unsafe extern "C" fn frz_shallow_detail_step(
     })
 }
 
-/// Sets sources, drains and absorbers, as frz_shallow_set_flows does. Each acts on the cells of the size that its centre lies in.
+/// Sets sources, drains and absorbers, as frz_shallow_set_flows does. Each acts on cells of the size at its centre.
 ///
-/// flows: count flow points; NULL with a count of 0: there is none. After a failure the old ones stay.
+/// flows: count flow points; NULL with a count of 0: none. After a failure the old ones are kept.
 /// count: number of flow points.
 ///
 /// One thread at a time.
@@ -271,7 +271,7 @@ pub unsafe extern "C" fn frz_shallow_detail_set_flows(
     count: usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut spread = change(detail)?;
             let attached = Attached::all(flows, count, &spread.terrain)?;
@@ -283,10 +283,10 @@ pub unsafe extern "C" fn frz_shallow_detail_set_flows(
     })
 }
 
-/// Gives a flow point another rate: a valve. What it has moved stays.
+/// Changes the rate of a flow point: a valve. The volume that it has moved stays.
 ///
-/// flow: which, counted from 0.
-/// rate: volume in a second (m3/s), 0 or more.
+/// flow: its index, from 0.
+/// rate: volume per second (m3/s), 0 or more.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -296,15 +296,15 @@ pub unsafe extern "C" fn frz_shallow_detail_set_rate(
     rate: f64,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the liquid is NULL or was not destroyed.
+        // SAFETY: the liquid is NULL or alive.
         let mut spread = unsafe { change(detail) }?;
         Ok(spread.detail.set_rate(flow, rate)?)
     })
 }
 
-/// Reports how much a flow point has moved since it was set: what came in, or went out.
+/// Reports the volume that entered or left through a flow point since it was set.
 ///
-/// flow: which, counted from 0.
+/// flow: its index, from 0.
 /// volume: receives it (m3); 0 after a failure.
 ///
 /// Any number of threads may read a shallow liquid in cells of two sizes.
@@ -315,7 +315,7 @@ pub unsafe extern "C" fn frz_shallow_detail_flow_moved(
     volume: *mut f64,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(volume);
             let volume = required(volume, "volume")?;
@@ -330,12 +330,12 @@ pub unsafe extern "C" fn frz_shallow_detail_flow_moved(
     })
 }
 
-/// Pours a volume at a position, as frz_shallow_pour does, into the cells of the size that it lies in.
+/// Pours a volume at a position, as frz_shallow_pour does, into cells of the size at that position.
 ///
 /// at: double[3], the position (m).
 /// radius: as in frz_shallow_flow (m).
-/// volume: what to pour (m3); negative: what to take.
-/// poured: receives what came in (m3), or went out (negative); 0 after a failure. May be NULL.
+/// volume: volume to pour in (m3); negative: to take out.
+/// poured: receives the volume poured in (m3), negative if taken out; 0 after a failure. May be NULL.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -347,7 +347,7 @@ pub unsafe extern "C" fn frz_shallow_detail_pour(
     poured: *mut f64,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(poured);
             let mut spread = change(detail)?;
@@ -364,13 +364,13 @@ pub unsafe extern "C" fn frz_shallow_detail_pour(
 
 /// Fills all columns up to a height, as frz_shallow_fill does.
 ///
-/// height: where the surface is to be (m).
+/// height: height of the surface (m).
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_detail_fill(detail: *mut frz_shallow_detail, height: f64) -> frz_status {
     guard(|| {
-        // SAFETY: the liquid is NULL or was not destroyed.
+        // SAFETY: the liquid is NULL or alive.
         let mut spread = unsafe { change(detail) }?;
         finite("height", height)?;
         spread.detail.fill(height);
@@ -378,7 +378,8 @@ pub unsafe extern "C" fn frz_shallow_detail_fill(detail: *mut frz_shallow_detail
     })
 }
 
-/// Reports where all liquid is. Less than a cell's share of four units waits for the rest of a unit of large cells: it is part of held.
+/// Reports where all liquid is, and where it came from. Less than a cell's share of four units waits for the rest of a unit of large cells:
+/// it is part of held.
 ///
 /// balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
 ///
@@ -389,7 +390,7 @@ pub unsafe extern "C" fn frz_shallow_detail_get_balance(
     balance: *mut frz_shallow_balance,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             fill(balance, None, Balance::default().into())?;
             fill(balance, None, read(detail)?.detail.balance().into())

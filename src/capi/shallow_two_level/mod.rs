@@ -1,6 +1,6 @@
 //! Small amounts of liquid in cells of two sizes.
 
-// In the header's order.
+// In the order of the header.
 pub mod liquid;
 
 pub mod ground;

@@ -1,4 +1,4 @@
-//! What shallow liquid in cells of two sizes carries.
+//! Scalars of shallow liquid in cells of two sizes.
 
 use super::liquid::frz_shallow_detail;
 use crate::capi::ffi::guard::{frz_status, guard};
@@ -9,9 +9,9 @@ use crate::capi::shallow::scalars::{
 };
 use crate::shallow::ScalarBalance;
 
-/// Sets what the liquid carries, as frz_shallow_set_scalars does. None of them thickens it.
+/// Sets the scalars that the liquid carries, as frz_shallow_set_scalars does. None of them thickens it.
 ///
-/// scalars: count scalars; NULL with a count of 0: there is none. After a failure the old ones stay.
+/// scalars: count scalars; NULL with a count of 0: none. After a failure the old ones are kept.
 /// count: number of scalars, up to FRZ_SHALLOW_MOST_SCALARS.
 ///
 /// One thread at a time.
@@ -22,7 +22,7 @@ pub unsafe extern "C" fn frz_shallow_detail_set_scalars(
     count: usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut spread = change(detail)?;
             let given = read_scalars(scalars, count)?;
@@ -31,7 +31,7 @@ pub unsafe extern "C" fn frz_shallow_detail_set_scalars(
     })
 }
 
-/// Sets the concentrations of scalars in what frz_shallow_detail_pour and _fill add from now on; 0 at first.
+/// Sets the concentrations of scalars in liquid that frz_shallow_detail_pour and _fill add from now on; initially 0.
 ///
 /// concentrations: double for each scalar, in their order, within its range.
 ///
@@ -42,7 +42,7 @@ pub unsafe extern "C" fn frz_shallow_detail_set_poured(
     concentrations: frz_view,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the liquid is NULL or was not destroyed; the view is the caller's.
+        // SAFETY: the liquid is NULL or alive; the view is valid.
         unsafe {
             let mut spread = change(detail)?;
             let given = of_scalars(spread.detail.scalars().len(), &concentrations)?;
@@ -51,9 +51,9 @@ pub unsafe extern "C" fn frz_shallow_detail_set_poured(
     })
 }
 
-/// Sets the concentrations of scalars in what comes through a source; 0 after frz_shallow_detail_set_flows.
+/// Sets the concentrations of scalars in liquid from a source; 0 after frz_shallow_detail_set_flows.
 ///
-/// flow: which flow point, counted from 0.
+/// flow: index of the flow point, from 0.
 /// concentrations: double for each scalar, in their order, within its range.
 ///
 /// One thread at a time.
@@ -64,7 +64,7 @@ pub unsafe extern "C" fn frz_shallow_detail_set_sourced(
     concentrations: frz_view,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the liquid is NULL or was not destroyed; the view is the caller's.
+        // SAFETY: the liquid is NULL or alive; the view is valid.
         unsafe {
             let mut spread = change(detail)?;
             let given = of_scalars(spread.detail.scalars().len(), &concentrations)?;
@@ -73,7 +73,7 @@ pub unsafe extern "C" fn frz_shallow_detail_set_sourced(
     })
 }
 
-/// Reports where all of a scalar is.
+/// Reports where all of a scalar is, and where it came from.
 ///
 /// scalar: which, counted from 0.
 /// balance: receives it, all zeroes after a failure. Its struct_size is set by the caller.
@@ -86,7 +86,7 @@ pub unsafe extern "C" fn frz_shallow_detail_get_scalar_balance(
     balance: *mut frz_shallow_scalar_balance,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             fill(balance, None, ScalarBalance::default().into())?;
             let spread = read(detail)?;

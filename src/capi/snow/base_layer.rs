@@ -1,4 +1,4 @@
-//! The base layer: the first of the objects that step. Those that follow have the same shape.
+//! The base layer, the first of the objects with steps; the others follow the same pattern.
 
 use std::ffi::c_void;
 use std::ptr::NonNull;
@@ -21,15 +21,15 @@ pub struct frz_base {
     _opaque: [u8; 0],
 }
 
-/// How bodies press into the snow. All of it may change between steps.
+/// How bodies press into the snow. All parameters may change between steps.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_base_params {
     /// sizeof(frz_base_params).
     pub struct_size: u32,
-    /// 0.
+    /// Must be 0.
     pub flags: u32,
-    /// Largest error of the swept volume (voxels), 0.001 to 1.
+    /// Maximum error of the swept volume (voxels), 0.001 to 1.
     pub tolerance: f64,
     /// Ragged edges of imprints.
     pub noise: frz_noise,
@@ -63,7 +63,7 @@ impl frz_base_params {
 pub struct frz_base_report {
     /// sizeof(frz_base_report), set by the caller.
     pub struct_size: u32,
-    /// Nothing.
+    /// Reserved.
     pub reserved: u32,
     /// Snow removed in this step (m3).
     pub removed_volume: f64,
@@ -71,7 +71,7 @@ pub struct frz_base_report {
     pub base_volume: f64,
     /// Blocks of 8 x 8 x 8 voxels in which the snow changed.
     pub touched_blocks: u64,
-    /// Triangles of the swept volume's boundary near the snow.
+    /// Triangles of the boundary of the swept volume near the snow.
     pub sweep_faces: u64,
 }
 
@@ -109,7 +109,7 @@ impl Layer {
         };
         for index in 0..LENT {
             let grid = NonNull::from(state.grids()[index]);
-            // SAFETY: the position is a pointer's.
+            // SAFETY: `out` points to a pointer of this object.
             unsafe { give(&raw mut state.lent[index], Grid::Lent(grid)) }?;
         }
         Ok(state)
@@ -119,9 +119,9 @@ impl Layer {
         [self.layer.surface(), self.layer.removed(), self.layer.compression(), self.layer.touched()]
     }
 
-    /// Runs `work` while the grids are not in use, and lends them again.
+    /// Runs `work` while the lent grids are not in use, and lends them again.
     fn alone<T>(&mut self, work: impl FnOnce(&mut Self) -> Outcome<T>) -> Outcome<T> {
-        // SAFETY: the handles live as long as this.
+        // SAFETY: the handles live as long as `self`.
         let mut held = self.lent.map(|grid| unsafe { change(grid) });
         if let Some(Err(_)) = held.iter().find(|held| held.is_err()) {
             let text = "a grid of the base layer is in use by another call";
@@ -144,26 +144,25 @@ impl Drop for Layer {
     }
 }
 
-/// Fills parameters with the usual values, those of the thesis' look.
+/// Fills parameters with the defaults, those of the thesis' look.
 ///
-/// params: receives them.
+/// params: receives the defaults.
 /// size: sizeof(frz_base_params).
 ///
 /// Any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_base_params_init(params: *mut frz_base_params, size: usize) -> frz_status {
-    // SAFETY: the parameters are NULL or have so many bytes.
+    // SAFETY: the parameters are NULL or have `size` bytes.
     guard(|| unsafe { fill(params, Some(size), frz_base_params::USUAL) })
 }
 
-/// Makes a base layer: untouched, or in a state that frz_base_save wrote.
+/// Creates a base layer: untouched, or in a state that frz_base_save wrote.
 ///
-/// params: NULL for the usual ones.
-/// snow: a level set with voxels fixed in the world, for instance from frz_snow_layer or frz_grid_load; it is copied.
-/// restart: restart_bytes bytes of frz_base_save of a layer made from the same snow: its grids come back bit for
-///     bit, on any number of threads. NULL: untouched. Bytes that are damaged, of another version or of other snow are
-///     FRZ_ERROR_FILE.
-/// restart_bytes: 0 without a restart.
+/// params: NULL for the defaults.
+/// snow: a level set with voxels fixed in world space, for instance from frz_snow_layer or frz_grid_load; it is copied.
+/// restart: restart_bytes bytes that frz_base_save wrote for a layer made from the same snow: its grids are restored bit for bit, on any
+///     number of threads. NULL: untouched. FRZ_ERROR_FILE if they are damaged, or of another version or other snow.
+/// restart_bytes: size of restart; 0 without one.
 /// out: receives the layer, to be destroyed with frz_base_destroy; NULL after a failure.
 ///
 /// Any number of threads may read a grid; one thread at a time for each context.
@@ -176,7 +175,7 @@ pub unsafe extern "C" fn frz_base_create(
     restart_bytes: usize,
     out: *mut *mut frz_base,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let held = read(snow)?;
@@ -201,21 +200,21 @@ pub unsafe extern "C" fn frz_base_create(
     }
 }
 
-/// Destroys a base layer, and the grids that it lent; NULL is fine.
+/// Destroys a base layer, and the grids that it lent; NULL is ignored.
 ///
-/// base: may be NULL. Not while a call uses it or one of its grids: it then stays, with all of them.
+/// base: may be NULL. While a call uses it or one of its grids nothing is destroyed.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_base_destroy(base: *mut frz_base) {
-    // SAFETY: the layer is NULL or was not destroyed.
+    // SAFETY: the layer is NULL or alive.
     guard(|| unsafe { destroy_whole(base, |layer: &Layer| layer.lent.to_vec()) });
 }
 
-/// Sets how bodies press from the next step on. All parameters may change between steps; what cannot change, the
-/// voxels and the snow itself, is none of them.
+/// Sets how bodies press from the next step on. All parameters may change between steps; the voxels and the snow itself are not parameters
+/// and cannot.
 ///
-/// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+/// params: the new parameters. FRZ_ERROR_ARGUMENT names a field that is out of range, and its range; the old ones are then kept.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -224,7 +223,7 @@ pub unsafe extern "C" fn frz_base_set_params(
     params: *const frz_base_params,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut base = change(base)?;
             let params = sized(params, frz_base_params::USUAL)?;
@@ -235,17 +234,16 @@ pub unsafe extern "C" fn frz_base_set_params(
     })
 }
 
-/// Removes from the snow what bodies pass through in a step.
+/// Removes from the snow the space that bodies pass through in a step.
 ///
-/// The work is done aside and put in place at the end: after a failure or a cancel the layer is as it was before.
+/// Results replace the layer's grids only at the end: after a failure or a cancel the layer is as it was before.
 ///
-/// bodies: count bodies; NULL with a count of 0. A vertex farther than 131072 voxels from the middle of the snow is out of
-///     reach: FRZ_ERROR_ARGUMENT names its body, counted from 0, and nothing is changed.
+/// bodies: count bodies; NULL with a count of 0. A vertex farther than 131072 voxels from the middle of the snow is out of reach:
+///     FRZ_ERROR_ARGUMENT names its body, counted from 0, and nothing is changed.
 /// count: number of bodies.
-/// dt: length of the step (s). 0: the bodies are cut out where they are at its beginning, as the first frame of a
-///     shot wants it.
-/// frame: the number that frz_base_touched gets where the snow changes, from -16777216 to 16777216.
-/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// dt: length of the step (s). 0: the bodies are cut out at their positions at its beginning, as the first frame of a shot requires.
+/// frame: the value that frz_base_touched takes where the snow changes, -16777216 to 16777216.
+/// report: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///
 /// One thread at a time; the layer's grids must not be in use meanwhile (FRZ_ERROR_BUSY).
 #[unsafe(no_mangle)]
@@ -259,7 +257,7 @@ pub unsafe extern "C" fn frz_base_step(
     report: *mut frz_base_report,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut told = frz_base_report {
                 struct_size: 0,
@@ -298,14 +296,14 @@ pub unsafe extern "C" fn frz_base_step(
     })
 }
 
-/// Writes what the next step depends on, besides the snow that the layer was made from: for a host's own cache.
+/// Saves what the next step depends on besides the snow that the layer was made from, for a host's own cache.
 ///
-/// Only blocks that ever changed are kept, packed; the bytes are the same on any number of threads. What the last
-/// step removed, and which blocks it changed, is not part of it.
+/// Only blocks that ever changed are stored, packed; the bytes are the same on any number of threads. What the last step removed, and which
+/// blocks it changed, is not part of the state.
 ///
-/// dst: room for capacity bytes. NULL: size receives a number that certainly suffices, and nothing is written.
-/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
-/// size: receives the bytes that were written, or are needed; 0 after other failures.
+/// dst: room for capacity bytes. NULL: only an upper bound of the size is reported.
+/// capacity: size of dst (bytes). FRZ_ERROR_CAPACITY if it is too small.
+/// size: receives the number of bytes written, or needed; 0 after other failures.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -317,7 +315,7 @@ pub unsafe extern "C" fn frz_base_save(
     size: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(size);
             let call = enter(context)?;
@@ -331,15 +329,14 @@ pub unsafe extern "C" fn frz_base_save(
 
 fn lent(base: *const frz_base, index: usize) -> *const frz_grid {
     crate::capi::ffi::guard::guard_value(std::ptr::null(), || {
-        // SAFETY: the layer is NULL or was not destroyed.
+        // SAFETY: the layer is NULL or alive.
         Ok(unsafe { read(base) }?.lent[index].cast_const())
     })
 }
 
 /// Lends the snow: a level set (m), negative inside.
 ///
-/// The grid is the layer's: the pointer is valid until the layer is destroyed, its contents until the next step. NULL
-/// after a failure.
+/// The layer owns the grid: the pointer is valid until the layer is destroyed, its contents until the next step. NULL after a failure.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -347,9 +344,9 @@ pub unsafe extern "C" fn frz_base_grid(base: *const frz_base) -> *const frz_grid
     lent(base, 0)
 }
 
-/// Lends what the last step removed: a level set (m), empty before the first step and after a restart.
+/// Lends the snow that the last step removed: a level set (m), empty before the first step and after a restart.
 ///
-/// The grid is the layer's, as that of frz_base_grid.
+/// The layer owns the grid, as that of frz_base_grid.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -357,10 +354,9 @@ pub unsafe extern "C" fn frz_base_removed(base: *const frz_base) -> *const frz_g
     lent(base, 1)
 }
 
-/// Lends how far the snow is pressed: the part of its column's height that was removed, 0 to 1, at touched voxels
-/// of the surface.
+/// Lends the compression of the snow: the fraction of its column's height that was removed, 0 to 1, at touched voxels of the surface.
 ///
-/// The grid is the layer's, as that of frz_base_grid.
+/// The layer owns the grid, as that of frz_base_grid.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -368,9 +364,9 @@ pub unsafe extern "C" fn frz_base_compression(base: *const frz_base) -> *const f
     lent(base, 2)
 }
 
-/// Lends when the snow was last touched: the frame that frz_base_step was given, at touched voxels of the surface.
+/// Lends the time of the last change of the snow: the frame that frz_base_step was given, at touched voxels of the surface.
 ///
-/// The grid is the layer's, as that of frz_base_grid.
+/// The layer owns the grid, as that of frz_base_grid.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -378,16 +374,16 @@ pub unsafe extern "C" fn frz_base_touched(base: *const frz_base) -> *const frz_g
     lent(base, 3)
 }
 
-/// Reports the box that the snow lies in: no step makes it larger.
+/// Reports the bounding box of the snow, which no step enlarges.
 ///
-/// min: receives double[3], its least corner (m); zeroes after a failure.
-/// max: receives double[3], its greatest corner (m); zeroes after a failure.
+/// min: receives double[3], its minimum corner (m); zeroes after a failure.
+/// max: receives double[3], its maximum corner (m); zeroes after a failure.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_base_bounds(base: *const frz_base, min: *mut f64, max: *mut f64) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let [min, max] = [min.cast::<[f64; 3]>(), max.cast::<[f64; 3]>()];
             clear(min);
@@ -401,12 +397,12 @@ pub unsafe extern "C" fn frz_base_bounds(base: *const frz_base, min: *mut f64, m
     })
 }
 
-/// Lends the origins of the blocks that the last step changed in any of the layer's grids, ascending: with
-/// frz_grid_probe a host brings its own copy up to date.
+/// Lends the origins of the blocks that the last step changed in any of the layer's grids, in ascending order: with them and frz_grid_probe
+/// a host updates its own copy.
 ///
-/// origins: receives a pointer to count times int32_t[3], voxels of least corners; it is the layer's and stays until
-///     the next step. NULL when there is none, or after a failure.
-/// count: receives their number; 0 after a failure. There is none before the first step and after a restart.
+/// origins: receives a pointer to count times int32_t[3], the minimum voxels of the blocks. The layer owns it, until the next step. NULL if
+///     there is none, or after a failure.
+/// count: receives their number; 0 after a failure, before the first step and after a restart.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -416,7 +412,7 @@ pub unsafe extern "C" fn frz_base_dirty(
     count: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(origins);
             clear(count);

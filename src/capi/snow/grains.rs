@@ -36,21 +36,21 @@ pub struct frz_grains_report {
     pub struct_size: u32,
     /// Sub-steps that the step was divided into.
     pub sub_steps: u32,
-    /// Grains now.
+    /// Grains after the step.
     pub count: u64,
-    /// Those that rest: nothing moves them until something wakes them.
+    /// Those at rest: nothing moves them until something wakes them.
     pub resting: u64,
-    /// Grains that were born of removed snow.
+    /// Grains born from removed snow.
     pub born: u64,
-    /// Grains that fell below the lowest height, left the box or the range of coordinates.
+    /// Grains that fell below the lowest height, or left the box or the range of coordinates.
     pub dropped: u64,
-    /// Grains that were as old as their lifetime.
+    /// Grains that reached their lifetime.
     pub expired: u64,
-    /// Grains that are pressed where they have no room: the attribute FRZ_GRAINS_TRAPPED.
+    /// Grains that are pressed where there is no room for them: the attribute FRZ_GRAINS_TRAPPED.
     pub trapped: u64,
     /// Snow that the base layer lost (m3).
     pub removed_volume: f64,
-    /// Grains that removed snow has paid for and that are not born yet: fractions, and what had no position.
+    /// Grains that removed snow has paid for but that are not born yet: fractions, and those for which there was no room.
     pub owed: f64,
     /// Largest speed (m/s).
     pub fastest: f64,
@@ -78,7 +78,7 @@ impl frz_grains_report {
     };
 }
 
-/// What lies below.
+/// What lies below the grains.
 #[derive(Clone, Copy)]
 struct Ground {
     floor: Option<f64>,
@@ -121,7 +121,7 @@ impl Heap {
         }
         ctx.allow("the grains", memory(self.grains.count()))?;
         let mut shapes = std::mem::take(&mut self.shapes);
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let bodies = unsafe { bodies(ctx, list, count, dt, Role::Push, &mut shapes) };
         self.shapes = shapes;
         let bodies = bodies?;
@@ -151,11 +151,11 @@ impl Heap {
     }
 }
 
-/// Shortest and longest step (s), besides 0.
+/// Minimum and maximum length of a step (s), besides 0.
 const SHORTEST: f64 = 1.0e-6;
 /// As above.
 const LONGEST: f64 = 3600.0;
-/// Least and greatest radius of a grain in voxels of the base layer.
+/// Minimum and maximum radius of a grain in voxels of the base layer.
 const RADII: [f64; 2] = [0.02, 0.5];
 
 /// Refuses grains that are too small or too large for a base layer's voxels (m).
@@ -184,12 +184,12 @@ pub(in crate::capi) fn check_snow(name: &str, grid: &FloatGrid) -> Outcome {
     Ok(())
 }
 
-/// Makes grains: none yet, or those of a state that frz_grains_save wrote.
+/// Creates grains: none yet, or those of a state that frz_grains_save wrote.
 ///
-/// params: NULL for the usual ones.
-/// restart: restart_bytes bytes of frz_grains_save of grains of the same radius: they come back bit for bit, on any number
-///     of threads. NULL: none. Bytes that are damaged, of another version or of another radius are FRZ_ERROR_FILE.
-/// restart_bytes: 0 without a restart.
+/// params: NULL for the defaults.
+/// restart: restart_bytes bytes that frz_grains_save wrote for grains of the same radius: they are restored bit for bit, on any number of
+///     threads. NULL: none. FRZ_ERROR_FILE if they are damaged, or of another version or radius.
+/// restart_bytes: size of restart; 0 without one.
 /// out: receives the grains, to be destroyed with frz_grains_destroy; NULL after a failure.
 ///
 /// One thread at a time for each context.
@@ -201,7 +201,7 @@ pub unsafe extern "C" fn frz_grains_create(
     restart_bytes: usize,
     out: *mut *mut frz_grains,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let defaults = frz_grains_params::defaults();
@@ -219,20 +219,20 @@ pub unsafe extern "C" fn frz_grains_create(
     }
 }
 
-/// Destroys grains; NULL is fine.
+/// Destroys grains; NULL is ignored.
 ///
-/// grains: may be NULL. Not while a call uses them: they then stay.
+/// grains: may be NULL. They are not destroyed while a call uses them.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_grains_destroy(grains: *mut frz_grains) {
-    // SAFETY: the grains are NULL or were not destroyed.
+    // SAFETY: the grains are NULL or alive.
     guard(|| unsafe { destroy(grains) });
 }
 
 /// Sets how grains behave from the next step on. All parameters but the radius may change between steps.
 ///
-/// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+/// params: the new parameters. FRZ_ERROR_ARGUMENT names a field that is out of range, and its range; the old ones are then kept.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -241,7 +241,7 @@ pub unsafe extern "C" fn frz_grains_set_params(
     params: *const frz_grains_params,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut grains = change(grains)?;
             let params = sized(params, frz_grains_params::defaults())?;
@@ -252,24 +252,22 @@ pub unsafe extern "C" fn frz_grains_set_params(
     })
 }
 
-/// Moves grains through a step, with those that are born of what the base layer's last step removed.
+/// Moves grains through a step, and adds those born from the snow that the base layer's last step removed.
 ///
-/// Call it once after each frz_base_step, with the same bodies, dt and frame. The layer has kept the blocks that its step
-/// changed, as they were: nothing else of it is compared or copied. After a failure or a cancel the grains are as they were
-/// before.
+/// Call it once after each frz_base_step, with the same bodies, dt and frame. The layer has kept the previous state of the blocks that its
+/// step changed; nothing else of it is compared or copied. After a failure or a cancel the grains are as they were before.
 ///
-/// base: the layer after its step; it is only read. Its voxels must suit the radius: FRZ_ERROR_ARGUMENT. A layer that has not
-///     stepped since it was made or restored removed nothing. NULL: there is none.
-/// bodies: count bodies that push the grains, each with its friction; NULL with a count of 0. Those that do not move have
-///     no positions_end. Holes of less than a tenth of a mesh's area are closed; of a mesh that is open wider both sides collide.
-///     A warning says so. A body with a vertex that moves at over 100 m/s is taken to jump: it stands at positions_end for the whole
-///     step and carries no grains along, with a warning. A vertex farther than 1e6 m from the origin along an axis is
-///     FRZ_ERROR_ARGUMENT.
+/// base: the layer after its step; it is only read. Its voxels must suit the radius, else FRZ_ERROR_ARGUMENT. A layer that has not stepped
+///     since it was created or restored removed nothing. NULL: there is none.
+/// bodies: count bodies that push the grains, each with its friction; NULL with a count of 0. Bodies that do not move have no
+///     positions_end. Holes of less than a tenth of a mesh's area are closed; a mesh with wider ones collides on both sides. A warning says
+///     so. A body with a vertex that moves faster than 100 m/s is treated as jumping: it stands at positions_end for the whole step and
+///     carries no grains along, with a warning. A vertex farther than 1e6 m from the origin along an axis is FRZ_ERROR_ARGUMENT.
 /// count: number of bodies.
-/// dt: length of the step (s), 1e-6 to 3600. 0: nothing is born and nothing moves, as the first frame of a shot wants it:
-///     what bodies cut out there was gone before.
-/// frame: becomes the source frame of the grains that are born.
-/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// dt: length of the step (s), 1e-6 to 3600. 0: nothing is born and nothing moves, as the first frame of a shot requires: the snow that
+///     bodies cut out there was gone before the shot.
+/// frame: the source frame of the grains that are born.
+/// report: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///
 /// One thread at a time; any number may read a base layer, but none may step it meanwhile (FRZ_ERROR_BUSY).
 #[unsafe(no_mangle)]
@@ -283,7 +281,7 @@ pub unsafe extern "C" fn frz_grains_step(
     frame: i32,
     report: *mut frz_grains_report,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         stepped(context, grains, report, |ctx, grains| {
             if base.is_null() {
@@ -296,11 +294,11 @@ pub unsafe extern "C" fn frz_grains_step(
     }
 }
 
-/// Moves grains through a step, with those that are born of the snow that lies in one grid and no more in another: as
-/// frz_grains_step, for a host whose base layer is its own, or that has its states only. The grains are the same, bit for
-/// bit, but all blocks of both grids are compared.
+/// Moves grains through a step, and adds those born from the snow that is in one grid but no longer in another: as frz_grains_step, for a
+/// host that has a base layer of its own, or only its states. The grains are the same, bit for bit, but all blocks of both grids are
+/// compared.
 ///
-/// before: the snow before the base layer's step, a level set with voxels fixed in the world; NULL: nothing was removed.
+/// before: the snow before the base layer's step, a level set with voxels fixed in world space; NULL: nothing was removed.
 /// after: the snow after it, with which grains collide; a level set with voxels of the same size.
 /// bodies: as for frz_grains_step.
 /// count: as for frz_grains_step.
@@ -321,7 +319,7 @@ pub unsafe extern "C" fn frz_grains_step_grids(
     frame: i32,
     report: *mut frz_grains_report,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         stepped(context, grains, report, |ctx, grains| {
             let after = read(after)?;
@@ -346,7 +344,7 @@ pub unsafe extern "C" fn frz_grains_step_grids(
 /// A step with its report, which is zero after a failure.
 ///
 /// # Safety
-/// The pointers must be NULL or the caller's.
+/// The pointers must be NULL or valid.
 unsafe fn stepped(
     context: *mut frz_context,
     grains: *mut frz_grains,
@@ -354,7 +352,7 @@ unsafe fn stepped(
     step: impl FnOnce(&Context, &mut Heap) -> Outcome<frz_grains_report>,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe {
             if !report.is_null() {
                 fill(report, None, frz_grains_report::NOTHING)?;

@@ -1,4 +1,4 @@
-//! How grains behave, in C's terms.
+//! Parameters of grains, in C.
 
 use crate::capi::ffi::guard::{Outcome, frz_status, guard};
 use crate::capi::ffi::handle::required;
@@ -8,62 +8,62 @@ use crate::geometry::DVec3;
 use crate::snow::grains::Params;
 use crate::snow::{grain_cohesion, grain_friction};
 
-/// Flag of parameters of grains: a level ground lies at frz_grains_params.floor.
+/// Flag of frz_grains_params: there is a level ground at frz_grains_params.floor.
 pub const FRZ_GRAINS_FLOOR: u32 = 1;
 
-/// Flag of parameters of grains: they never come to rest.
+/// Flag of frz_grains_params: grains never come to rest.
 pub const FRZ_GRAINS_RESTLESS: u32 = 2;
 
-/// Flag of parameters of grains: those outside of frz_grains_params.keep_low and keep_high are taken away.
+/// Flag of frz_grains_params: grains outside the box from frz_grains_params.keep_low to keep_high are removed.
 pub const FRZ_GRAINS_BOX: u32 = 4;
 
-/// Flag of parameters of grains: those among others feel less of the air than those of a thin spray.
+/// Flag of frz_grains_params: grains among others feel less of the air than those of a thin spray.
 pub const FRZ_GRAINS_AIR_BY_DENSITY: u32 = 8;
 
-/// How snow becomes grains and how they behave. All of it but the radius may change between steps.
+/// How snow becomes grains and how they behave. All parameters but the radius may change between steps.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_grains_params {
     /// sizeof(frz_grains_params).
     pub struct_size: u32,
-    /// 0, or some of FRZ_GRAINS_FLOOR, FRZ_GRAINS_RESTLESS, FRZ_GRAINS_BOX and FRZ_GRAINS_AIR_BY_DENSITY.
+    /// 0, or any of FRZ_GRAINS_FLOOR, FRZ_GRAINS_RESTLESS, FRZ_GRAINS_BOX and FRZ_GRAINS_AIR_BY_DENSITY.
     pub flags: u32,
-    /// Radius of a grain (m), 1e-5 to 1; at a base layer from 0.02 to 0.5 of its voxel. A third of the voxel gives the
-    /// thesis' look, and is usual for voxels of 1 cm.
+    /// Radius of a grain (m), 1e-5 to 1; with a base layer 0.02 to 0.5 of its voxel. A third of the voxel gives the thesis' look; default:
+    /// that for voxels of 1 cm.
     pub radius: f64,
-    /// Share of the removed snow that is pressed together and becomes no grains, 0 to 1; 0.75 is usual.
+    /// Share of the removed snow that is compressed and becomes no grains, 0 to 1; default 0.75.
     pub compression: f64,
-    /// Friction between grains, 0 to 1; as they do not turn, 0.14, the usual one, already holds a slope of 32 degrees. Where
-    /// they attract each other, 0.26 does. On the base layer they lie up to the same slope.
+    /// Friction between grains, 0 to 1; default 0.14. As grains do not rotate, 0.14 already holds a slope of 32 degrees; with attraction
+    /// 0.26 does. On the base layer they rest up to the same slope.
     pub friction: f64,
-    /// With which grains that all but touch hold each other (weights of a grain), 0 to 1000; 0 is usual.
+    /// Force with which grains that almost touch hold each other (weights of a grain), 0 to 1000; default 0.
     pub attraction: f64,
-    /// Share of their speed with which grains bounce off, 0 to 1; 0 is usual.
+    /// Share of their speed with which grains bounce off, 0 to 1; default 0.
     pub restitution: f64,
-    /// Share of its velocity that a grain keeps in a second, 0 to 1; 0.5 is usual.
+    /// Share of its velocity that a grain keeps in a second, 0 to 1; default 0.5.
     pub air: f64,
-    /// Gravity along y (m/s2), -1000 to 1000; -9.81 is usual.
+    /// Gravity along y (m/s2), -1000 to 1000; default -9.81.
     pub gravity: f64,
-    /// Height of a level ground (m), -1e6 to 1e6; only with FRZ_GRAINS_FLOOR. 0 is usual.
+    /// Height of a level ground (m), -1e6 to 1e6; only with FRZ_GRAINS_FLOOR. Default 0.
     pub floor: f64,
-    /// Grains below this height (m) are dropped at the end of a step; -1e6 is usual, and far below all that grains reach.
+    /// Grains below this height (m) are removed at the end of a step; default -1e6, far below all that grains reach.
     pub lowest: f64,
-    /// Least and greatest position (m) of a box outside of which grains are dropped; only with FRZ_GRAINS_BOX. 0 is usual.
+    /// Minimum corner (m) of a box outside of which grains are removed; only with FRZ_GRAINS_BOX. Default 0.
     pub keep_low: [f64; 3],
-    /// See keep_low.
+    /// Its maximum corner (m); default 0.
     pub keep_high: [f64; 3],
-    /// Seconds after which a grain is taken away, counted by the frames of its birth and of the step; 0, as is usual: it stays.
+    /// Seconds after which a grain is removed, counted by the frames of its birth and of the step; default 0: never.
     pub lifetime: f64,
-    /// Most grains, 1 to 60000000: a step or an emission that would make more fails. 20000000 is usual.
+    /// Maximum number of grains, 1 to 60000000: a step or an emission that would exceed it fails. Default 20000000.
     pub max_grains: u64,
-    /// Another one scatters the grains of removed snow otherwise; 0 is usual.
+    /// Seed of the scatter of grains in removed snow; default 0.
     pub seed: u64,
-    /// Sub-steps of a step, 1 to 1000; 0, as is usual: as many as sizes, times and speeds need.
+    /// Number of sub-steps of a step, 1 to 1000; default 0: as many as sizes, times and speeds need.
     pub sub_steps: u32,
-    /// 0.
+    /// Must be 0.
     pub reserved: u32,
-    /// Distance (m) from objects and fast grains beyond which slow grains rest at once, 1e-5 to 1e5; 0, as is usual: they lie still
-    /// first, wherever they are. It has no effect with FRZ_GRAINS_RESTLESS.
+    /// Distance (m) from objects and fast grains beyond which slow grains rest at once, 1e-5 to 1e5; default 0: grains everywhere must lie
+    /// still before they rest. It has no effect with FRZ_GRAINS_RESTLESS.
     pub active_distance: f64,
 }
 
@@ -74,11 +74,11 @@ unsafe impl Sized32 for frz_grains_params {
     const NAME: &'static str = "frz_grains_params";
 }
 
-/// Farthest from 0 (m) of the ground.
+/// Maximum height of the ground above or below 0 (m).
 pub(in crate::capi) const FARTHEST: f64 = 1.0e6;
 
 impl frz_grains_params {
-    /// Those of the library, for voxels of 1 cm.
+    /// The library's defaults, for voxels of 1 cm.
     pub(in crate::capi) fn defaults() -> Self {
         let defaults = Params::for_cell(0.01);
         Self {
@@ -104,7 +104,7 @@ impl frz_grains_params {
         }
     }
 
-    /// The library's own parameters; what is out of range is named.
+    /// The library's own parameters; an error names a field that is out of range.
     pub(in crate::capi) fn params(&self) -> Outcome<Params> {
         let known = FRZ_GRAINS_FLOOR | FRZ_GRAINS_RESTLESS | FRZ_GRAINS_BOX | FRZ_GRAINS_AIR_BY_DENSITY;
         no_flags(self.flags, known)?;
@@ -148,23 +148,23 @@ impl frz_grains_params {
     }
 }
 
-/// Fills parameters with the usual values, those of the thesis' look for voxels of 1 cm.
+/// Fills parameters with the defaults, those of the thesis' look for voxels of 1 cm.
 ///
-/// params: receives them.
+/// params: receives the defaults.
 /// size: sizeof(frz_grains_params).
 ///
 /// Any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_grains_params_init(params: *mut frz_grains_params, size: usize) -> frz_status {
-    // SAFETY: the parameters are NULL or have so many bytes.
+    // SAFETY: the parameters are NULL or have `size` bytes.
     guard(|| unsafe { fill(params, Some(size), frz_grains_params::defaults()) })
 }
 
-/// Sets the friction and the attraction of parameters from what can be measured of snow.
+/// Sets friction and attraction of parameters from measurable properties of snow.
 ///
 /// params: friction and attraction are set, for grains of its radius.
 /// repose_angle_deg: slope at which a poured pile comes to rest (degrees), 0 to 42.
-/// stands: height of a wall of grains that just stands (m), 0 to 1000; up to 64 diameters it was measured. 0: no attraction.
+/// stands: height of a wall of grains that just stands (m), 0 to 1000; measured up to 64 diameters. 0: no attraction.
 ///
 /// Any thread.
 #[unsafe(no_mangle)]
@@ -177,7 +177,7 @@ pub unsafe extern "C" fn frz_grains_params_of_snow(
         within("repose_angle_deg", repose_angle_deg, 0.0..=grain_friction::STEEPEST, " degrees")?;
         within("stands", stands, 0.0..=1000.0, " m")?;
         let to = required(params, "params")?;
-        // SAFETY: the parameters are the caller's, checked for their size.
+        // SAFETY: the parameters are valid, and their size was checked.
         unsafe {
             let mut now = sized(to.cast_const(), frz_grains_params::defaults())?;
             now.params()?;

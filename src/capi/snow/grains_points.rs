@@ -1,4 +1,4 @@
-//! What goes into grains and comes out of them: loose grains, attributes, saved states.
+//! Input and output of grains: loose grains, attributes, saved states.
 
 use std::ffi::c_void;
 
@@ -10,27 +10,27 @@ use crate::capi::runtime::context::{enter, frz_context};
 use crate::geometry::DVec3;
 use crate::snow::grains::memory;
 
-/// What frz_grains_read reads of each grain; in brackets its usual name as an attribute.
+/// Attributes that frz_grains_read copies; the customary attribute name is in brackets.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_grains_attribute {
     /// float[3]: its position (P, m).
     FRZ_GRAINS_POSITION = 0,
-    /// double[3]: its position (m), as exactly as it is known: also far from the origin.
+    /// double[3]: its position (m) in full precision, also far from the origin.
     FRZ_GRAINS_POSITION_DOUBLE = 1,
     /// float[3]: its velocity (v, m/s).
     FRZ_GRAINS_VELOCITY = 2,
-    /// int64_t: its number (id), counted from 0 in the order of birth; it keeps it, and no other grain ever has it.
+    /// int64_t: its id (id), counted from 0 in the order of birth; it never changes and is never reused.
     FRZ_GRAINS_ID = 3,
     /// float: its radius (pscale, m).
     FRZ_GRAINS_RADIUS = 4,
-    /// int32_t: the frame that frz_grains_step or frz_grains_emit was given when it was born (source_frame).
+    /// int32_t: the frame given to the frz_grains_step or frz_grains_emit that created it (source_frame).
     FRZ_GRAINS_SOURCE_FRAME = 5,
-    /// float[3]: its position when it was born (rest, m).
+    /// float[3]: its position at birth (rest, m).
     FRZ_GRAINS_REST = 6,
-    /// int32_t: 1 where it is awake, 0 where it rests (active).
+    /// int32_t: 1 if it is awake, 0 if it rests (active).
     FRZ_GRAINS_ACTIVE = 7,
-    /// int32_t: 1 where it is trapped: a surface that it is in and those around it leave it no room (trapped).
+    /// int32_t: 1 if it is trapped: a surface that it is in and those around it leave it no room (trapped).
     FRZ_GRAINS_TRAPPED = 8,
 }
 
@@ -48,14 +48,14 @@ const ATTRIBUTES: [(u32, frz_grains_attribute); 9] = [
     (8, FRZ_GRAINS_TRAPPED),
 ];
 
-/// Adds loose grains: debris, drift, snow that falls from a tree. They are there at once and move with the next step; those
-/// that overlap each other or an object are pushed apart.
+/// Adds loose grains: debris, drift, snow that falls from a tree. They exist at once and move with the next step; those that overlap each
+/// other or an object are pushed apart.
 ///
 /// positions: float[3] for each grain (m), finite, within 8388608 diameters of the origin along x and z and 65536 along y.
 /// velocities: float[3] for each grain (m/s), each component from -10000 to 10000; data NULL with a count of 0: at rest.
-/// frame: becomes their source frame.
-/// first: receives the id of the first new grain, the others follow it in the order of the positions; -1 where there are
-///     none, 0 after a failure; may be NULL.
+/// frame: their source frame.
+/// first: receives the id of the first new grain; the others follow in the order of the positions. -1 if there are none, 0 after a failure;
+///     may be NULL.
 ///
 /// After a failure no grain was added; the error names the first element at fault, counted from 0. One thread at a time.
 #[unsafe(no_mangle)]
@@ -68,7 +68,7 @@ pub unsafe extern "C" fn frz_grains_emit(
     first: *mut i64,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(first);
             let call = enter(context)?;
@@ -90,7 +90,7 @@ pub unsafe extern "C" fn frz_grains_emit(
     })
 }
 
-/// Reports how many grains there are.
+/// Reports the number of grains.
 ///
 /// count: receives their number; 0 after a failure.
 ///
@@ -98,7 +98,7 @@ pub unsafe extern "C" fn frz_grains_emit(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_grains_count(grains: *const frz_grains, count: *mut usize) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(count);
             let count = required(count, "count")?;
@@ -108,12 +108,10 @@ pub unsafe extern "C" fn frz_grains_count(grains: *const frz_grains, count: *mut
     })
 }
 
-/// Copies an attribute of all grains, in an order that all attributes share and that changes from step to step: ids tell
-/// which is which.
+/// Copies an attribute of all grains. All attributes have the same order, which changes from step to step: ids identify the grains.
 ///
-/// attribute: a frz_grains_attribute; it says of what type the elements are.
-/// dst: room for as many elements as frz_grains_count reports; FRZ_ERROR_CAPACITY when it is too little, and nothing is
-///     written.
+/// attribute: a frz_grains_attribute, which states the type of the elements.
+/// dst: room for as many elements as frz_grains_count reports; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
 ///
 /// Any number of threads may read grains.
 #[unsafe(no_mangle)]
@@ -124,7 +122,7 @@ pub unsafe extern "C" fn frz_grains_read(
 ) -> frz_status {
     guard(|| {
         let attribute = meaning("attribute", "frz_grains_attribute", attribute, &ATTRIBUTES)?;
-        // SAFETY: the grains are NULL or were not destroyed; the span is the caller's.
+        // SAFETY: the grains are NULL or alive; the span is valid.
         unsafe {
             let heap = read(grains)?;
             let grains = &heap.grains;
@@ -155,12 +153,12 @@ pub unsafe extern "C" fn frz_grains_read(
     })
 }
 
-/// Writes all that the next step depends on, besides the parameters, the base layer and the bodies: for a host's own cache.
-/// The bytes are the same on any number of threads.
+/// Saves all that the next step depends on besides the parameters, the base layer and the bodies, for a host's own cache. The bytes are the
+/// same on any number of threads.
 ///
-/// dst: room for capacity bytes. NULL: size receives their number, and nothing is written.
-/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
-/// size: receives the bytes that were written, or are needed; 0 after other failures.
+/// dst: room for capacity bytes. NULL: only the size is reported.
+/// capacity: size of dst (bytes). FRZ_ERROR_CAPACITY if it is too small.
+/// size: receives the number of bytes written, or needed; 0 after other failures.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -172,7 +170,7 @@ pub unsafe extern "C" fn frz_grains_save(
     size: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(size);
             required(size, "size")?;

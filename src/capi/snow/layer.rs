@@ -1,4 +1,4 @@
-//! Snow before anything moves.
+//! The layer of snow before anything moves.
 
 use crate::capi::ffi::guard::{Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{Reading, read};
@@ -16,15 +16,15 @@ use crate::sweep::surface_bytes;
 pub struct frz_snow_desc {
     /// sizeof(frz_snow_desc).
     pub struct_size: u32,
-    /// 0.
+    /// Must be 0.
     pub flags: u32,
     /// Edge of a voxel (m), 1e-6 to 1000.
     pub voxel_size: f64,
-    /// Half width of the band of distances on each side (voxels), 3 to 64.
+    /// Half width of the band of distances (voxels), 3 to 64.
     pub half_width: f64,
     /// Vertical depth above the ground and above static objects (m), above 0; not used with a top.
     pub depth: f64,
-    /// The snow's top surface; the space between it and the ground is snow. NULL: the depth is used.
+    /// The top surface of the snow; the space between it and the ground is snow. NULL: depth is used.
     pub top: *const frz_mesh,
     /// The ground, a surface or a solid; NULL: a horizontal rectangle.
     pub ground: *const frz_mesh,
@@ -32,7 +32,7 @@ pub struct frz_snow_desc {
     pub ground_height: f64,
     /// x0, z0, x1, z1 of the rectangle (m), x0 < x1, z0 < z1.
     pub area: [f64; 4],
-    /// Objects that do not move and that snow lies on: pointers to solids; NULL for none.
+    /// Pointers to static objects that snow lies on, each a solid; NULL for none.
     pub statics: *const *const frz_mesh,
     /// Number of static objects.
     pub static_count: usize,
@@ -67,19 +67,19 @@ struct Pointer(*const frz_mesh);
 // SAFETY: a pointer, which is followed only as a handle.
 unsafe impl Plain for Pointer {}
 
-/// Fills a description with the usual values: voxels of 1 cm, 0.3 m of snow on a square of 2 m at y = 0.
+/// Fills a description with the defaults: voxels of 1 cm, 0.3 m of snow on a square of 2 m at y = 0.
 ///
-/// desc: receives them.
+/// desc: receives the defaults.
 /// size: sizeof(frz_snow_desc).
 ///
 /// Any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_snow_desc_init(desc: *mut frz_snow_desc, size: usize) -> frz_status {
-    // SAFETY: the description is NULL or has so many bytes.
+    // SAFETY: the description is NULL or has `size` bytes.
     guard(|| unsafe { fill(desc, Some(size), frz_snow_desc::USUAL) })
 }
 
-/// Makes a layer of snow as a level set named "surface", for frz_base_create.
+/// Creates a layer of snow as a level set named "surface", for frz_base_create.
 ///
 /// desc: its ground and depth. Y is up.
 /// out: receives the grid, to be destroyed with frz_grid_destroy; NULL after a failure.
@@ -91,7 +91,7 @@ pub unsafe extern "C" fn frz_snow_layer(
     desc: *const frz_snow_desc,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let desc = sized(desc, frz_snow_desc::USUAL)?;
@@ -125,7 +125,7 @@ pub unsafe extern "C" fn frz_snow_layer(
     }
 }
 
-/// Surface (m2) of the layer: its bottom and its top.
+/// Surface area (m2) of the layer: bottom and top.
 fn surfaces(ground: &Ground, cover: &Cover, statics: &[TriMesh]) -> f64 {
     let ground = match ground {
         Ground::Plane { area: [x0, z0, x1, z1], .. } => ((x1 - x0) * (z1 - z0)).abs(),

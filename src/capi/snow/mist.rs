@@ -33,17 +33,17 @@ pub struct frz_mist_report {
     pub struct_size: u32,
     /// Sub-steps that the step was divided into.
     pub sub_steps: u32,
-    /// Cells of air now.
+    /// Cells of air after the step.
     pub cells: u64,
     /// Grains that raised mist.
     pub sources: u64,
-    /// Iterations of all projections.
+    /// Iterations of all projections together.
     pub iterations: u64,
-    /// Sum of the density, times the volume of a cell (m3).
+    /// Sum of the density times the volume of a cell (m3).
     pub mass: f64,
-    /// Greatest divergence times the cell that a projection left, over the greatest speed before it.
+    /// Maximum divergence left by a projection, times the cell, over the maximum speed before it.
     pub divergence: f64,
-    /// Greatest speed of the air on any axis (m/s).
+    /// Maximum speed of the air along any axis (m/s).
     pub fastest: f64,
 }
 
@@ -80,14 +80,14 @@ impl Noun for frz_mist {
     const TAG: u32 = 0x6672_7a07;
 }
 
-/// Shortest and longest step (s).
+/// Minimum and maximum length of a step (s).
 const SHORTEST: f64 = 1.0e-6;
 /// As above.
 const LONGEST: f64 = 3600.0;
-/// Farthest time from 0 (s).
+/// Maximum distance of a time from 0 (s).
 const LATEST: f64 = 1.0e9;
 
-/// What a step takes besides grains.
+/// Inputs of a step besides grains.
 pub(in crate::capi) struct Scene<'a> {
     pub snow: Option<&'a FloatGrid>,
     pub wind: Option<&'a VectorGrid>,
@@ -111,7 +111,7 @@ impl Air {
         within("dt", dt, SHORTEST..=LONGEST, " s")?;
         within("time", time, -LATEST..=LATEST, " s")?;
         let mut shapes = std::mem::take(&mut self.shapes);
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let bodies = unsafe { bodies(ctx, list, count, dt, Role::Bound, &mut shapes) };
         self.shapes = shapes;
         let bodies = bodies?;
@@ -143,12 +143,12 @@ impl Air {
     }
 }
 
-/// Makes mist: none yet, or that of a state that frz_mist_save wrote.
+/// Creates mist: none yet, or that of a state that frz_mist_save wrote.
 ///
-/// params: NULL for the usual ones.
-/// restart: restart_bytes bytes of frz_mist_save of mist with the same cell and wind: it comes back bit for bit, on any
-///     number of threads. NULL: none. Bytes that are damaged, of another version, cell or wind are FRZ_ERROR_FILE.
-/// restart_bytes: 0 without a restart.
+/// params: NULL for the defaults.
+/// restart: restart_bytes bytes that frz_mist_save wrote for mist with the same cell and wind: it is restored bit for bit, on any number of
+///     threads. NULL: none. FRZ_ERROR_FILE if they are damaged, or of another version, cell or wind.
+/// restart_bytes: size of restart; 0 without one.
 /// out: receives the mist, to be destroyed with frz_mist_destroy; NULL after a failure.
 ///
 /// One thread at a time for each context.
@@ -160,7 +160,7 @@ pub unsafe extern "C" fn frz_mist_create(
     restart_bytes: usize,
     out: *mut *mut frz_mist,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let defaults = frz_mist_params::defaults();
@@ -177,20 +177,20 @@ pub unsafe extern "C" fn frz_mist_create(
     }
 }
 
-/// Destroys mist; NULL is fine.
+/// Destroys mist; NULL is ignored.
 ///
-/// mist: may be NULL. Not while a call uses it: it then stays.
+/// mist: may be NULL. It is not destroyed while a call uses it.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_mist_destroy(mist: *mut frz_mist) {
-    // SAFETY: the mist is NULL or was not destroyed.
+    // SAFETY: the mist is NULL or alive.
     guard(|| unsafe { destroy(mist) });
 }
 
 /// Sets how mist behaves from the next step on. All parameters but the cell and the wind may change between steps.
 ///
-/// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+/// params: the new parameters. FRZ_ERROR_ARGUMENT names a field that is out of range, and its range; the old ones are then kept.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -199,7 +199,7 @@ pub unsafe extern "C" fn frz_mist_set_params(
     params: *const frz_mist_params,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut air = change(mist)?;
             let params = sized(params, frz_mist_params::defaults())?;
@@ -210,25 +210,25 @@ pub unsafe extern "C" fn frz_mist_set_params(
     })
 }
 
-/// Moves mist through a step, with what fast grains raise along their paths in it.
+/// Moves mist through a step, and adds what fast grains raise along their paths.
 ///
-/// Mist is raised along the paths of the grains from where their last step began, or where it created them: it is the same at every
-/// frame rate.
+/// The paths of grains begin at their positions at the beginning of their last step, or where they were born in it: mist is the same at
+/// every frame rate.
 ///
-/// Call it once after each frz_grains_step, with the same base layer, bodies and dt, but not at the first frame of a shot, with a
-/// dt of 0: nothing moved before it. After a failure or a cancel the mist is as it was before.
+/// Call it once after each frz_grains_step, with the same base layer, bodies and dt, but not at the first frame of a shot, with a dt of 0:
+/// nothing moved before it. After a failure or a cancel the mist is as it was before.
 ///
 /// grains: the grains after their step; they are only read. NULL: none raise mist.
 /// base: the layer after its step, around which the air flows; it is only read. NULL: there is none.
-/// wind: a grid of velocities (m/s) that the air where there is mist takes on, half of the difference in a tenth of a second;
-///     a component that is not within 1000 m/s of 0 where there is air is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
-/// bodies: count bodies that bound the air and carry it along; NULL with a count of 0. Those that do not move have no
-///     positions_end. Of a body that is open wider than a tenth of its area the air flows around both sides. One with a vertex that
-///     moves at over 100 m/s is taken to jump: it stands at positions_end for the whole step.
+/// wind: a grid of velocities (m/s) towards which the air moves where there is mist, by half of the difference in a tenth of a second; a
+///     component that is not within 1000 m/s of 0 where there is air is FRZ_ERROR_ARGUMENT. NULL: only frz_mist_params.wind.
+/// bodies: count bodies that bound the air and carry it along; NULL with a count of 0. Bodies that do not move have no positions_end. If
+///     the openings of a body exceed a tenth of its area, air flows around both of its sides. A body with a vertex that moves faster than
+///     100 m/s is treated as jumping: it stands at positions_end for the whole step.
 /// count: number of bodies.
-/// time: of the step's beginning (s), -1e9 to 1e9: eddies change with it.
+/// time: time at the beginning of the step (s), -1e9 to 1e9: eddies change with it.
 /// dt: length of the step (s), 1e-6 to 3600.
-/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// report: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///
 /// One thread at a time; any number may read a base layer, grains and a grid, but none may change them meanwhile (FRZ_ERROR_BUSY).
 #[unsafe(no_mangle)]
@@ -244,7 +244,7 @@ pub unsafe extern "C" fn frz_mist_step(
     dt: f64,
     report: *mut frz_mist_report,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         stepped(context, mist, report, |ctx, air| {
             let grains = read_some(grains)?;
@@ -288,7 +288,7 @@ fn before(ctx: &Context, layer: &BaseLayer) -> Outcome<FloatGrid> {
 /// A step with its report, which is zero after a failure.
 ///
 /// # Safety
-/// The pointers must be NULL or the caller's.
+/// The pointers must be NULL or valid.
 pub(in crate::capi) unsafe fn stepped(
     context: *mut frz_context,
     mist: *mut frz_mist,
@@ -296,7 +296,7 @@ pub(in crate::capi) unsafe fn stepped(
     step: impl FnOnce(&Context, &mut Air) -> Outcome<frz_mist_report>,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe {
             if !report.is_null() {
                 fill(report, None, frz_mist_report::NOTHING)?;
@@ -309,13 +309,13 @@ pub(in crate::capi) unsafe fn stepped(
     })
 }
 
-/// What frz_mist_grid makes a grid of.
+/// Fields that frz_mist_grid returns.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_mist_field {
-    /// Floats: the density of the mist, a fog; active where there is some. It is called "density".
+    /// Floats: the density of the mist, a fog; active where there is some. The grid is named "density".
     FRZ_MIST_DENSITY = 0,
-    /// Vectors: the velocity of the air (m/s) at the cells' centres, where blocks hold mist. It is called "vel".
+    /// Vectors: the velocity of the air (m/s) at the cells' centres, in blocks that hold mist. The grid is named "vel".
     FRZ_MIST_VELOCITY = 1,
 }
 
@@ -323,10 +323,10 @@ use frz_mist_field::*;
 
 const FIELDS: [(u32, frz_mist_field); 2] = [(0, FRZ_MIST_DENSITY), (1, FRZ_MIST_VELOCITY)];
 
-/// Makes a grid of the mist, whose voxels are its cells: the centre of voxel (0, 0, 0) lies at half a cell on each axis.
+/// Creates a grid of the mist, whose voxels are its cells: the centre of voxel (0, 0, 0) lies at half a cell on each axis.
 ///
 /// field: a frz_mist_field.
-/// out: receives the grid, the caller's own, to be destroyed with frz_grid_destroy; NULL after a failure.
+/// out: receives the grid, owned by the caller, to be destroyed with frz_grid_destroy; NULL after a failure.
 ///
 /// One thread at a time for each context; any number may read mist.
 #[unsafe(no_mangle)]
@@ -336,7 +336,7 @@ pub unsafe extern "C" fn frz_mist_grid(
     field: u32,
     out: *mut *mut frz_grid,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let field = meaning("field", "frz_mist_field", field, &FIELDS)?;
@@ -350,12 +350,12 @@ pub unsafe extern "C" fn frz_mist_grid(
     }
 }
 
-/// Writes all that the next step depends on, besides the parameters and what is around: for a host's own cache. The bytes
-/// are the same on any number of threads.
+/// Saves all that the next step depends on besides the parameters and the surroundings, for a host's own cache. The bytes are the same on
+/// any number of threads.
 ///
-/// dst: room for capacity bytes. NULL: size receives their number, and nothing is written.
-/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
-/// size: receives the bytes that were written, or are needed; 0 after other failures.
+/// dst: room for capacity bytes. NULL: only the size is reported.
+/// capacity: size of dst (bytes). FRZ_ERROR_CAPACITY if it is too small.
+/// size: receives the number of bytes written, or needed; 0 after other failures.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -367,7 +367,7 @@ pub unsafe extern "C" fn frz_mist_save(
     size: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(size);
             required(size, "size")?;

@@ -1,17 +1,17 @@
-//! How mist behaves, in C's terms.
+//! Parameters of mist, in C.
 
 use crate::capi::ffi::guard::{Outcome, frz_status, guard};
 use crate::capi::ffi::views::{Sized32, fill, finite, within};
 use crate::capi::mesh::triangles::no_flags;
 use crate::snow::mist::Params;
 
-/// Flag of parameters of mist: falling grains raise it too.
+/// Flag of frz_mist_params: falling grains raise mist too.
 pub const FRZ_MIST_FALLING: u32 = 1;
 
-/// Flag of parameters of mist: a level ground lies at frz_mist_params.floor.
+/// Flag of frz_mist_params: there is a level ground at frz_mist_params.floor.
 pub const FRZ_MIST_FLOOR: u32 = 2;
 
-/// How grains raise mist and how it behaves. All of it but the cell and the wind may change between steps.
+/// How grains raise mist and how it behaves. All parameters but the cell and the wind may change between steps.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_mist_params {
@@ -21,29 +21,29 @@ pub struct frz_mist_params {
     pub flags: u32,
     /// Edge of a cell of air (m), 1e-5 to 100; 4/3 of the base layer's voxel gives the thesis' look.
     pub cell: f64,
-    /// Speed (m/s) over which grains raise mist, 0 to 1000; 2 is usual.
+    /// Speed (m/s) above which grains raise mist, 0 to 1000; default 2.
     pub from_speed: f64,
-    /// Of the air where there is mist, along y (m/s2), -1000 to 1000; -2 is usual.
+    /// Gravity on the air where there is mist, along y (m/s2), -1000 to 1000; default -2.
     pub gravity: f64,
-    /// Time (s) in which half of the mist dissipates, above 0; infinite: it stays. 1 is usual.
+    /// Time (s) in which half of the mist dissipates, above 0; infinite: it stays. Default 1.
     pub half_life: f64,
-    /// Velocity of the air (m/s), each component -1000 to 1000; 0 is usual.
+    /// Velocity of the air (m/s), each component -1000 to 1000; default 0.
     pub wind: [f64; 3],
-    /// Acceleration by eddies (m/s2, root mean square), 0 to 1000; 0, as is usual: none.
+    /// Acceleration by eddies (m/s2, root mean square), 0 to 1000; default 0: none.
     pub turbulence: f64,
-    /// Size of the eddies (m), at least 8 cells; 24 cells are usual.
+    /// Size of the eddies (m), at least 8 cells; default 24 cells.
     pub turbulence_size: f64,
-    /// Strength with which small eddies are kept alive (1/s), 0 to 100; 0, as is usual: not at all.
+    /// Strength with which small eddies are kept alive (1/s), 0 to 100; default 0: not at all.
     pub confinement: f64,
-    /// Share of the density of new mist that noise takes away at most, 0 to 1; 0.3 is usual.
+    /// Maximum share of the density of new mist that noise removes, 0 to 1; default 0.3.
     pub noise: f64,
-    /// Size of that noise (m), at least a cell; 4 cells are usual.
+    /// Size of that noise (m), at least a cell; default 4 cells.
     pub noise_size: f64,
-    /// Height of a level ground (m), -1e6 to 1e6; only with FRZ_MIST_FLOOR. 0 is usual.
+    /// Height of a level ground (m), -1e6 to 1e6; only with FRZ_MIST_FLOOR. Default 0.
     pub floor: f64,
-    /// Another one gives other noise and eddies; 0 is usual.
+    /// Seed of the noise and eddies; default 0.
     pub seed: i32,
-    /// Tiles of air, 8 cells wide, that are computed around the mist, 1 to 64; 1 is usual.
+    /// Width (tiles of 8 cells) of the air that is computed around the mist, 1 to 64; default 1.
     pub padding: u32,
 }
 
@@ -53,13 +53,13 @@ unsafe impl Sized32 for frz_mist_params {
     const NAME: &'static str = "frz_mist_params";
 }
 
-/// Farthest from 0 (m) of the ground.
+/// Maximum height of the ground above or below 0 (m).
 const FARTHEST: f64 = 1.0e6;
-/// The usual cell (m): that for voxels of 1 cm.
+/// The default cell (m), for voxels of 1 cm.
 const USUAL: f64 = 0.01 * 4.0 / 3.0;
 
 impl frz_mist_params {
-    /// Those of the library, for voxels of 1 cm.
+    /// The library's defaults, for voxels of 1 cm.
     pub(in crate::capi) fn defaults() -> Self {
         let defaults = Params::for_cell(USUAL);
         Self {
@@ -81,7 +81,7 @@ impl frz_mist_params {
         }
     }
 
-    /// The library's own parameters; what is out of range is named.
+    /// The library's own parameters; an error names a field that is out of range.
     pub(in crate::capi) fn params(&self) -> Outcome<Params> {
         no_flags(self.flags, FRZ_MIST_FALLING | FRZ_MIST_FLOOR)?;
         finite("cell", self.cell)?;
@@ -106,21 +106,21 @@ impl frz_mist_params {
         Ok(params)
     }
 
-    /// Height of the ground (m), where there is a level one.
+    /// Height of the level ground (m), if there is one.
     pub(in crate::capi) fn ground(&self) -> Option<f64> {
         Some(self.floor).filter(|_| self.flags & FRZ_MIST_FLOOR != 0)
     }
 }
 
-/// Fills parameters with the usual values, those of the thesis' look for voxels of 1 cm. Another cell wants another
-/// turbulence_size and noise_size.
+/// Fills parameters with the defaults, those of the thesis' look for voxels of 1 cm. If you change cell, change turbulence_size and
+/// noise_size too.
 ///
-/// params: receives them.
+/// params: receives the defaults.
 /// size: sizeof(frz_mist_params).
 ///
 /// Any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_mist_params_init(params: *mut frz_mist_params, size: usize) -> frz_status {
-    // SAFETY: the parameters are NULL or have so many bytes.
+    // SAFETY: the parameters are NULL or have `size` bytes.
     guard(|| unsafe { fill(params, Some(size), frz_mist_params::defaults()) })
 }

@@ -1,4 +1,4 @@
-//! Mist that points of a host raise.
+//! Mist that a host's points raise.
 
 use super::grains::check_snow;
 use super::mist::{Scene, frz_mist, frz_mist_report, stepped};
@@ -10,17 +10,17 @@ use crate::capi::level_set::body::frz_body;
 use crate::capi::runtime::context::frz_context;
 use crate::snow::mist::{Source, Start};
 
-/// Moves mist through a step, with what points raise along their paths in it: as frz_mist_step, for a host whose grains or base
-/// layer are its own, or that has their files only.
+/// Moves mist through a step, and adds what points raise along their paths: as frz_mist_step, for a host that has grains or a base layer of
+/// its own, or only their files.
 ///
-/// Each point is taken to have moved at its velocity after the step for all of dt, also where it was hit or born in it: more mist is
-/// raised where points begin to fly, the more the longer steps are. A host that knows where points were calls frz_mist_step_paths.
+/// Each point is assumed to have moved at its final velocity for all of dt, even if it was hit or born during the step: where points begin
+/// to fly this raises more mist, the more the longer the steps. A host that knows where points were calls frz_mist_step_paths.
 ///
 /// positions: double[3] for each point at the step's end (m), finite, within 1e7 cells of the origin along each axis.
 /// velocities: float[3] for each point (m/s), finite.
 /// radius: of the points (m), above 0 and at most 64 cells.
-/// snow: a level set around which the air flows, with voxels fixed in the world, as it was before the layer's step, in which bodies
-///     move into it. NULL: there is none.
+/// snow: a level set around which the air flows, with voxels fixed in world space, before the layer's step, in which bodies move into it.
+///     NULL: there is none.
 /// wind: as for frz_mist_step.
 /// bodies: as for frz_mist_step.
 /// count: as for frz_mist_step.
@@ -44,18 +44,19 @@ pub unsafe extern "C" fn frz_mist_step_points(
     dt: f64,
     report: *mut frz_mist_report,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         let raised = || sources(&points(("positions", positions), ("velocities", velocities))?, None, radius);
         step_along(context, mist, report, raised, [snow, wind], (bodies, count), [time, dt])
     }
 }
 
-/// Moves mist through a step, with what points raise along their paths: as frz_mist_step_points, for a host that knows where points
+/// Moves mist through a step, and adds what points raise along their paths: as frz_mist_step_points, for a host that knows where points
 /// were before the step. The mist is that of frz_mist_step, bit for bit.
 ///
-/// positions_before: double[3] for each point at the step's beginning (m), as positions; that of its birth where it was born in it.
-/// velocities_before: float[3] for each point then (m/s), finite; 0 where it was born in the step.
+/// positions_before: double[3] for each point at the step's beginning (m), as positions; for a point born in the step its position at
+///     birth.
+/// velocities_before: float[3] for each point at the step's beginning (m/s), finite; 0 for a point born in the step.
 /// positions: as for frz_mist_step_points, of the same points in the same order.
 /// velocities: as for frz_mist_step_points.
 /// radius: as for frz_mist_step_points.
@@ -85,7 +86,7 @@ pub unsafe extern "C" fn frz_mist_step_paths(
     dt: f64,
     report: *mut frz_mist_report,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         let raised = || {
             let starts =
@@ -102,7 +103,7 @@ pub unsafe extern "C" fn frz_mist_step_paths(
     }
 }
 
-/// Moves mist through a step with what points raise.
+/// Moves mist through a step, and adds what points raise.
 ///
 /// # Safety
 /// As the functions above.
@@ -115,7 +116,7 @@ unsafe fn step_along(
     bodies: (*const frz_body, usize),
     [time, dt]: [f64; 2],
 ) -> frz_status {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         stepped(context, mist, report, |ctx, air| {
             let snow = read_some(snow)?;
@@ -128,7 +129,7 @@ unsafe fn step_along(
     }
 }
 
-/// Positions (m) and velocities (m/s) of points, which are named in messages.
+/// Positions (m) and velocities (m/s) of points; their names appear in messages.
 ///
 /// # Safety
 /// The views must describe memory that can be read.
@@ -136,7 +137,7 @@ unsafe fn points(
     (names, positions): (&str, frz_view),
     (of_velocities, velocities): (&str, frz_view),
 ) -> Outcome<Vec<Start>> {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let (positions, velocities) =
         unsafe { (positions.elements::<[f64; 3]>(names)?, velocities.elements::<[f32; 3]>(of_velocities)?) };
     if velocities.len() != positions.len() {
@@ -151,7 +152,7 @@ unsafe fn points(
     Ok(positions.iter().zip(&*velocities).map(point).collect())
 }
 
-/// Points of a radius (m) after a step as sources of mist, and where they were before it.
+/// Points of a radius (m) after a step as sources of mist, with their positions before it.
 fn sources(ends: &[Start], starts: Option<&[Start]>, radius: f64) -> Outcome<Vec<Source>> {
     within("radius", radius, f64::MIN_POSITIVE..=f64::MAX, " m")?;
     let source = |(index, end): (usize, &Start)| Source {

@@ -1,6 +1,6 @@
-//! Snow: the layer, what presses into it, grains and mist.
+//! Snow: the layer, bodies that press into it, grains and mist.
 
-// In the header's order.
+// In the order of the header.
 pub mod layer;
 
 pub mod base_layer;

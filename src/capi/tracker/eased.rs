@@ -1,4 +1,4 @@
-//! The mesh of a tracker as it is shown before the liquid merges or splits.
+//! The mesh of a tracker as it is displayed before the liquid merges or splits.
 
 use super::mesh::{frz_particles, frz_tracker, particles};
 use crate::capi::ffi::guard::{Failure, frz_status, guard};
@@ -7,23 +7,23 @@ use crate::capi::ffi::views::{finite, frz_span};
 use crate::capi::runtime::context::{enter, frz_context};
 use crate::surface::Particles;
 
-/// Most frames ahead.
+/// Maximum number of frames ahead.
 const MOST: usize = 100;
 
-/// Copies the positions of the mesh's vertices as they are shown: in the steps before the liquid merges or splits, the vertices that will
-/// be taken away already go towards what will be made, so that it does not pop up. With frz_tracker_params.rebuild only; else, and
-/// far from all changes, they are those of frz_tracker_read.
+/// Copies the displayed positions of the mesh's vertices. In the steps before the liquid merges or splits, vertices that will be removed
+/// already move towards the mesh that will replace them, so that the change does not pop. This needs frz_tracker_params.rebuild; without
+/// it, and far from any change, the positions are those of frz_tracker_read.
 ///
-/// The steps to come are made for it, and kept: frz_tracker_step with the same particles and dt then only takes over what is there, so
-/// that a step costs about as much as without. Each of them keeps its particles and a mesh, and where it changes that two more. The tracker itself stays as it is, and so do states that
-/// are saved.
+/// The coming steps are computed for this and kept: frz_tracker_step with the same particles and dt then only adopts the result, so that a
+/// step costs about as much as without easing. Each of these steps keeps its particles and a mesh, and two more meshes if it changes the
+/// mesh. The tracker and its saved states do not change.
 ///
-/// now: the particles at the last step's end, or at which the tracker began.
-/// coming: count pointers, to the particles of the frames to come, in their order, each dt after the one before; NULL where count is 0.
+/// now: the particles at the end of the last step, or those that the tracker was created with.
+/// coming: count pointers to the particles of the coming frames, in order, each dt after the previous one; NULL if count is 0.
 /// count: 0 to ahead; less than ahead where the shot ends.
-/// ahead: how many steps before a change vertices set out, 1 to 100; 4 is usual. The same in all frames.
+/// ahead: number of steps before a change in which vertices start to move, 1 to 100; 4 is a good value. The same in all frames.
 /// dt: time between frames (s), above 0.
-/// dst: room for as many double[3] as frz_tracker_count reports (m); FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+/// dst: room for as many double[3] as frz_tracker_count reports (m); FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -38,7 +38,7 @@ pub unsafe extern "C" fn frz_tracker_read_eased(
     dst: frz_span,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let call = enter(context)?;
             let mut follower = change(tracker)?;
@@ -73,8 +73,8 @@ pub unsafe extern "C" fn frz_tracker_read_eased(
 /// The particles of several frames.
 ///
 /// # Safety
-/// The pointer must be the caller's, to so many pointers to structures.
+/// The pointer must be valid for `count` pointers to structs.
 unsafe fn frames(first: *const *const frz_particles, count: usize) -> Result<Vec<Particles>, Failure> {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     (0..count).map(|frame| unsafe { particles(first.add(frame).read_unaligned()) }).collect()
 }

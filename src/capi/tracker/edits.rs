@@ -1,4 +1,4 @@
-//! The mesh of a tracker as it is now, and what the last step made of the one before.
+//! The current mesh of a tracker, and how the last step changed it.
 
 use super::mesh::{Follower, frz_tracker};
 use crate::capi::ffi::guard::{frz_status, guard};
@@ -8,13 +8,13 @@ use crate::geometry::DVec3;
 use crate::mesh_repair::Source;
 use crate::surface::Change;
 
-/// What a step made of the mesh.
+/// How a step changed the mesh.
 pub(in crate::capi) struct Edits {
-    /// For each vertex the one that it was; none: it was made.
+    /// For each vertex its index before the step; `None`: it is new.
     pub origins: Vec<Option<u32>>,
-    /// For each triangle where it comes from.
+    /// For each triangle its origin.
     pub sources: Vec<Source>,
-    /// Positions (m) to which the step took the vertices that there were.
+    /// Positions (m) to which the step took the previous vertices.
     pub before: Vec<DVec3>,
 }
 
@@ -25,18 +25,19 @@ impl From<Change> for Edits {
     }
 }
 
-/// What frz_tracker_read reads of each vertex: in the order of the mesh that the tracker was made with, until a step or frz_tracker_resculpt changes it.
+/// Vertex arrays that frz_tracker_read copies, in the order of the mesh that the tracker was created with until a step or
+/// frz_tracker_resculpt changes it.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_tracker_array {
     /// float[3]: its position (m).
     FRZ_TRACKER_POSITION = 0,
-    /// double[3]: its position (m), as exactly as it is known: also far from the origin. The next step's, less these, over dt are the
-    /// velocities for motion blur; where that step changes the mesh, FRZ_EDIT_BEFORE less these.
+    /// double[3]: its position (m) in full precision, also far from the origin. The next step's positions minus these, divided by dt, are
+    /// the velocities for motion blur; if that step changes the mesh, take FRZ_EDIT_BEFORE minus these.
     FRZ_TRACKER_POSITION_DOUBLE = 1,
     /// float: the distance that it keeps from the particles' surface (m), negative inside; NaN: it was too far away to have one.
     FRZ_TRACKER_DELTA = 2,
-    /// int32_t: 1 where the last step could not project it, or found surface beside it that the mesh does not cover; else 0.
+    /// int32_t: 1 if the last step could not project it, or found surface next to it that the mesh does not cover; else 0.
     FRZ_TRACKER_FLAGGED = 3,
 }
 
@@ -49,8 +50,8 @@ const ARRAYS: [(u32, frz_tracker_array); 4] = [
     (3, FRZ_TRACKER_FLAGGED),
 ];
 
-/// Reports how many vertices the mesh has: as many as the one that it was made with, until a step or frz_tracker_resculpt changes it
-/// (frz_tracker_params.rebuild).
+/// Reports the number of vertices of the mesh: that of the mesh that the tracker was created with, until a step
+/// (frz_tracker_params.rebuild) or frz_tracker_resculpt changes it.
 ///
 /// count: receives their number; 0 after a failure.
 ///
@@ -58,7 +59,7 @@ const ARRAYS: [(u32, frz_tracker_array); 4] = [
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_tracker_count(tracker: *const frz_tracker, count: *mut usize) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(count);
             let count = required(count, "count")?;
@@ -70,8 +71,8 @@ pub unsafe extern "C" fn frz_tracker_count(tracker: *const frz_tracker, count: *
 
 /// Copies an array of the mesh's vertices.
 ///
-/// array: a frz_tracker_array; it says of what type the elements are.
-/// dst: room for as many elements as frz_tracker_count reports; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+/// array: a frz_tracker_array, which states the type of the elements.
+/// dst: room for as many elements as frz_tracker_count reports; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
 ///
 /// Any number of threads may read a tracker.
 #[unsafe(no_mangle)]
@@ -82,7 +83,7 @@ pub unsafe extern "C" fn frz_tracker_read(
 ) -> frz_status {
     guard(|| {
         let array = meaning("array", "frz_tracker_array", array, &ARRAYS)?;
-        // SAFETY: the tracker is NULL or was not destroyed; the span is the caller's.
+        // SAFETY: the tracker is NULL or alive; the span is valid.
         unsafe {
             let follower = read(tracker)?;
             let tracker = &follower.tracker;
@@ -106,8 +107,8 @@ pub unsafe extern "C" fn frz_tracker_read(
     })
 }
 
-/// Reports how many triangles the mesh has: those that the faces of the one that it was made with were cut into, until a step
-/// changes it.
+/// Reports the number of triangles of the mesh: those into which the faces of the mesh that the tracker was created with were divided,
+/// until a step changes it.
 ///
 /// count: receives their number; 0 after a failure.
 ///
@@ -118,7 +119,7 @@ pub unsafe extern "C" fn frz_tracker_triangle_count(
     count: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(count);
             let count = required(count, "count")?;
@@ -128,11 +129,11 @@ pub unsafe extern "C" fn frz_tracker_triangle_count(
     })
 }
 
-/// Copies the mesh's triangles, counter-clockwise seen from outside. Until a step changes the mesh they are the FRZ_MESH_TRIANGLES of
-/// the one that it was made with; they have to be read anew where frz_tracker_report.changed is 1, and after frz_tracker_resculpt.
+/// Copies the mesh's triangles, counter-clockwise seen from outside. Until a step changes the mesh they are the FRZ_MESH_TRIANGLES of the
+/// mesh that the tracker was created with. Read them again if frz_tracker_report.changed is 1, and after frz_tracker_resculpt.
 ///
-/// dst: room for as many uint32_t[3] as frz_tracker_triangle_count reports, the vertices of each; FRZ_ERROR_CAPACITY when it is too
-///     little, and nothing is written.
+/// dst: room for as many uint32_t[3] as frz_tracker_triangle_count reports, the vertices of each; FRZ_ERROR_CAPACITY if it is too small,
+///     and nothing is written.
 ///
 /// Any number of threads may read a tracker.
 #[unsafe(no_mangle)]
@@ -140,34 +141,35 @@ pub unsafe extern "C" fn frz_tracker_read_triangles(
     tracker: *const frz_tracker,
     dst: frz_span,
 ) -> frz_status {
-    // SAFETY: the tracker is NULL or was not destroyed; the span is the caller's.
+    // SAFETY: the tracker is NULL or alive; the span is valid.
     guard(|| unsafe { dst.fill("dst", read(tracker)?.tracker.triangles()) })
 }
 
-/// Arrays that frz_tracker_read_edits reads.
+/// Arrays that frz_tracker_read_edits copies.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_edit_array {
-    /// int64_t for each vertex (frz_tracker_count): the vertex that it was before the step, and no other was; -1: it was made.
+    /// int64_t for each vertex (frz_tracker_count): its index before the step, which no other vertex shares; -1: it is new.
     FRZ_EDIT_ORIGIN = 0,
-    /// int64_t for each triangle (frz_tracker_triangle_count): the triangle that it was before the step, or is a part of; -1: neither.
+    /// int64_t for each triangle (frz_tracker_triangle_count): the index of the triangle that it was before the step, or is a part of; -1:
+    /// neither.
     FRZ_EDIT_SOURCE = 1,
     /// uint32_t for each triangle: a frz_edit_kind.
     FRZ_EDIT_KIND = 2,
-    /// double[3] for each vertex that there was before the step (frz_tracker_edits): the position (m) to which the step took it, before
-    /// the mesh was rebuilt. Those that are still there lie there.
+    /// double[3] for each vertex that existed before the step (frz_tracker_edits): the position (m) to which the step took it, before the
+    /// mesh was rebuilt. Remaining vertices are at this position.
     FRZ_EDIT_BEFORE = 3,
 }
 
-/// What a triangle is.
+/// The origin of a triangle.
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_edit_kind {
-    /// One that there was, with the same vertices in the same direction.
+    /// It existed before, with the same vertices in the same order of rotation.
     FRZ_EDIT_WHOLE = 0,
-    /// A part of one that there was, which was cut or divided.
+    /// A part of a triangle that existed before and was cut or divided.
     FRZ_EDIT_PART = 1,
-    /// A new one.
+    /// A new triangle.
     FRZ_EDIT_NEW = 2,
 }
 
@@ -177,11 +179,11 @@ use frz_edit_kind::*;
 const EDITS: [(u32, frz_edit_array); 4] =
     [(0, FRZ_EDIT_ORIGIN), (1, FRZ_EDIT_SOURCE), (2, FRZ_EDIT_KIND), (3, FRZ_EDIT_BEFORE)];
 
-/// Reports whether the last step, or frz_tracker_resculpt since, changed the mesh's vertices and triangles. Neither did in a tracker that
-/// has just been made, or has just come back from a state.
+/// Reports whether the last step, or frz_tracker_resculpt since, changed the mesh's vertices and triangles. 0 for a tracker that was just
+/// created or restored.
 ///
-/// changed: receives 1 where it did, else 0; 0 after a failure.
-/// before: receives how many vertices there were before the step; 0 after a failure. May be NULL.
+/// changed: receives 1 if so, else 0; 0 after a failure.
+/// before: receives the number of vertices before the step; 0 after a failure. May be NULL.
 ///
 /// Any number of threads may read a tracker.
 #[unsafe(no_mangle)]
@@ -191,7 +193,7 @@ pub unsafe extern "C" fn frz_tracker_edits(
     before: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(changed);
             clear(before);
@@ -206,11 +208,11 @@ pub unsafe extern "C" fn frz_tracker_edits(
     })
 }
 
-/// Copies what the last step made of the mesh, for a host to take its own arrays along. Where it changed nothing every vertex and
-/// every triangle is what it was.
+/// Copies how the last step changed the mesh, so that a host can carry its own arrays along. If nothing changed, every vertex and every
+/// triangle is its own origin.
 ///
-/// array: a frz_edit_array; it says of what type the elements are, and how many there are.
-/// dst: room for as many; FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
+/// array: a frz_edit_array, which states the type and the number of the elements.
+/// dst: room for that many; FRZ_ERROR_CAPACITY if it is too small, and nothing is written.
 ///
 /// Any number of threads may read a tracker.
 #[unsafe(no_mangle)]
@@ -221,7 +223,7 @@ pub unsafe extern "C" fn frz_tracker_read_edits(
 ) -> frz_status {
     guard(|| {
         let array = meaning("array", "frz_edit_array", array, &EDITS)?;
-        // SAFETY: the tracker is NULL or was not destroyed; the span is the caller's.
+        // SAFETY: the tracker is NULL or alive; the span is valid.
         unsafe {
             let follower = read(tracker)?;
             match array {
@@ -237,7 +239,7 @@ pub unsafe extern "C" fn frz_tracker_read_edits(
 }
 
 impl Follower {
-    /// Positions (m) of the vertices that there were before the last step, at its end.
+    /// Positions (m), at the end of the last step, of the vertices that existed before it.
     fn before(&self) -> &[DVec3] {
         match &self.edits {
             Some(edits) => &edits.before,
@@ -245,7 +247,7 @@ impl Follower {
         }
     }
 
-    /// For each vertex the one that it was; -1: it was made.
+    /// For each vertex its index before the step; -1: it is new.
     fn origins(&self) -> Vec<i64> {
         match &self.edits {
             Some(edits) => edits.origins.iter().map(|at| at.map_or(-1, i64::from)).collect(),

@@ -25,14 +25,13 @@ pub struct frz_tracker {
 pub struct frz_particles {
     /// sizeof(frz_particles).
     pub struct_size: u32,
-    /// 0.
+    /// Must be 0.
     pub flags: u32,
     /// double[3] for each particle (m), finite.
     pub positions: frz_view,
-    /// float[3] for each particle (m/s), finite; data NULL with a count of 0: not known.
+    /// float[3] for each particle (m/s), finite; data NULL with a count of 0: unknown.
     pub velocities: frz_view,
-    /// int64_t for each particle, no two the same: a particle keeps its own from time to time; data NULL with a count of 0: not
-    /// known.
+    /// int64_t for each particle, all different: a particle keeps its id over time; data NULL with a count of 0: unknown.
     pub ids: frz_view,
 }
 
@@ -48,37 +47,36 @@ unsafe impl Sized32 for frz_particles {
 pub struct frz_tracker_report {
     /// sizeof(frz_tracker_report), set by the caller.
     pub struct_size: u32,
-    /// Parts into which the step was divided, for no particle to move farther than its spacing in one.
+    /// Sub-steps of the step, enough that no particle moves farther than the particle spacing in one.
     pub parts: u32,
     /// Vertices whose projection jumped: the liquid merged or split there. They are flagged.
     pub jumped: u64,
     /// Vertices whose projection did not find the particles' surface. They are flagged.
     pub lost: u64,
-    /// Particles that are new.
+    /// New particles.
     pub born: u64,
-    /// Particles that are gone.
+    /// Particles that disappeared.
     pub died: u64,
     /// Triangles of the particles' own surface.
     pub triangles: u64,
-    /// Parts of that surface that the mesh does not cover: drops outside of it.
+    /// Parts of that surface that the mesh does not cover: drops outside it.
     pub drops: u64,
-    /// The same: bubbles inside.
+    /// Likewise, bubbles inside it.
     pub bubbles: u64,
-    /// Vertices beside which there is surface that the mesh does not cover: the liquid begins to merge or to split there. They are
-    /// flagged.
+    /// Vertices next to surface that the mesh does not cover: the liquid begins to merge or to split there. They are flagged.
     pub uncovered: u64,
-    /// 1 where the mesh has other vertices or triangles now (frz_tracker_read_edits); else 0, and so is all below.
+    /// 1 if the mesh now has other vertices or triangles (frz_tracker_read_edits); else 0, as are all fields below.
     pub changed: u32,
-    /// How much more was rebuilt than the cells in which the mesh no longer fitted, and what they need: 0 nothing, 1 a ring of cells
-    /// around them, 2 the whole parts of the mesh that pass through them, 3 everything.
+    /// Rebuild level: what was rebuilt beyond the cells in which the mesh no longer fitted the liquid and those that they require: 0
+    /// nothing, 1 a ring of cells around them, 2 the whole parts of the mesh that pass through them, 3 everything.
     pub rung: u32,
-    /// Cells in which the mesh no longer fitted.
+    /// Cells in which the mesh no longer fitted the liquid.
     pub changed_cells: u64,
-    /// Cells in which it was rebuilt; 0 where edges were only divided, turned, or went.
+    /// Cells in which it was rebuilt; 0 if edges were only split, flipped or collapsed.
     pub rebuilt_cells: u64,
-    /// Triangles that are new, or parts of others.
+    /// Triangles that are new, or parts of previous ones.
     pub made_triangles: u64,
-    /// Parts of the mesh with some particles inside, but fewer than frz_tracker_params.min_drop, that were taken away.
+    /// Parts of the mesh that were removed because they held some particles, but fewer than frz_tracker_params.min_drop.
     pub specks: u64,
 }
 
@@ -118,19 +116,19 @@ impl frz_tracker_report {
 pub(in crate::capi) struct Follower {
     /// The mesh.
     pub tracker: Tracker,
-    /// What the last step made of it; none: it changed no triangle, or there was none yet.
+    /// How the last step changed it; `None`: no triangle changed, or there was no step yet.
     pub edits: Option<Edits>,
-    /// Steps that were made ahead.
+    /// Steps computed in advance.
     pub outlook: Outlook,
     pub saved: Saved,
-    /// Whether a warning of the particles was logged.
+    /// Whether a warning about the particles was logged.
     pub has_warned: bool,
 }
 
-/// Refuses to rebuild a mesh of a state that is not closed, as [`Tracker::new`] does one at the first frame.
+/// Refuses to rebuild a restored mesh that is not closed, as [`Tracker::new`] does at the first frame.
 fn check_closed(tracker: &Tracker) -> Outcome {
     let triangles = tracker.triangles();
-    // Nothing is left where all of the liquid has gone.
+    // Nothing is left if all of the liquid has gone.
     if triangles.is_empty() || Topology::of(tracker.vertices().len(), triangles).is_watertight() {
         return Ok(());
     }
@@ -146,11 +144,11 @@ impl Noun for frz_tracker {
 /// Particles from a host's arrays, checked.
 ///
 /// # Safety
-/// The pointer must be NULL or the caller's, and its views describe memory that can be read.
+/// The pointer must be NULL or valid, and its views must describe memory that can be read.
 pub(in crate::capi) unsafe fn particles(pointer: *const frz_particles) -> Outcome<Particles> {
     let none = frz_view::NONE;
     let defaults = frz_particles { struct_size: 0, flags: 0, positions: none, velocities: none, ids: none };
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let (places, velocities, ids) = unsafe {
         let given = sized(pointer, defaults)?;
         no_flags(given.flags, 0)?;
@@ -165,10 +163,10 @@ pub(in crate::capi) unsafe fn particles(pointer: *const frz_particles) -> Outcom
     Ok(particles)
 }
 
-/// Estimates the initial distance between particles: from the median of the mean distances to the six nearest ones.
+/// Estimates the initial distance between particles: from the median of the mean distances to the six nearest particles.
 ///
-/// particles: as they are at the first frame.
-/// spacing: receives it (m); 0 where there are too few particles, or too many at one position, to tell, and after a failure.
+/// particles: those of the first frame.
+/// spacing: receives it (m); 0 if there are too few particles for an estimate, or too many at one position, and after a failure.
 ///
 /// One thread at a time for each context.
 #[unsafe(no_mangle)]
@@ -178,7 +176,7 @@ pub unsafe extern "C" fn frz_particles_spacing(
     spacing: *mut f64,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(spacing);
             required(spacing, "spacing")?;
@@ -191,17 +189,16 @@ pub unsafe extern "C" fn frz_particles_spacing(
     })
 }
 
-/// Makes a mesh that follows particles: as it is at the first frame, or in a state that frz_tracker_save wrote.
+/// Creates a tracker, a mesh that follows particles: at the first frame, or in a state that frz_tracker_save wrote.
 ///
 /// params: see frz_tracker_params.
-/// mesh: at the first frame, in the particles' space; also with a restart. It is copied, and may be open, cross itself and repeat
-///     vertices; with params.rebuild it must be closed, each edge with two triangles that agree about which side is out, each
-///     vertex with one fan of them: see frz_mesh_repair. FRZ_ERROR_ARGUMENT says where it is not, or is not where the particles
-///     are.
-/// particles: at the first frame; NULL with a restart.
-/// restart: restart_bytes bytes of frz_tracker_save of a tracker of the same mesh, spacing and cell: it comes back bit for bit, on
-///     any number of threads. NULL: none. Bytes that are damaged, of another version, mesh, spacing or cell are FRZ_ERROR_FILE.
-/// restart_bytes: 0 without a restart.
+/// mesh: the mesh at the first frame, in the particles' space; also with a restart. It is copied. It may be open, intersect itself and
+///     repeat vertices; with params.rebuild it must be closed, each edge with two consistently oriented triangles, and the triangles around
+///     each vertex a single ring: see frz_mesh_repair. FRZ_ERROR_ARGUMENT says where it is not, or that it is not where the particles are.
+/// particles: those of the first frame; NULL with a restart.
+/// restart: restart_bytes bytes that frz_tracker_save wrote for a tracker with the same mesh, spacing and cell: it is restored bit for bit,
+///     on any number of threads. NULL: none. FRZ_ERROR_FILE if they are damaged, or of another version, mesh, spacing or cell.
+/// restart_bytes: size of restart; 0 without one.
 /// out: receives the tracker, to be destroyed with frz_tracker_destroy; NULL after a failure.
 ///
 /// One thread at a time for each context; any number may read a mesh.
@@ -215,7 +212,7 @@ pub unsafe extern "C" fn frz_tracker_create(
     restart_bytes: usize,
     out: *mut *mut frz_tracker,
 ) -> frz_status {
-    // SAFETY: the pointers are NULL or the caller's.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
             let params = sized(params, frz_tracker_params::defaults())?.params()?;
@@ -238,7 +235,7 @@ pub unsafe extern "C" fn frz_tracker_create(
             if params.rebuild && !restart.is_null() {
                 check_closed(&tracker)?;
             }
-            // A mesh that was rebuilt has it in its state.
+            // The state of a rebuilt mesh contains the mesh.
             if !tracker.is_rebuilt() {
                 tracker.set_lasting(mesh.attribute("detail", 1).unwrap_or_default().to_vec())?;
             }
@@ -253,20 +250,20 @@ pub unsafe extern "C" fn frz_tracker_create(
     }
 }
 
-/// Destroys a tracker; NULL is fine.
+/// Destroys a tracker; NULL is ignored.
 ///
-/// tracker: may be NULL. Not while a call uses it: it then stays.
+/// tracker: may be NULL. It is not destroyed while a call uses it.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_tracker_destroy(tracker: *mut frz_tracker) {
-    // SAFETY: the tracker is NULL or was not destroyed.
+    // SAFETY: the tracker is NULL or alive.
     guard(|| unsafe { destroy(tracker) });
 }
 
-/// Sets how a mesh follows from the next step on. The spacing, the cell and whether it is rebuilt must stay.
+/// Sets the parameters from the next step on. spacing, cell and rebuild cannot change.
 ///
-/// params: FRZ_ERROR_ARGUMENT names the field at fault and its range; the old ones then stay.
+/// params: the new parameters. FRZ_ERROR_ARGUMENT names a field that is out of range, and its range; the old ones are then kept.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -275,7 +272,7 @@ pub unsafe extern "C" fn frz_tracker_set_params(
     params: *const frz_tracker_params,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut follower = change(tracker)?;
             let params = sized(params, frz_tracker_params::defaults())?.params()?;
@@ -286,11 +283,11 @@ pub unsafe extern "C" fn frz_tracker_set_params(
     })
 }
 
-/// Prefetches the particles of the step after the coming one: with frz_tracker_params.rebuild their surface is made
-/// while the coming step rebuilds the mesh, on threads that have nothing to do. The result is identical; particles that
-/// then do not come cost time. Of no use with frz_tracker_read_eased, which makes the steps to come itself.
+/// Prefetches the particles of the step after the next: with frz_tracker_params.rebuild their surface is computed on idle threads while the
+/// next step rebuilds the mesh. The result is identical; if other particles then come, time was wasted. Of no use with
+/// frz_tracker_read_eased, which computes the coming steps itself.
 ///
-/// particles: as they will be; they are copied.
+/// particles: those of that step; they are copied.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -299,7 +296,7 @@ pub unsafe extern "C" fn frz_tracker_ahead(
     particles: *const frz_particles,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let mut follower = change(tracker)?;
             let particles = self::particles(particles)?;
@@ -311,17 +308,16 @@ pub unsafe extern "C" fn frz_tracker_ahead(
 }
 
 /// Moves the mesh with its particles from one time to another. After a failure or a cancel it is as it was before. With
-/// frz_tracker_params.rebuild it may have other vertices and triangles afterwards.
+/// frz_tracker_params.rebuild its vertices and triangles may change.
 ///
-/// Either of both may have no particles: the mesh then loses its vertices, and gets others from the particles' surface when there are some
-/// again; without rebuild it waits where it was. The context's log hears once of ids and velocities that contradict each other, and of
-/// steps in which over half of the mesh is lost or made anew.
+/// from, to or both may have no particles: the mesh then loses its vertices, and gets new ones from the particles' surface once there are
+/// particles again; without rebuild it stays where it was. The context logs a warning once if ids and velocities contradict each other, and
+/// for each step in which over half of the mesh is lost or remade.
 ///
-/// from: the particles as they were at the last step's end.
-/// to: the particles at this step's end. Those of the same id are the same; where one of the two has no ids, from must have
-///     velocities.
+/// from: the particles at the end of the last step.
+/// to: the particles at the end of this step. Equal ids mark the same particle; if from or to has no ids, from must have velocities.
 /// dt: time between them (s), above 0.
-/// report: receives what was done, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// report: receives what the call did, all zeroes after a failure; may be NULL. The caller sets its struct_size.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -334,7 +330,7 @@ pub unsafe extern "C" fn frz_tracker_step(
     report: *mut frz_tracker_report,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             if !report.is_null() {
                 fill(report, None, frz_tracker_report::NOTHING)?;
@@ -344,7 +340,7 @@ pub unsafe extern "C" fn frz_tracker_step(
             finite("dt", dt)?;
             let (from, to) = (particles(from)?, particles(to)?);
             let follower = &mut *follower;
-            // A step that was made ahead looks for no cancel.
+            // A step that was computed in advance checks for no cancel.
             call.ctx().check()?;
             let done = match follower.outlook.take(&from, &to, dt) {
                 Some((tracker, done)) => {
@@ -381,12 +377,12 @@ pub unsafe extern "C" fn frz_tracker_step(
     })
 }
 
-/// Writes all that the next step depends on, besides the parameters, the mesh and the particles: for a host's own cache. The bytes
-/// are the same on any number of threads.
+/// Saves all that the next step depends on besides the parameters, the mesh and the particles, for a host's own cache. The bytes are the
+/// same on any number of threads.
 ///
-/// dst: room for capacity bytes. NULL: size receives their number, and nothing is written.
-/// capacity: bytes at dst. FRZ_ERROR_CAPACITY when they are too few.
-/// size: receives the bytes that were written, or are needed; 0 after other failures.
+/// dst: room for capacity bytes. NULL: only the size is reported.
+/// capacity: size of dst (bytes). FRZ_ERROR_CAPACITY if it is too small.
+/// size: receives the number of bytes written, or needed; 0 after other failures.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -398,7 +394,7 @@ pub unsafe extern "C" fn frz_tracker_save(
     size: *mut usize,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             clear(size);
             required(size, "size")?;

@@ -1,6 +1,6 @@
 //! A detailed mesh that follows the particles of a liquid.
 
-// In the header's order.
+// In the order of the header.
 pub mod params;
 
 pub mod mesh;

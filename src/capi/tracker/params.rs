@@ -1,4 +1,4 @@
-//! How a mesh follows particles, in C's terms.
+//! Parameters of a tracker, in C.
 
 use crate::capi::ffi::guard::{Outcome, frz_status, guard};
 use crate::capi::ffi::views::{Sized32, fill, finite, meaning, within};
@@ -9,7 +9,7 @@ use crate::surface::{Params, Weighting};
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_tracker_weighting {
-    /// By affine maps: exact where the liquid turns and stretches.
+    /// By affine maps: exact where the liquid rotates and stretches.
     FRZ_TRACKER_AFFINE = 0,
     /// By their mean, as in the thesis: it lags behind.
     FRZ_TRACKER_MEAN = 1,
@@ -19,10 +19,10 @@ pub enum frz_tracker_weighting {
 #[repr(u32)]
 #[derive(Clone, Copy)]
 pub enum frz_tracker_match {
-    /// Where vertices are flagged, and at drops that it does not cover.
+    /// Where vertices are flagged, and at drops that the mesh does not cover.
     FRZ_TRACKER_MATCH_FLAGGED = 0,
-    /// All over it in every step: also at bubbles, and where it differs from the liquid between vertices by more than the detail
-    /// around. It takes longer.
+    /// Everywhere in every step: also at bubbles, and where the mesh differs from the liquid between vertices by more than the surrounding
+    /// detail. Slower.
     FRZ_TRACKER_MATCH_EVERY = 1,
 }
 
@@ -36,44 +36,45 @@ const WEIGHTINGS: [(u32, Weighting); 2] =
 const MATCHES: [(u32, bool); 2] =
     [(FRZ_TRACKER_MATCH_FLAGGED as u32, false), (FRZ_TRACKER_MATCH_EVERY as u32, true)];
 
-/// How a mesh follows particles. All of it but the spacing, the cell and whether it is rebuilt may change between steps.
+/// Parameters of a tracker. All but spacing, cell and rebuild may change between steps.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_tracker_params {
     /// sizeof(frz_tracker_params).
     pub struct_size: u32,
-    /// 0.
+    /// Must be 0.
     pub flags: u32,
-    /// Initial distance r between particles (m), 1e-9 to 1e6: see frz_particles_spacing. No usual one: it must be set.
+    /// Initial distance r between particles (m), 1e-9 to 1e6: see frz_particles_spacing. No default: it must be set.
     pub spacing: f64,
-    /// Edge of a cell of the particles' surface (r), 0.125 to 2; 0.5 is usual.
+    /// Edge of a cell of the particles' surface (r), 0.125 to 2; default 0.5.
     pub cell: f64,
-    /// Vertices that would be moved farther (r) to keep their detail are flagged, 0.001 to 100: the liquid has merged or split
-    /// there. 0.5 is usual.
+    /// Vertices that would be moved farther than this (r) to keep their detail are flagged, 0.001 to 100; default 0.5. The liquid has
+    /// merged or split there.
     pub change: f64,
-    /// Time (s) in which half of the detail fades, above 0; infinite, as is usual: it stays. It stays anyway where the mesh's attribute
-    /// "detail" of one float is 1, and fades as fast as this says where that is 0. A vertex that a step makes has the mean of those of
-    /// its neighbours that were there, 0 without any.
+    /// Time (s) in which half of the detail fades, above 0; default infinite: it does not fade. Where the mesh's attribute "detail", of one
+    /// float, is 1, detail never fades; where it is 0, it fades at this rate. A new vertex takes the mean of this attribute over those of
+    /// its neighbours that existed before, 0 without any.
     pub half_life: f64,
-    /// How much detail fades where the mesh is strained: to exp(-fade) of it while lengths change by a factor of e, 0 to 1000; 0,
-    /// as is usual: not at all.
+    /// How much detail fades where the mesh is strained: to exp(-fade) of itself while lengths change by a factor of e, 0 to 1000; default
+    /// 0: not at all.
     pub fade: f64,
-    /// A frz_tracker_weighting; FRZ_TRACKER_AFFINE is usual.
+    /// A frz_tracker_weighting; default FRZ_TRACKER_AFFINE.
     pub weighting: u32,
-    /// 0.
+    /// Must be 0.
     pub reserved: u32,
-    /// 1: where the liquid merges or splits the mesh is rebuilt, and merges or splits with it; where it is stretched or squeezed, edges
-    /// are divided or go. It must be closed, a 2-manifold by its indices. 0, as is usual: the mesh keeps the vertices and the faces
-    /// that it was made with, or was given by frz_tracker_resculpt, and is flagged where it no longer fits. With 1 any step may change both (frz_tracker_report.changed): a
-    /// host has to read the triangles anew, and to take its own arrays along (frz_tracker_read_edits), which one that knows nothing of
-    /// it does not do.
+    /// 1: where the liquid merges or splits, the mesh is rebuilt and merges or splits with it; where it is stretched or compressed, edges
+    /// are split or collapsed. The mesh must be closed, a 2-manifold by its indices. 0, the default: the mesh keeps the vertices and faces
+    /// that it was created with, or was given by frz_tracker_resculpt, and is flagged where it no longer fits. With 1 any step may change
+    /// both (frz_tracker_report.changed): the host must then read the triangles again and carry its own arrays along
+    /// (frz_tracker_read_edits). A host that does not do this leaves it at 0.
     pub rebuild: u32,
-    /// A frz_tracker_match; FRZ_TRACKER_MATCH_FLAGGED is usual. Without rebuild it does nothing.
+    /// A frz_tracker_match; default FRZ_TRACKER_MATCH_FLAGGED. No effect without rebuild.
     pub r#match: u32,
-    /// Least count of particles in a part of a mesh that is rebuilt, up to 1000000; those up to half a spacing outside count where any is
-    /// inside. Parts with fewer are taken away, and drops with fewer get no mesh; a mesh of one part stays. 1 is usual: only parts without any go. 0 is as 1.
+    /// Minimum number of particles in a part of a rebuilt mesh, up to 1000000; default 1. Particles up to half a spacing outside a part
+    /// count if any is inside it. Parts with fewer are removed, and drops with fewer get no mesh; a mesh of one part stays. 1 removes only
+    /// parts without particles. 0 means 1.
     pub min_drop: u32,
-    /// 0.
+    /// Must be 0.
     pub reserved3: u32,
 }
 
@@ -107,7 +108,7 @@ impl frz_tracker_params {
         }
     }
 
-    /// The library's own parameters; what is out of range is named.
+    /// The library's own parameters; an error names a field that is out of range.
     pub(in crate::capi) fn params(&self) -> Outcome<Params> {
         no_flags(self.flags, 0)?;
         within("reserved", f64::from(self.reserved), 0.0..=0.0, "")?;
@@ -135,14 +136,14 @@ impl frz_tracker_params {
     }
 }
 
-/// Fills parameters with the usual values; the spacing must be set.
+/// Fills parameters with the defaults; spacing must be set.
 ///
-/// params: receives them.
+/// params: receives the defaults.
 /// size: sizeof(frz_tracker_params).
 ///
 /// Any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_tracker_params_init(params: *mut frz_tracker_params, size: usize) -> frz_status {
-    // SAFETY: the parameters are NULL or have so many bytes.
+    // SAFETY: the parameters are NULL or have `size` bytes.
     guard(|| unsafe { fill(params, Some(size), frz_tracker_params::defaults()) })
 }

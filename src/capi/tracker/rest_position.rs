@@ -7,15 +7,15 @@ use crate::capi::ffi::views::frz_span;
 use crate::capi::runtime::context::{enter, frz_context};
 use crate::surface::Rest;
 
-/// Copies for each vertex where the liquid there was at the first frame, by the particles around it that were there then: for a host to
-/// take textures and arrays of its own through merges and splits. What a step made (frz_tracker_read_edits) takes what the mesh of the
-/// first frame has at the nearest position to where its liquid was. Corners of a triangle may come from far apart, where liquids have come
-/// together: it should have all of its corners' numbers from near one of them.
+/// Copies for each vertex where the liquid there was at the first frame, according to the nearby particles that already existed then. With
+/// it a host carries its own textures and arrays through merges and splits: vertices that a step made (frz_tracker_read_edits) take what
+/// the mesh of the first frame has at the position nearest to where their liquid was. The corners of a triangle may come from far apart
+/// where liquids have merged: all of them should then take their values from near one of them.
 ///
 /// first: the particles at the first frame, with ids.
-/// now: the particles at the time to which the last step led, with ids.
-/// dst: room for as many double[3] as frz_tracker_count reports (m); FRZ_ERROR_CAPACITY when it is too little, and nothing is written.
-///     NaN where it is not known: no particle near a vertex was there at the first frame.
+/// now: the particles at the end of the last step, with ids.
+/// dst: room for as many double[3] as frz_tracker_count reports (m); FRZ_ERROR_CAPACITY if it is too small, and nothing is written. NaN
+///     where unknown: no particle near the vertex existed at the first frame.
 ///
 /// One thread at a time for each context; any number may read a tracker.
 #[unsafe(no_mangle)]
@@ -27,7 +27,7 @@ pub unsafe extern "C" fn frz_tracker_read_rest(
     dst: frz_span,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; the span is the caller's.
+        // SAFETY: the pointers are NULL or valid; the span is valid.
         unsafe {
             let call = enter(context)?;
             let follower = read(tracker)?;

@@ -1,4 +1,4 @@
-//! A mesh that was edited by hand takes the place of a tracker's.
+//! Replacing a tracker's mesh by one that was edited by hand.
 
 use super::edits::Edits;
 use super::mesh::{frz_particles, frz_tracker, particles};
@@ -9,16 +9,16 @@ use crate::capi::runtime::context::{enter, frz_context};
 use crate::mesh_repair::Source;
 use crate::surface::Outlook;
 
-/// Puts an edited mesh in the place of the tracker's: an artist's change in the middle of a shot. How far each of its vertices is from
-/// the particles' surface is measured anew, and kept from there on. After a failure or a cancel the tracker is as it was.
+/// Replaces the tracker's mesh by an edited one: an artist's change in the middle of a shot. The distance of each of its vertices from the
+/// particles' surface is measured again, and kept from then on. After a failure or a cancel the tracker is as it was.
 ///
-/// The parameters stay. No vertex and no triangle is one from before: frz_tracker_edits answers 1, and frz_tracker_read_edits says that
-/// all were made; the positions from before (FRZ_EDIT_BEFORE) are those to which the last step led. States that are saved from then on
-/// hold the edited mesh, and still come back with the mesh that the tracker was made with (frz_tracker_create).
+/// The parameters stay. All vertices and triangles count as new: frz_tracker_edits reports 1, and frz_tracker_read_edits reports all as
+/// made; the positions before (FRZ_EDIT_BEFORE) are those to which the last step led. States saved from then on hold the edited mesh, but
+/// are still restored with the mesh that the tracker was created with (frz_tracker_create).
 ///
-/// mesh: as frz_tracker_create takes it, with any vertices and faces, in the particles' space; it is copied. Its attribute "detail" of
-///     one float says what does not fade, also where the mesh before had none.
-/// particles: at the time to which the last step led, or at which the tracker began: the next step begins with them.
+/// mesh: as for frz_tracker_create, with any vertices and faces, in the particles' space; it is copied. Its attribute "detail", of one
+///     float, says what does not fade, even if the previous mesh had none.
+/// particles: those at the end of the last step, or those that the tracker was created with: the next step begins with them.
 ///
 /// One thread at a time; any number may read a mesh.
 #[unsafe(no_mangle)]
@@ -29,7 +29,7 @@ pub unsafe extern "C" fn frz_tracker_resculpt(
     particles: *const frz_particles,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             let call = enter(context)?;
             let mut follower = change(tracker)?;

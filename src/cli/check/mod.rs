@@ -1,4 +1,4 @@
-//! `frazil check`: every input of every frame, before a night on the farm; every file of a folder after it.
+//! `frazil check`: reads every input of every frame before an overnight run; every file of a folder after it.
 
 mod shallow;
 #[cfg(feature = "vdb")]
@@ -18,20 +18,19 @@ use super::session::exit::{Failure, Phase};
 
 /// Read every input of every frame of a scene, and print its sizes, memory and disk; nothing is computed.
 ///
-/// Of an output folder: read every file that a run wrote there, and name those that are not what was written.
+/// For an output folder: read every file that a run wrote there, and name those that are not what was written.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  frazil check walker.toml -o cache/\n  frazil check cache/")]
 pub struct Args {
     /// Scene file (TOML), or an output folder.
     scene: PathBuf,
-    /// Where the output is to go: its free space is printed too, how many grains come from the base that is there, and how
-    /// far the mist that is there spread.
+    /// Output folder: also prints its free space, how many grains the base in it yields, and how far the mist in it spread.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Put a setting over the scene's, for instance snow.noise.seed=2 or object.1.file=hero.glb.
+    /// Override a setting of the scene, for instance snow.noise.seed=2 or object.1.file=hero.glb.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Override>,
-    /// Check it with cells N times as large, as `frazil snow --preview N` makes it.
+    /// Check the scene with cells N times as large, as for `frazil snow --preview N`.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=100))]
     preview: Option<u16>,
     /// Print JSON.
@@ -40,7 +39,7 @@ pub struct Args {
 }
 
 impl Args {
-    /// Free bytes where the output is, or is to be.
+    /// Free bytes on the disk of the output.
     #[cfg(feature = "vdb")]
     fn free_space(&self) -> Option<u64> {
         let absolute = std::path::absolute(self.output.as_deref()?).ok()?;
@@ -48,7 +47,7 @@ impl Args {
         super::session::machine::free_space(there)
     }
 
-    /// Not known.
+    /// Unknown.
     #[cfg(not(feature = "vdb"))]
     fn free_space(&self) -> Option<u64> {
         None

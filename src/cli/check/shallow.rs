@@ -1,4 +1,4 @@
-//! What a scene with a liquid on a terrain will do: cells, heights, millilitres, memory, disk, and what looks wrong.
+//! Forecast of a scene with a liquid on a terrain: cells, heights, millilitres, memory, disk, and warnings.
 
 use std::fmt::Write;
 
@@ -17,7 +17,7 @@ pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure>
         return Err(Failure::refused(what));
     }
     let limit = session.max_memory();
-    // The terrain becomes columns here too.
+    // The check converts the terrain to columns, too.
     session.ctx.set_memory_limit(limit);
     let inputs = Inputs::load(&session.ctx, scene).before()?;
     let mut report = check(&session.ctx, scene, &inputs).before()?;

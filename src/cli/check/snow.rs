@@ -1,4 +1,4 @@
-//! What a scene will do: sizes, speeds, memory, disk, and what looks wrong.
+//! Forecast of a scene: sizes, speeds, memory, disk, and warnings.
 
 use std::fmt::Write;
 

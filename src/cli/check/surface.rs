@@ -1,4 +1,4 @@
-//! What a scene with a mesh that follows a liquid will do: counts, sizes, disk, and what looks wrong.
+//! Forecast of a scene with a mesh that follows a liquid: counts, sizes, disk, and warnings.
 
 use std::fmt::Write;
 
@@ -23,7 +23,7 @@ pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure>
     let mut report = check(&session.ctx, scene, &inputs).before()?;
     let limit = session.max_memory();
     if let Err(error) = report.check_memory(limit) {
-        // A run reads no frame ahead, so that it cannot know.
+        // A run reads no frames ahead, so it cannot know this.
         let what = format!("{error}; a run begins all the same, and ends where one part needs more");
         report.warnings.push(what);
     }

@@ -17,11 +17,11 @@ use crate::cli::output;
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
 
-/// Say how far two meshes lie apart, or two sequences of them frame by frame, and how much a sequence flickers.
+/// Report how far two meshes lie apart, or two sequences of them frame by frame, and how much a sequence flickers.
 ///
-/// Distances go from points of one mesh, its vertices and the centres of its triangles, to the nearest positions of the other's surface,
-/// and back, in the unit of the files (m). Each point counts as much as the area that it stands for: three quarters of a triangle's
-/// is its centre's, a twelfth each corner's.
+/// Distances are measured from points of one mesh, its vertices and the centres of its triangles, to the nearest positions of the other's
+/// surface, and back, in the unit of the files (m). Each point is weighted by the area that it stands for: three quarters of a triangle's
+/// go to its centre, a twelfth to each corner.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -31,14 +31,14 @@ Examples:
 pub struct Args {
     /// Mesh (.obj, .ply, .stl), character at rest (.glb, .gltf), or a sequence of meshes (a.%04d.ply).
     a: PathBuf,
-    /// What it is compared with: as A; a single file is compared with every frame.
+    /// The mesh to compare with, as A; a single file is compared with every frame.
     #[arg(required_unless_present = "flicker")]
     b: Option<PathBuf>,
     /// Frames of sequences.
     #[arg(long, value_name = "A-B|A-BxN|A,B,C", allow_hyphen_values = true)]
     frames: Option<FrameChoice>,
-    /// Of each sequence also the second differences of its vertices' positions over three frames, x(n-1) - 2 x(n) + x(n+1) (m): what a
-    /// still camera sees tremble.
+    /// For each sequence also the second differences of its vertices' positions over three frames, x(n-1) - 2 x(n) + x(n+1) (m): the
+    /// trembling that a still camera sees.
     #[arg(long)]
     flicker: bool,
     #[command(flatten)]
@@ -56,7 +56,7 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
 }
 
-/// What is said where the faces of a sequence change.
+/// Printed if the faces of a sequence change.
 const CHANGED: &str = "where faces change between two frames no vertex can be followed and the surface's own motion cannot be taken \
                        off: the distances between the two surfaces are given there instead";
 
@@ -72,7 +72,7 @@ impl Args {
         Map::from_iter([("a".to_string(), name(&self.a)), ("b".to_string(), b)])
     }
 
-    /// The frames of sequences; none where there are only files.
+    /// The frames of sequences; none for single files.
     fn frames(&self) -> Result<Option<Vec<i32>>, Failure> {
         let refused = |what: &str| Err(Failure::refused(what));
         let sequence = self.paths().find(|path| Pattern::parse(path).is_some());
@@ -117,11 +117,11 @@ impl Args {
         output::print(&found.in_words(&names[0], &names[1])).during()
     }
 
-    /// Compares two sequences, or looks at one, frame by frame.
+    /// Compares two sequences, or checks one for flicker, frame by frame.
     fn sequences(&self, session: &Session, frames: &[i32]) -> Result<(), Failure> {
         for &frame in frames {
             for path in self.paths() {
-                // A gap in a sequence is known before any work.
+                // Report a gap in a sequence before any work.
                 io::files::source::open(&of_frame(path, frame)).before()?;
             }
         }
@@ -134,7 +134,7 @@ impl Args {
                 .map(|path| Model::read(&of_frame(path, frame), &self.origin))
                 .collect::<frazil::Result<Vec<_>>>()
         };
-        // What the first frame is without, nothing can be begun with.
+        // Fail early if the first frame cannot be compared.
         self.look(session, models(frames[0]).before()?, frames[0], &mut found, &mut flickers)?;
         let looked = frames[1..].iter().try_for_each(|&frame| {
             self.look(session, models(frame).during()?, frame, &mut found, &mut flickers)
@@ -145,7 +145,7 @@ impl Args {
             let text: String = flickers().map(Flicker::in_words).collect();
             return output::print(&(all_in_words(&found) + &text)).during();
         }
-        // Frames before one that ends the run are told all the same, as they are in words; of all frames nothing is known then.
+        // Frames before an error are reported in JSON as in text, but `all_frames` is then null.
         let mut object = self.names();
         object.insert("frames".into(), found.iter().map(|(frame, found)| found.json_of(*frame)).collect());
         object.insert("all_frames".into(), all_json(if looked.is_ok() { &found[..] } else { &[] }));
@@ -154,7 +154,7 @@ impl Args {
         looked
     }
 
-    /// Looks at the meshes of a frame, and says what is found.
+    /// Compares the meshes of a frame, and prints the result.
     fn look(
         &self,
         session: &Session,
@@ -178,18 +178,18 @@ impl Args {
         Ok(())
     }
 
-    /// Prints words as soon as they are known.
+    /// Prints text as soon as it is known.
     fn say(&self, text: &str) -> Result<(), Failure> {
         if self.json { Ok(()) } else { output::print(text).during() }
     }
 }
 
-/// The file of a frame, of one file or of a sequence.
+/// The file of a frame, from one file or a sequence.
 fn of_frame(path: &Path, frame: i32) -> PathBuf {
     Pattern::parse(path).map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
 }
 
-/// Distances from the surface of one mesh to that of another, and back.
+/// Distances between the surfaces of two meshes, both ways.
 struct Apart {
     to: Deviation,
     back: Deviation,
@@ -212,14 +212,14 @@ impl Apart {
     }
 }
 
-/// What is known of two meshes.
+/// The comparison of two meshes.
 struct Comparison {
     apart: Apart,
-    /// From vertex to vertex, where both have the same faces.
+    /// From vertex to vertex, if both have the same faces.
     vertices: Option<Deviation>,
-    /// Of both (m2).
+    /// Areas of both (m2).
     areas: [f64; 2],
-    /// Of both (m3).
+    /// Volumes of both (m3).
     volumes: [f64; 2],
 }
 
@@ -288,12 +288,12 @@ struct Overall {
     mean: f64,
     p95: f64,
     max: f64,
-    /// Where the largest is.
+    /// Frame of the maximum.
     frame: i32,
 }
 
 impl Overall {
-    /// None without frames.
+    /// None if there are no frames.
     fn of<'a>(frames: impl Iterator<Item = (i32, &'a Deviation)>) -> Option<Self> {
         let (mut count, mut sum) = (0u32, 0.0);
         let mut all: Option<Self> = None;
@@ -321,7 +321,7 @@ impl Overall {
     }
 }
 
-/// From A to B, back, and from vertex to vertex where all frames have the same faces.
+/// From A to B, back, and from vertex to vertex if all frames have the same faces.
 fn overall(found: &[(i32, Comparison)]) -> [(&'static str, &'static str, Option<Overall>); 3] {
     let to = Overall::of(found.iter().map(|(frame, found)| (*frame, &found.apart.to)));
     let back = Overall::of(found.iter().map(|(frame, found)| (*frame, &found.apart.back)));
@@ -358,24 +358,24 @@ fn all_in_words(found: &[(i32, Comparison)]) -> String {
     format!("all frames:\n{lines}  Hausdorff distance at most {:.6} m\n", hausdorff(found))
 }
 
-/// The largest of all frames (m).
+/// The maximum over all frames (m).
 fn hausdorff(found: &[(i32, Comparison)]) -> f64 {
     found.iter().map(|(_, found)| found.apart.hausdorff()).fold(0.0, f64::max)
 }
 
-/// How much a sequence flickers.
+/// The flicker of a sequence.
 struct Flicker {
     name: String,
-    /// The last frames, at most two.
+    /// The previous frames, at most two.
     last: Vec<(i32, Model)>,
     steps: Vec<Step>,
 }
 
-/// What a frame adds to it.
+/// The contribution of a frame.
 enum Step {
-    /// Second differences around the frame in the middle of three with the same faces.
+    /// Second differences around the middle frame of three with the same faces.
     Vertices(i32, Deviation),
-    /// Two frames with other faces.
+    /// Two frames with different faces.
     Surfaces([i32; 2], Apart),
 }
 
@@ -384,7 +384,7 @@ impl Flicker {
         Self { name: path.display().to_string(), last: Vec::new(), steps: Vec::new() }
     }
 
-    /// Takes the next frame; what it adds, in words.
+    /// Adds the next frame; returns its contribution as text.
     fn add(&mut self, ctx: &Context, frame: i32, model: Model) -> frazil::Result<Option<String>> {
         let step = match &self.last[..] {
             [.., (before, last)] if !model.has_faces_of(last) => {
@@ -405,7 +405,7 @@ impl Flicker {
         Ok(text)
     }
 
-    /// The frames around which there are second differences.
+    /// The middle frames of the second differences.
     fn vertices(&self) -> impl Iterator<Item = (i32, &Deviation)> {
         self.steps.iter().filter_map(|step| match step {
             Step::Vertices(frame, found) => Some((*frame, found)),
@@ -475,7 +475,7 @@ fn in_words(found: &Deviation) -> String {
     )
 }
 
-/// How much larger the second number is; none where the first is 0.
+/// How much larger the second number is, in percent; none if the first is 0.
 fn percent([a, b]: [f64; 2]) -> Option<f64> {
     (a != 0.0).then(|| 100.0 * (b - a) / a.abs())
 }

@@ -1,4 +1,4 @@
-//! The meshes that `frazil mesh compare` compares.
+//! The meshes compared by `frazil mesh compare`.
 
 use std::path::Path;
 
@@ -7,16 +7,16 @@ use frazil::motion::{Character, is_gltf};
 
 use crate::cli::options::{Origin, warn_if_far};
 
-/// A mesh in triangles, and its faces as the file has them: those of bent polygons may be cut otherwise in another frame.
+/// A mesh in triangles, and its faces as the file has them: non-planar polygons may be triangulated differently in another frame.
 pub struct Model {
     /// In triangles.
     pub mesh: TriMesh,
-    /// As the file has them, without what they carry.
+    /// As the file has them, without their arrays.
     pub faces: PolygonMesh,
 }
 
 impl Model {
-    /// Reads that of a file, less an origin.
+    /// Reads a file's mesh relative to an origin.
     ///
     /// # Errors
     /// A file that cannot be read.

@@ -1,4 +1,4 @@
-//! `frazil mesh`: what is wrong with a mesh, and what else is done to meshes: a file for each.
+//! `frazil mesh`: checks meshes and changes them; one file for each command.
 
 mod compare;
 mod compared;
@@ -20,7 +20,7 @@ use super::output;
 use super::session::Session;
 use super::session::exit::{Failure, Phase};
 
-/// Look at meshes, and repair them.
+/// Check, compare and repair meshes.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -39,7 +39,7 @@ enum Command {
     Repair(repair::Args),
 }
 
-/// Say whether meshes bound a solid, and what keeps them from it; characters in their pose at rest.
+/// Report whether meshes bound a solid, and if not, why; characters in their pose at rest.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  frazil mesh check boot.obj box.obj --json")]
 struct CheckArgs {
@@ -90,7 +90,7 @@ impl CheckArgs {
     }
 }
 
-/// What is known of a mesh.
+/// The check of a mesh.
 fn report(path: &Path, mesh: &TriMesh, faults: &Faults, bodies: &[Body]) -> Value {
     let size = mesh.bounds().map(|(low, high)| <[f32; 3]>::from(high - low));
     json!({
@@ -126,7 +126,7 @@ fn report(path: &Path, mesh: &TriMesh, faults: &Faults, bodies: &[Body]) -> Valu
     })
 }
 
-/// What of the mesh's topology hangs on vertices as the file has them.
+/// The part of the mesh's topology that depends on vertices as the file has them.
 fn by_index(topology: &Topology) -> Value {
     json!({
         "watertight": topology.is_watertight(),
@@ -139,14 +139,14 @@ fn by_index(topology: &Topology) -> Value {
     })
 }
 
-/// Triangles with an area that hang together by edges, with vertices at one position joined.
+/// A component: triangles with an area that are connected by edges, with vertices at one position joined.
 struct Body {
     mesh: TriMesh,
     faults: Faults,
 }
 
 impl Body {
-    /// The bodies of a mesh with such faults, in the order of their first triangles.
+    /// The bodies of a mesh with these faults, in the order of their first triangles.
     fn all(mesh: &TriMesh, faults: &Faults) -> Vec<Self> {
         let bodies = bodies(mesh);
         let is_alone = bodies.len() == 1;
@@ -185,7 +185,7 @@ fn bodies(mesh: &TriMesh) -> Vec<TriMesh> {
     };
     let mut edges: Vec<([u32; 2], u32)> = triangles.iter().zip(0..).flat_map(sides).collect();
     edges.sort_unstable();
-    // Each triangle leads to one before it in its body, the first to itself.
+    // Union-find: each triangle points to an earlier one of its body, the first to itself.
     let mut before: Vec<u32> = (0..triangles.len() as u32).collect();
     for pair in edges.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
         let [a, b] = [pair[0].1, pair[1].1].map(|triangle| first(&mut before, triangle));
@@ -218,7 +218,7 @@ fn first(before: &mut [u32], mut triangle: u32) -> u32 {
     triangle
 }
 
-/// A key of the report, and what it counts, for one and for several.
+/// A key of the report, and the noun for its count, singular and plural.
 pub type Counted = (&'static str, [&'static str; 2]);
 
 const PARTS: [Counted; 2] = [
@@ -232,7 +232,7 @@ const PARTS: [Counted; 2] = [
     ),
 ];
 
-/// Edges and vertices at fault, joined by position or by index.
+/// Faulty edges and vertices, joined by position or by index.
 const JOINTS: [Counted; 4] = [
     ("open_edges", ["edge with one triangle", "edges with one triangle"]),
     (
@@ -317,7 +317,7 @@ const TRIANGLES: [Counted; 11] = [
     ),
 ];
 
-/// A mesh in words: what it is, then only the faults that it has.
+/// A mesh as text: what it is, then only the faults that it has.
 fn in_words(mesh: &Value) -> String {
     let count = |key: &str| mesh[key].as_u64().unwrap_or(0);
     let as_it_is = |key: &str| mesh["by_index"][key].as_u64().unwrap_or(0);
@@ -346,7 +346,7 @@ fn in_words(mesh: &Value) -> String {
     }
     let number = |key: &str| mesh[key].as_f64().unwrap_or(0.0);
     let (area, volume) = (number("area_m2"), number("volume_m3"));
-    // What the parts' volumes leave where they cancel is rounding.
+    // If the parts' volumes cancel, the rest is rounding.
     let is_rounding = volume.abs() < 1e-9 * area * area.sqrt();
     let volume = if is_rounding { 0.0 } else { volume };
     out += &format!("area {area:.6} m2, volume {volume:.6} m3\n");
@@ -354,7 +354,7 @@ fn in_words(mesh: &Value) -> String {
     for (key, forms) in PARTS.into_iter().chain(JOINTS).chain(TRIANGLES).filter(|(key, _)| count(key) > 0) {
         out += &format!("  {:>8} {}\n", count(key), form(count(key), forms));
     }
-    // What joining by position hides.
+    // Faults hidden by joining vertices by position.
     for (key, forms) in JOINTS.into_iter().filter(|(key, _)| ![0, count(key)].contains(&as_it_is(key))) {
         out += &format!("  {:>8} {}, by the vertices' indices\n", as_it_is(key), form(as_it_is(key), forms));
     }
@@ -364,10 +364,10 @@ fn in_words(mesh: &Value) -> String {
     out
 }
 
-/// Bodies that are told in words.
+/// Maximum number of bodies listed in text.
 const TOLD: usize = 8;
 
-/// Several bodies, the largest first; the others only by their count.
+/// Several bodies, the largest first; the rest only as a count.
 fn bodies_in_words(bodies: &[Value]) -> String {
     if bodies.len() < 2 {
         return String::new();
@@ -389,7 +389,7 @@ fn bodies_in_words(bodies: &[Value]) -> String {
     out
 }
 
-/// What is counted, for one or for several.
+/// The noun for a count, singular or plural.
 pub fn form(count: u64, [one, several]: [&'static str; 2]) -> &'static str {
     if count == 1 { one } else { several }
 }

@@ -1,4 +1,4 @@
-//! `frazil mesh repair`: meshes that are open, cross themselves or are inside out in parts become solids.
+//! `frazil mesh repair`: makes solids of meshes that are open, intersect themselves or are inside out in parts.
 
 use std::path::{Path, PathBuf};
 
@@ -22,11 +22,11 @@ use crate::cli::output;
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
 
-/// Make solids of meshes that are open, cross themselves, or are inside out in parts.
+/// Make solids of meshes that are open, intersect themselves, or are inside out in parts.
 ///
-/// The solid is where, with each part turned outward, a point lies inside of at least one: parts that overlap become one, and cavities
-/// are filled. The mesh is rebuilt in the cells of a grid where it is at fault; all other triangles stay as they are, with all that they
-/// carry. What is written has metres, with Y up.
+/// With each part turned outward, the solid is the set of points inside at least one part: overlapping parts become one, and cavities
+/// are filled. The mesh is rebuilt in the cells of a grid where it is faulty; all other triangles stay as they are, with all that they
+/// carry. The output is in metres, with Y up.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -62,7 +62,7 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
     output::check_writable(&args.output).before()?;
     for frame in frames.iter() {
         let from = of_frame(&args.input, frame);
-        // A gap in a sequence is known before any work.
+        // Report a gap in a sequence before any work.
         io::files::source::open(&from).before()?;
         output::refuse_input(&of_frame(&args.output, frame), [from.as_path()]).before()?;
     }
@@ -72,7 +72,7 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
         session.ctx.check().during()?;
         let (from, to) = (of_frame(&args.input, frame), of_frame(&args.output, frame));
         let detail = args.read(&from);
-        // Fail early if the first file lacks it.
+        // Fail early if the first file cannot be repaired.
         let detail = if told.is_empty() { detail.before()? } else { detail.during()? };
         if told.is_empty() {
             args.warn_of_losses(&from, &detail).before()?;
@@ -112,12 +112,12 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
     output::print(&format!("{all:#}\n")).during()
 }
 
-/// The file of a frame, of one file or of a sequence.
+/// The file of a frame, from one file or a sequence.
 fn of_frame(path: &Path, frame: i32) -> PathBuf {
     Pattern::parse(path).map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
 }
 
-/// What encloses nothing.
+/// The error for a mesh that encloses nothing.
 const NOTHING: &str = "nothing in the mesh encloses a volume";
 
 /// Repairs the mesh of a file.
@@ -133,7 +133,7 @@ fn repaired(session: &Session, path: &Path, mesh: &TriMesh, cell: f64) -> Result
     })
 }
 
-/// What to say of a repair besides what was done: what is lost, and corners of which it is not clear which are one.
+/// Warnings about a repair: what is lost, and ambiguous corners.
 fn warning(repaired: &Repaired) -> Option<String> {
     let report = &repaired.report;
     let count = report.prepared.ambiguous_vertices;
@@ -145,7 +145,7 @@ fn warning(repaired: &Repaired) -> Option<String> {
     (!all.is_empty()).then(|| all.join("; "))
 }
 
-/// Whether a mesh had no need of a repair.
+/// Whether a mesh needed no repair.
 fn is_as_it_was(mesh: &TriMesh, repaired: &Repaired) -> bool {
     let count = mesh.triangles.len();
     let Repaired { mesh: after, report, .. } = repaired;
@@ -155,16 +155,16 @@ fn is_as_it_was(mesh: &TriMesh, repaired: &Repaired) -> bool {
         && after.triangles.len() == count
 }
 
-/// The edge of the cells.
+/// The edge of the cells, and its reason.
 #[derive(Clone, Copy)]
 struct Cell {
-    /// m; 0 for a mesh without any extent.
+    /// Edge (m); 0 for a mesh without any extent.
     edge: f64,
-    /// Why it is that.
+    /// The reason for that edge.
     why: &'static str,
 }
 
-/// Parts of a mesh's longest side that cells are at least and at most.
+/// Minimum and maximum cell, as fractions of a mesh's longest side.
 const PARTS: [f64; 2] = [400.0, 40.0];
 
 impl Cell {
@@ -172,7 +172,7 @@ impl Cell {
         Self { edge, why: "" }
     }
 
-    /// Of a mesh, in three digits, so that what is said can be given again.
+    /// The default for a mesh, to three digits, so that the printed value can be passed as an option.
     fn of(mesh: &TriMesh) -> Self {
         let mut lengths = Vec::with_capacity(3 * mesh.triangles.len());
         let (mut low, mut high) = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
@@ -217,7 +217,7 @@ impl Args {
         self.space.space().keeps_vectors()
     }
 
-    /// A mesh in metres with Y up, with all that it carries; of a character only the mesh.
+    /// A mesh in metres with Y up, with its arrays; of a character only the mesh.
     fn read(&self, path: &Path) -> Result<DetailedMesh> {
         let mut detail = if is_gltf(path) {
             let mesh = Character::at_rest_from(path, self.space.origin.at)?;
@@ -227,7 +227,7 @@ impl Args {
         };
         if !self.keeps_space() {
             self.space.bring(&mut detail.mesh);
-            // In another space velocities would be others.
+            // Velocities are not converted to another space.
             detail.arrays.retain(|array| !VELOCITY.contains(&&*array.name));
         }
         warn_if_far(path, &detail.mesh);
@@ -246,7 +246,7 @@ impl Args {
             let carried = io::mesh::Carried { uvs: uvs.as_ref(), arrays: &arrays, ..Default::default() };
             return io::mesh::write_carried(path, mesh, &carried);
         }
-        // USD has velocities of its own.
+        // USD has its own velocities.
         let velocities = vectors(arrays, VELOCITY).unwrap_or_default();
         let is_other = |array: &&MeshArray| {
             velocities.is_empty() || array.on != On::Vertices || !VELOCITY.contains(&&*array.name)
@@ -266,7 +266,7 @@ impl Args {
     }
 }
 
-/// What was done to a mesh.
+/// Report of a mesh's repair.
 fn report(mesh: &TriMesh, repaired: &Repaired, cell: Cell) -> Value {
     let Repaired { mesh: after, report, .. } = repaired;
     let done = &report.prepared;
@@ -299,7 +299,7 @@ fn report(mesh: &TriMesh, repaired: &Repaired, cell: Cell) -> Value {
     })
 }
 
-/// What is done before anything is rebuilt.
+/// Preparation before anything is rebuilt.
 const DONE: [Counted; 5] = [
     (
         "joined_vertices",
@@ -323,7 +323,7 @@ const DONE: [Counted; 5] = [
     ("closed_holes", ["hole closed", "holes closed"]),
 ];
 
-/// How far cells were rebuilt beyond those at fault and what they need.
+/// How far rebuilding extended beyond the faulty cells and those that they require.
 const RUNGS: [&str; 4] = [
     "",
     ", with a ring around",
@@ -331,7 +331,7 @@ const RUNGS: [&str; 4] = [
     ", with all that the mesh passes through",
 ];
 
-/// A repair in words: only what was done.
+/// A repair as text: only what was done.
 fn in_words(report: &Value, cell: Cell) -> String {
     let count = |key: &str| report[key].as_u64().unwrap_or(0);
     let number = |key: &str| report[key].as_f64().unwrap_or(0.0);

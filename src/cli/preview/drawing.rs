@@ -1,4 +1,4 @@
-//! How what was read is drawn, and from where.
+//! How the inputs are drawn, and from which camera.
 
 use frazil::geometry::DVec3;
 use frazil::render::{Camera, Cloud, Cut, Light, Model, Models, Picture, Plane, Size};
@@ -12,19 +12,19 @@ use super::sources::{Part, Wet};
 use super::tint::Tint;
 use crate::cli::session::exit::Failure;
 
-/// The colour of meshes (linear red, green, blue): leather, which snow is seen beside.
+/// The colour of meshes (linear red, green, blue): leather, to contrast with snow.
 const BROWN: [f32; 3] = [0.35, 0.16, 0.08];
-/// The colours of the ground below a liquid, pale stone, and of what stands or moves in it, steel.
+/// The colours of the ground below a liquid (pale stone) and of objects that stand or move in it (steel).
 const STONE: [f32; 3] = [0.58, 0.54, 0.47];
 const STEEL: [f32; 3] = [0.24, 0.26, 0.29];
-/// How much of a liquid's colour a stain takes.
+/// Weight of the liquid's colour in a full stain.
 const STAINED: f64 = 0.6;
-/// The colour of meshes that stand in a liquid, linen.
+/// The colour of static meshes in a liquid: linen.
 const LINEN: [f32; 3] = [0.78, 0.76, 0.70];
-/// The colour of the lines in which a cut meets meshes.
+/// The colour of the lines in which a cut intersects meshes.
 const INK: [f32; 3] = [0.0; 3];
 
-/// What the user chose about the picture.
+/// The user's choices for the picture.
 pub struct Look {
     /// Pixels.
     pub size: Size,
@@ -34,33 +34,33 @@ pub struct Look {
     pub light: Option<Light>,
     /// The attribute that colours points and meshes.
     pub color: Option<String>,
-    /// The scalar that tints liquids, and what it looks like.
+    /// The scalar that tints liquids, and the liquid that it looks like.
     pub tint: Option<Tint>,
-    /// The plane that is drawn in place of the whole.
+    /// The plane to draw instead of the whole.
     pub cut: Option<Plane>,
-    /// Extinction (1/m) of a fog of density 1 whose file does not say it.
+    /// Extinction (1/m) of a fog of density 1 whose file does not give it.
     #[cfg_attr(not(feature = "vdb"), expect(dead_code, reason = "fogs come from .vdb files"))]
     pub fog_density: f64,
 }
 
-/// What is drawn of a frame.
+/// The drawable content of a frame.
 pub struct Drawing {
     content: Content,
-    /// Whether anything in it has what `--color` asks for.
+    /// Whether any part has the attribute of `--color`.
     has_colors: bool,
-    /// Whether a liquid in it is tinted.
+    /// Whether any liquid is tinted.
     has_tint: bool,
-    /// Why nothing may be seen of it: a fog without density, points that a cut leaves out.
+    /// Reasons why parts may be invisible: a fog without density, points that a cut leaves out.
     hollow: Option<String>,
 }
 
-/// Everything in a picture.
+/// All contents of a picture.
 enum Content {
     Models(Models),
     Cut(Cut),
 }
 
-/// What all pictures of a flipbook have in common.
+/// Shared by all pictures of a flipbook.
 pub struct View {
     camera: Camera,
     light: Light,
@@ -95,7 +95,7 @@ impl Look {
                     let mesh = &detailed.mesh;
                     let numbers = self.color.as_deref().and_then(|name| detailed.of_vertices(name));
                     has_colors |= numbers.is_some();
-                    // Without opacities it hides the ground.
+                    // Without opacities the liquid hides the ground.
                     let alpha =
                         detailed.of_vertices("alpha").unwrap_or_else(|| vec![1.0; mesh.positions.len()]);
                     let alpha = alpha.iter().map(|opacity| *opacity as f32).collect();
@@ -149,10 +149,10 @@ impl Look {
         Ok(Drawing { content: Content::Models(models), has_colors, has_tint, hollow })
     }
 
-    /// The camera and the light that were chosen, or those that show all drawings as wholes.
+    /// The chosen camera and light, or ones that show all drawings in full.
     ///
     /// # Errors
-    /// Nothing to see; nothing that `--color` gives colours; a plane beside everything.
+    /// Nothing to see; nothing that `--color` can colour; a plane that misses everything.
     pub fn view(&self, drawings: &[Drawing]) -> std::result::Result<View, Failure> {
         if let Some(name) = self.color.as_ref().filter(|_| drawings.iter().all(|drawing| !drawing.has_colors))
         {
@@ -187,7 +187,7 @@ impl Look {
     }
 }
 
-/// Prepares parts to be cut by a plane: the first grid gives it colours, level sets and meshes are lines in it.
+/// Prepares parts to be cut by a plane: the first grid gives the colours, level sets and meshes become lines.
 #[cfg_attr(not(feature = "vdb"), expect(unused_variables, reason = "of grids only"))]
 fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
     let (mut cut, mut hollow) = (Cut::new(plane), None);
@@ -217,7 +217,7 @@ fn cut(ctx: &Context, parts: Vec<Part>, plane: Plane) -> Result<Drawing> {
     Ok(Drawing { content: Content::Cut(cut), has_colors: false, has_tint: false, hollow })
 }
 
-/// A colour between two.
+/// Interpolates two colours.
 fn mix(from: [f32; 3], to: [f32; 3], share: f64) -> [f32; 3] {
     [0, 1, 2].map(|n| from[n] + share as f32 * (to[n] - from[n]))
 }
@@ -235,7 +235,7 @@ impl Wet {
         }
     }
 
-    /// The depth in which it takes 63 % of the light (m).
+    /// The depth that absorbs 63 % of the light (m).
     pub fn depth(self) -> f64 {
         match self {
             Self::Water => 0.05,
@@ -247,7 +247,7 @@ impl Wet {
         }
     }
 
-    /// What it is called.
+    /// Its name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Water => "water",
@@ -261,7 +261,7 @@ impl Wet {
 }
 
 impl Content {
-    /// Least and greatest corner (m); none when it is empty.
+    /// Minimum and maximum corner (m); none if it is empty.
     fn bounds(&self) -> Option<(DVec3, DVec3)> {
         match self {
             Self::Models(models) => models.bounds(),
@@ -282,7 +282,7 @@ impl View {
         }
     }
 
-    /// The same view on a picture that is smaller by a factor along each edge.
+    /// The same view for a picture that is smaller by a factor along each edge.
     pub fn smaller(&self, factor: u32) -> Self {
         let Size { width, height } = self.size;
         let size = Size { width: width.div_ceil(factor), height: height.div_ceil(factor) };

@@ -15,26 +15,26 @@ use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
 use crate::cli::shot::progress::FrameProgress;
 
-/// Most frames that are made at once: each holds its snow as triangles, and a limit of memory holds for each of them.
+/// Maximum number of frames made at once: each holds its snow as triangles, and a memory limit applies to each of them.
 const MOST_AT_ONCE: usize = 4;
 /// The colours of a GIF are chosen from pictures that are smaller by this factor along each edge.
 const SMALLER: u32 = 4;
 
-/// Frames that are drawn by one camera.
+/// Frames drawn with one camera.
 pub struct Flipbook<'a> {
     session: &'a Session,
     look: &'a Look,
     sources: Sources,
-    /// Ascending.
+    /// Frame numbers, ascending.
     frames: Vec<i32>,
     view: View,
-    /// The first frame, one in the middle and the last.
+    /// The first frame, the middle one and the last.
     probes: Vec<Drawing>,
 }
 
 impl<'a> Flipbook<'a> {
-    /// Chooses the camera for some frames, ascending, at least one: it sees all of the first, of one in the middle and of
-    /// the last, or of those beside them where one cannot be drawn.
+    /// Chooses the camera for some frames, ascending, at least one: it sees all of the first, the middle and
+    /// the last one, or of their neighbours if one cannot be drawn.
     ///
     /// # Errors
     /// No frame that can be drawn; nothing to draw; cancel.
@@ -54,7 +54,7 @@ impl<'a> Flipbook<'a> {
         };
         let (mut probes, mut looked_at, mut first) = (Vec::new(), Vec::new(), None);
         for wanted in positions {
-            // One that cannot be drawn gives way to the next that can.
+            // If one cannot be drawn, the next that can is used.
             for position in (wanted..frames.len()).chain((0..wanted).rev()) {
                 if looked_at.contains(&position) {
                     break;
@@ -96,7 +96,7 @@ impl<'a> Flipbook<'a> {
         each.finish()
     }
 
-    /// Writes a GIF file, whole or not at all, that plays `fps` frames of the shot a second. For a frame that cannot be drawn the one
+    /// Writes a GIF file, whole or not at all, that plays `fps` frames of the shot a second. In place of a frame that cannot be drawn, the one
     /// before is shown longer.
     ///
     /// # Errors
@@ -106,7 +106,7 @@ impl<'a> Flipbook<'a> {
         self.probes.clear();
         let (delays, size) = (delays(&self.frames, fps), self.view.size);
         let (frames, session, mut each) = (self.frames.clone(), self.session, Each::default());
-        // The first error of a frame, kept apart so that it is not reported as one of writing.
+        // The first error of a frame, kept apart so that it is not reported as a write error.
         let mut ended = None;
         let written = atomic::write(path, |out| {
             let mut gif = Gif::new(out, size, &palette)?;
@@ -144,8 +144,8 @@ impl<'a> Flipbook<'a> {
         }
     }
 
-    /// Draws the frames, several at once: `finish` makes of each picture what `take` then gets in the order of the frames, or what
-    /// went wrong with it; what `take` fails with ends the work.
+    /// Draws the frames, several at once: `finish` processes each picture, and `take` gets the results, or errors, in the order of the frames;
+    /// an error of `take` ends the work.
     fn draw<T: Send>(
         &mut self,
         finish: impl Fn(Picture) -> Result<T> + Sync,
@@ -155,7 +155,7 @@ impl<'a> Flipbook<'a> {
         let ctx = &session.ctx;
         let read = |position: usize| -> Result<Result<Vec<Part>>> {
             ctx.check()?;
-            // What is wrong with a frame is its own result.
+            // An error of a frame is its own result.
             let frame = Some(f64::from(frames[position]));
             Ok(sources.refuse_missing(frame).and_then(|()| sources.read(ctx, frame)))
         };

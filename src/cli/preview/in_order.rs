@@ -1,4 +1,4 @@
-//! Several frames at once: read in order, made side by side, taken in order.
+//! Several frames at once: read in order, processed in parallel, taken in order.
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
@@ -7,15 +7,15 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use frazil::{Error, Result};
 
-/// A frame to be made: its position, and where it goes.
+/// A frame to be made: its index, and the channel for its result.
 type Job<T> = (usize, Sender<Result<T>>);
 
-/// Makes frames 0 to `count` on some threads. `read` is called with one after the other, `make` for several at once, on
-/// the thread that read them, and `take` with their results in order on the thread of the caller. At most one frame more
-/// than there are threads is begun and not taken.
+/// Makes frames 0 to `count` on several threads. `read` is called for one frame after the other, `make` for several at once, on
+/// the thread that read them, and `take` with their results in order on the caller's thread. At most one frame more
+/// than there are threads is in flight.
 ///
 /// # Errors
-/// The first error, by frame; no frame behind it is read any more.
+/// The first error, in order of frames; no later frame is read any more.
 pub fn in_order<R, T: Send>(
     count: usize,
     threads: usize,
@@ -29,7 +29,7 @@ pub fn in_order<R, T: Send>(
         for _ in 0..threads.max(1) {
             scope.spawn(|| work(&waiting, &failed, &make));
         }
-        // Dropped with the closure, which ends the threads.
+        // Dropped with the closure; this ends the threads.
         let ask = ask;
         let mut begun: VecDeque<Receiver<Result<T>>> = VecDeque::new();
         let mut next = 0;
@@ -49,24 +49,24 @@ pub fn in_order<R, T: Send>(
     })
 }
 
-/// Takes jobs until there are none.
+/// Takes jobs until none are left.
 fn work<R, T>(
     waiting: &Mutex<(Receiver<Job<T>>, impl FnMut(usize) -> Result<R>)>,
     failed: &AtomicBool,
     make: &impl Fn(usize, R) -> Result<T>,
 ) {
     loop {
-        // One thread waits for a job and reads it while the others make theirs; a panic there ends them all.
+        // One thread waits for a job and reads it while the others process theirs; a panic there ends them all.
         let Ok(mut turn) = waiting.lock() else { return };
         let (jobs, read) = &mut *turn;
         let Ok((frame, done)) = jobs.recv() else { return };
-        // What was asked for before a frame failed is still in the channel.
+        // Jobs that were sent before a frame failed are still in the channel.
         if failed.load(Ordering::Relaxed) {
             return;
         }
         let raw = read(frame);
         drop(turn);
-        // Nobody listens any more when a frame before this one failed.
+        // The receiver is gone if an earlier frame failed.
         let _ = done.send(raw.and_then(|raw| make(frame, raw)));
     }
 }
@@ -92,7 +92,7 @@ mod tests {
                 Ok(frame)
             };
             let make = |frame: usize, raw: usize| {
-                // Later frames are done sooner.
+                // Later frames finish sooner.
                 std::thread::sleep(Duration::from_millis(3 * (20 - frame as u64) % 7));
                 Ok(10 * raw)
             };

@@ -43,24 +43,24 @@ pub struct Args {
     /// `frazil snow`, `surface` or `shallow`, or, with --frame or --frames, a pattern (base.%04d.vdb).
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// The picture (.png); of several frames a pattern (p.%04d.png), or a .gif.
+    /// The picture (.png); for several frames a pattern (p.%04d.png), or a .gif.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Attribute that gives points, and vertices of a mesh, their colours, from dark blue to pale yellow over its values.
+    /// Attribute that colours points and vertices of a mesh, from dark blue to pale yellow over its values.
     #[arg(long, value_name = "NAME")]
     color: Option<String>,
     /// Scalar that tints a liquid, from clear water at 0 to blood, paint, honey, milk or coffee at 1.
     #[arg(long, value_name = "NAME=LIQUID", conflicts_with = "color")]
     tint: Option<Tint>,
-    /// Draw a plane across an axis at a position (m), seen from the axis' end, in place of the whole: the first grid in colours from
-    /// dark blue to pale yellow, of a level set from the inner end of its narrow band to the outer, of any other from the least of
-    /// its values and 0 to the greatest (-v prints both), level sets as white lines and meshes as black ones; points are left out.
+    /// Draw only a plane across an axis at a position (m), seen from the axis' end: the first grid in colours from
+    /// dark blue to pale yellow, for a level set from the inner end of its narrow band to the outer, for any other from the minimum of
+    /// its values and 0 to the maximum (-v prints both), level sets as white lines and meshes as black ones; points are left out.
     #[arg(long, value_name = "AXIS=M", value_parser = plane, conflicts_with_all = ["color", "tint", "sun", "fog_density"])]
     cut: Option<Plane>,
     /// Clip that characters play [default: they are at rest, or play their only clip with --frame].
     #[arg(long, value_name = "NAME")]
     clip: Option<String>,
-    /// Frame of a shot [default: its last one]; clips of characters begin at frame 1.
+    /// Frame of a shot [default: its last one]; clips of characters start at frame 1.
     #[arg(long, value_name = "N", value_parser = options::finite, allow_hyphen_values = true)]
     frame: Option<f64>,
     /// Frames of a flipbook [default: all of a shot, if the output is a pattern or a .gif].
@@ -69,16 +69,16 @@ pub struct Args {
     /// Frames a second [default: as the shot's scene says, else 24].
     #[arg(long, value_name = "N", value_parser = options::positive)]
     fps: Option<f64>,
-    /// Extinction of a fog of density 1 (1/m), where its file does not say it (frazil:density_scale).
+    /// Extinction of a fog of density 1 (1/m), if its file does not give it (frazil:density_scale).
     #[arg(long, value_name = "N", default_value = "5", value_parser = options::positive)]
     fog_density: f64,
     /// Pixels.
     #[arg(long, default_value = "1280x720", value_parser = options::size)]
     size: Size,
-    /// Where the camera is (m) [default: so that everything is seen].
+    /// Position of the camera (m) [default: so that everything is seen].
     #[arg(long, value_name = "X,Y,Z", value_parser = options::triple, allow_hyphen_values = true, requires = "target")]
     eye: Option<DVec3>,
-    /// What it looks at (m).
+    /// Point that the camera looks at (m).
     #[arg(long, value_name = "X,Y,Z", value_parser = options::triple, allow_hyphen_values = true, requires = "eye")]
     target: Option<DVec3>,
     /// Vertical field of view (degrees).
@@ -107,9 +107,9 @@ fn plane(text: &str) -> Result<Plane, String> {
     Ok(Plane { axis, at })
 }
 
-/// What is made.
+/// The kind of output.
 enum Job {
-    /// A picture, of a frame where something moves.
+    /// A picture, of one frame if anything moves.
     Still(Option<f64>, PathBuf),
     /// A picture of each frame.
     Pictures(Vec<i32>, Pattern),
@@ -172,7 +172,7 @@ impl Args {
         Ok(Look { size, camera, light, color, tint, cut: self.cut, fog_density })
     }
 
-    /// Refuses options that nothing of what is drawn depends on.
+    /// Refuses options that have no effect on these inputs.
     fn refuse_idle_options(&self, sources: &Sources) -> Result<(), Failure> {
         if self.clip.is_some() && !sources.has_characters() {
             return Err(Failure::refused("--clip is for .glb and .gltf files, and none is given"));
@@ -185,12 +185,12 @@ impl Args {
         Ok(())
     }
 
-    /// What is to be made, by the name of the output and the frames.
+    /// The kind of output, from its name and the frames.
     fn job(&self, sources: &Sources) -> Result<Job, Failure> {
         let path = self.output.clone();
         let refused = |what: &str| Err(Failure::refused(format!("{}: {what}", path.display())));
         let is_gif = extension(&path) == "gif";
-        // Whatever else is there under that name, a shot's file above all, is not a picture.
+        // Any other file under that name, especially a shot's, is not a picture.
         if !is_gif && extension(&path) != "png" && !atomic::is_stream(&path) {
             return refused("a picture is a .png file, a flipbook a .gif file or a pattern (p.%04d.png)");
         }
@@ -226,7 +226,7 @@ impl Args {
 }
 
 impl Job {
-    /// Refuses frames that a shot does not have, to draw where no frame of a sequence is there, and a folder that takes no pictures.
+    /// Refuses frames that a shot lacks, a drawing for which no frame of a sequence exists, and a folder that cannot take pictures.
     fn check(&self, sources: &Sources) -> frazil::Result<()> {
         let (first, frames) = match self {
             Self::Still(frame, path) => (path.clone(), vec![*frame]),

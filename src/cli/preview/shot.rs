@@ -24,10 +24,10 @@ pub struct Shot {
     frames: Vec<i32>,
 }
 
-/// Of each frame of a stage the file that is drawn.
+/// The file to draw for each frame of a stage.
 type Files = BTreeMap<i32, PathBuf>;
 
-/// The stages that are drawn, in this order, each with the files of it that are read, the best first.
+/// The stages that are drawn, in this order, each with its readable kinds of files, the best first.
 const STAGES: [(&str, &[&str]); 5] = [
     ("base", &["vdb"]),
     ("grains", &["vdb", "ply"]),
@@ -40,7 +40,7 @@ impl Shot {
     /// Opens a folder.
     ///
     /// # Errors
-    /// Records that cannot be read; none of a stage that is drawn.
+    /// Records that cannot be read; no stage that can be drawn.
     pub fn open(folder: &Path) -> Result<Self> {
         let (base, grains) = (Rebuild::open(folder)?, RebuildGrains::open(folder)?);
         let stored = |stage: usize| Stored::read(folder, STAGES[stage].0);
@@ -57,7 +57,7 @@ impl Shot {
         Ok(Self { folder: folder.to_path_buf(), base, grains, mist, objects, surface, files, frames })
     }
 
-    /// Where it is.
+    /// Its path.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -67,7 +67,7 @@ impl Shot {
         &self.frames
     }
 
-    /// Its frames a second, from its scene.
+    /// Its frame rate, from its scene.
     ///
     /// # Errors
     /// No scene.toml, or one that cannot be read.
@@ -82,7 +82,7 @@ impl Shot {
     /// Refuses a frame that one of its stages lacks.
     ///
     /// # Errors
-    /// Which frames there are.
+    /// Lists the frames that exist.
     pub fn refuse_missing(&self, frame: i32) -> Result<()> {
         if self.frames.binary_search(&frame).is_ok() {
             return Ok(());
@@ -98,7 +98,7 @@ impl Shot {
         Err(Error::file(&self.folder, what))
     }
 
-    /// What there is of a frame; frames in ascending order cost one file of each stage.
+    /// Reads the contents of a frame; in ascending order, each frame reads one file of each stage.
     ///
     /// # Errors
     /// A file that cannot be read or that is not what was written; cancel.
@@ -146,7 +146,7 @@ impl Shot {
     }
 }
 
-/// The files of a stage that are drawn; a warning where it has none of a kind that is read.
+/// The files of a stage to draw; a warning if it has none of a readable kind.
 fn files_of(folder: &Path, stored: &Stored, (stage, extensions): (&str, &[&str])) -> Files {
     let all = stored.files(stage);
     let mut files = Files::new();
@@ -163,7 +163,7 @@ fn files_of(folder: &Path, stored: &Stored, (stage, extensions): (&str, &[&str])
     files
 }
 
-/// The frames that all stages have of which there are any.
+/// The frames that all existing stages have.
 fn frames_of_all(files: &[Files]) -> Vec<i32> {
     let mut of_stages = files.iter().filter(|files| !files.is_empty());
     let Some(first) = of_stages.next() else { return Vec::new() };

@@ -1,4 +1,4 @@
-//! What is drawn: files, sequences and whole shots, read frame by frame.
+//! The inputs of a picture: files, sequences and whole shots, read frame by frame.
 
 use std::path::{Path, PathBuf};
 
@@ -15,19 +15,19 @@ use super::spill::Spill;
 #[cfg(feature = "vdb")]
 use crate::cli::vdb::model::{self, Content};
 
-/// A part of a picture, as it was read.
+/// A part of a picture, as read.
 pub enum Part {
-    /// A mesh with what it carries.
+    /// A mesh with its arrays.
     Mesh(DetailedMesh),
-    /// The surface of a liquid, with its opacities `alpha`, and what it is.
+    /// The surface of a liquid, with its opacities `alpha`, and the kind of liquid.
     Liquid(DetailedMesh, Wet),
-    /// The ground below a liquid, with the stains on its vertices, 0 to 1, and what left them; there may be none.
+    /// The ground below a liquid, with the stains on its vertices, 0 to 1, and the liquid that left them; stains are optional.
     Ground(TriMesh, Vec<f64>, Wet),
-    /// What moves in a liquid, or stands there: a tool.
+    /// A tool or an obstacle in a liquid.
     Obstacle(TriMesh),
-    /// A mesh that stands in a liquid.
+    /// A static mesh in a liquid.
     Cloth(TriMesh),
-    /// Points, and where they came from.
+    /// Points, and the file that they came from.
     Points(PathBuf, Points),
     /// A level set.
     #[cfg(feature = "vdb")]
@@ -37,20 +37,20 @@ pub enum Part {
     Fog(PathBuf, FloatGrid),
 }
 
-/// A liquid that is drawn.
+/// The look of a liquid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wet {
     Water,
     Blood,
     Paint,
     Honey,
-    /// Those that only dyes look like.
+    /// Looks that only dyes have.
     Milk,
     Coffee,
 }
 
 impl Wet {
-    /// That of a name; blood where it is another.
+    /// The liquid of a name; blood if the name is unknown.
     pub fn of(name: &str) -> Self {
         match name {
             "water" => Self::Water,
@@ -61,7 +61,7 @@ impl Wet {
     }
 }
 
-/// Something to draw.
+/// An input to draw.
 enum Source {
     File(PathBuf),
     Sequence(Pattern),
@@ -70,28 +70,28 @@ enum Source {
     Spill(Box<Spill>),
 }
 
-/// Everything that is drawn.
+/// All inputs of a picture.
 pub struct Sources {
     all: Vec<Source>,
     clip: Option<String>,
-    /// Frames a second that the user gave.
+    /// The user's frame rate.
     fps: Option<f64>,
 }
 
-/// Frames a second where neither the user nor a shot says it.
+/// Frames a second if neither the user nor a shot gives them.
 const FPS: f64 = 24.0;
 
 impl Sources {
-    /// Opens files, patterns of sequences and folders of shots. Characters play `clip`, or their only one without it.
+    /// Opens files, patterns of sequences and folders of shots. Characters play `clip`; without it their only one.
     ///
     /// # Errors
-    /// A folder that is no shot's, or whose records cannot be read.
+    /// A folder that is not a shot's, or whose records cannot be read.
     pub fn open(paths: &[PathBuf], clip: Option<String>, fps: Option<f64>) -> Result<Self> {
         let all = paths.iter().map(|path| Source::open(path)).collect::<Result<_>>()?;
         Ok(Self { all, clip, fps })
     }
 
-    /// Frames a second: those that the user gave, else those of the first shot, else 24.
+    /// Frames a second: the user's, else those of the first shot, else 24.
     ///
     /// # Errors
     /// A shot's scene that cannot be read.
@@ -111,7 +111,7 @@ impl Sources {
         })
     }
 
-    /// Whether something depends on the frame.
+    /// Whether any input depends on the frame.
     pub fn moves(&self) -> bool {
         self.all.iter().any(|source| !matches!(source, Source::File(path) if !is_gltf(path)))
     }
@@ -121,24 +121,24 @@ impl Sources {
         self.all.iter().any(|source| matches!(source, Source::File(path) if is_gltf(path)))
     }
 
-    /// Refuses a frame of which a sequence or a shot has nothing, and no frame where one is needed.
+    /// Refuses a frame that a sequence or a shot lacks, or a missing frame number if one is needed.
     ///
     /// # Errors
-    /// Which.
+    /// Names what is missing.
     pub fn refuse_missing(&self, frame: Option<f64>) -> Result<()> {
         self.all.iter().try_for_each(|source| source.refuse_missing(frame))
     }
 
-    /// As [`Sources::refuse_missing`], of shots alone: a sequence may have gaps.
+    /// As [`Sources::refuse_missing`], for shots alone: a sequence may have gaps.
     ///
     /// # Errors
-    /// Which.
+    /// Names what is missing.
     pub fn refuse_beyond(&self, frame: Option<f64>) -> Result<()> {
         let shots = self.all.iter().filter(|source| !matches!(source, Source::Sequence(_)));
         shots.into_iter().try_for_each(|source| source.refuse_missing(frame))
     }
 
-    /// Reads what is drawn at a frame; a shot's frames in ascending order cost one file each.
+    /// Reads the inputs at a frame; in ascending order, each frame of a shot reads one file.
     ///
     /// # Errors
     /// A file that cannot be read; cancel.
@@ -215,7 +215,7 @@ impl Source {
     }
 }
 
-/// The frame of something that has whole frames only.
+/// The frame number for an input that has whole frames only.
 fn whole(frame: Option<f64>, name: &Path) -> Result<i32> {
     match frame {
         Some(frame) if frame.fract() == 0.0 && frame.abs() <= 1.0e9 => Ok(frame as i32),
@@ -247,7 +247,7 @@ fn of_file(path: &Path, clip: Option<&str>, frame: Option<f64>, fps: f64) -> Res
     Ok(vec![Part::Mesh(mesh)])
 }
 
-/// Reads points of a file that is not .vdb.
+/// Reads points of a file other than .vdb.
 ///
 /// # Errors
 /// A file that cannot be read.

@@ -13,23 +13,23 @@ use super::sources::{Part, Wet};
 
 /// The stage, and the kind of its files.
 const LIQUID: &str = "liquid";
-/// The kind of the files of a terrain with stains.
+/// The kind of the files of a stained terrain.
 const TERRAIN: &str = "terrain";
 
-/// Such a folder, read frame by frame.
+/// An output folder of `frazil shallow`, read frame by frame.
 pub struct Spill {
     folder: PathBuf,
     liquid: Stored,
-    /// The scene; none where it cannot be read: the liquid is then drawn alone.
+    /// The scene; none if it cannot be read: the liquid is then drawn alone.
     scene: Option<Scene>,
-    /// The terrain, where it is the same in all frames and was read.
+    /// The terrain, if it is the same in all frames and was read.
     terrain: Option<TriMesh>,
-    /// The frames that there are, ascending; at least one.
+    /// The existing frames, ascending; at least one.
     frames: Vec<i32>,
 }
 
 impl Spill {
-    /// Opens a folder; none where it has no such frames.
+    /// Opens a folder; none if it has no such frames.
     ///
     /// # Errors
     /// Records that cannot be read.
@@ -51,20 +51,20 @@ impl Spill {
         Ok(Some(Self { folder: folder.to_path_buf(), liquid, scene, terrain: None, frames }))
     }
 
-    /// Where it is.
+    /// Its path.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// The frames that there are, ascending; at least one.
+    /// The existing frames, ascending; at least one.
     pub fn frames(&self) -> &[i32] {
         &self.frames
     }
 
-    /// Its frames a second, from its scene.
+    /// Its frame rate, from its scene.
     ///
     /// # Errors
-    /// No scene that can be read.
+    /// A scene that cannot be read.
     pub fn fps(&self) -> Result<f64> {
         let fps = self.scene.as_ref().map(|scene| scene.shot().fps);
         fps.ok_or_else(|| {
@@ -73,10 +73,10 @@ impl Spill {
         })
     }
 
-    /// Refuses a frame that is not there.
+    /// Refuses a frame that does not exist.
     ///
     /// # Errors
-    /// Which frames there are.
+    /// Lists the frames that exist.
     pub fn refuse_missing(&self, frame: i32) -> Result<()> {
         if self.frames.binary_search(&frame).is_ok() {
             return Ok(());
@@ -89,7 +89,7 @@ impl Spill {
         Err(Error::file(&self.folder, what))
     }
 
-    /// What there is of a frame.
+    /// Reads the contents of a frame.
     ///
     /// # Errors
     /// A file that cannot be read or that is not what was written; cancel.
@@ -105,7 +105,7 @@ impl Spill {
             parts.push(Part::Ground(stained.mesh, stains, look));
         }
         let path = self.liquid.file_with(frame, LIQUID, "ply")?;
-        // A file without faces is no mesh.
+        // A file without faces is not a mesh.
         let report = self.liquid.report(frame)?;
         let is_dry = report.is_some_and(|report| report["triangles"].as_u64() == Some(0));
         if !is_dry {
@@ -114,7 +114,7 @@ impl Spill {
         Ok(parts)
     }
 
-    /// The terrain, and what stands on it; a warning where it is gone.
+    /// The terrain, and the objects on it; a warning if they cannot be read.
     fn around(&mut self, ctx: &Context, frame: i32, look: Wet) -> Vec<Part> {
         let Some(scene) = &self.scene else { return Vec::new() };
         let around = match self.terrain.clone() {

@@ -1,4 +1,4 @@
-//! Dyes: a clear liquid takes the colour of another one, as far as it carries it.
+//! Dyes: a clear liquid takes the colour of another in proportion to the dye that it carries.
 
 use std::str::FromStr;
 
@@ -9,7 +9,7 @@ use super::sources::Wet;
 /// A scalar that tints a liquid.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tint {
-    /// The scalar: from 0, water, to 1.
+    /// The scalar: 0 is water, 1 the full dye.
     pub name: String,
     look: Wet,
 }
@@ -30,8 +30,8 @@ impl FromStr for Tint {
 }
 
 impl Tint {
-    /// What light is left with on its way through liquid of these depths that carries so much (Lambert, Beer); none for a mesh that does not
-    /// say both.
+    /// The fraction of light that remains after passing through liquid of these depths and concentrations (Lambert, Beer); none for a mesh
+    /// that lacks either.
     pub fn of(&self, liquid: &DetailedMesh) -> Option<Tinted> {
         let (shares, depths) = (liquid.of_vertices(&self.name)?, liquid.of_vertices("depth")?);
         let [clear, dye] = [Wet::Water, self.look].map(|look| (look.colour(), 1.0 / look.depth()));

@@ -11,7 +11,7 @@ pub const FAILED: u8 = 1;
 /// Exit code: refused before the work began.
 pub const REFUSED: u8 = 2;
 
-/// Exit code: refused because another run is at work in the folder (`EX_TEMPFAIL` of sysexits.h): the same command may do later.
+/// Exit code: refused because another run is at work in the folder (`EX_TEMPFAIL` of sysexits.h): the same command may succeed later.
 pub const BUSY: u8 = 75;
 
 /// Why a command ends early.
@@ -43,7 +43,7 @@ impl Failure {
 pub trait Phase<T> {
     /// Before the work began: exit code 2.
     fn before(self) -> Result<T, Failure>;
-    /// After it began: exit code 1, but 2 for arguments and memory, which are known beforehand.
+    /// After it began: exit code 1, but 2 for arguments and memory, which are checked beforehand.
     fn during(self) -> Result<T, Failure>;
 }
 
@@ -63,11 +63,11 @@ impl<T> Phase<T> for frazil::Result<T> {
     }
 }
 
-/// One sentence on stderr, whatever line breaks its parts had.
+/// Prints one sentence on stderr, without the line breaks of its parts.
 pub fn say_error(message: &str) {
     let message = frazil::error::visible(message);
     let sentence: Vec<&str> = message.split_whitespace().collect();
-    // There is nobody to report to when stderr is closed.
+    // If stderr is closed, there is nowhere to report to.
     let _ = writeln!(std::io::stderr(), "frazil: {}", sentence.join(" "));
 }
 

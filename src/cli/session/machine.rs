@@ -14,7 +14,7 @@ pub enum Amount {
 }
 
 impl Amount {
-    /// In bytes; without a limit when the machine does not report its memory.
+    /// In bytes; unlimited if the machine does not report its memory.
     pub fn bytes(self) -> u64 {
         match self {
             Self::Bytes(bytes) => bytes,
@@ -46,7 +46,7 @@ impl FromStr for Amount {
     }
 }
 
-/// Bytes that this user may still write where a folder is.
+/// Bytes that this user may still write on a folder's disk.
 pub fn free_space(folder: &std::path::Path) -> Option<u64> {
     let file_system = rustix::fs::statvfs(folder).ok()?;
     Some(file_system.f_bavail * file_system.f_frsize)

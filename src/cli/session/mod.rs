@@ -28,10 +28,10 @@ pub struct Globals {
     #[cfg(feature = "vdb")]
     #[arg(long, value_name = "SIZE", global = true, default_value = "80%")]
     max_memory: machine::Amount,
-    /// Say nothing but errors.
+    /// Print nothing but errors.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Say what is read and how long each phase takes; twice: everything.
+    /// Print what is read and how long each phase takes; twice: everything.
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
     /// Write times, memory and results of this run as JSON.
@@ -52,7 +52,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Starts threads and signal handlers, and checks what can be checked without knowing the command.
+    /// Starts threads and signal handlers, and does the checks that do not depend on the command.
     pub fn start(globals: Globals) -> Result<Self, Failure> {
         start_log(&globals);
         let pool = match globals.threads {
@@ -67,7 +67,7 @@ impl Session {
         frazil::io::files::source::stop_when(cancel.clone());
         #[cfg(feature = "vdb")]
         guard::install(Guard {
-            // The program as it runs, even if its file was replaced meanwhile.
+            // The running program, even if its file was replaced meanwhile.
             program: "/proc/self/exe".into(),
             memory: globals.max_memory.bytes(),
             threads: ctx.pool().threads(),
@@ -101,7 +101,7 @@ impl Session {
         self.results.lock().expect("no panic holds this lock").insert(key.to_string(), value);
     }
 
-    /// Writes the report, prints what went wrong, and returns the exit code.
+    /// Writes the report, prints the error if there is one, and returns the exit code.
     pub fn finish(&self, result: Result<(), Failure>) -> u8 {
         let result = match (&self.globals.report, result) {
             (Some(path), Ok(())) => self.write_report(path).during(),

@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM raise the cancel flags; a second one ends the program at once, and so does the first when the work
+//! Ctrl-C and SIGTERM raise the cancel flags; a second one ends the program at once, and so does the first if the work
 //! does not stop by itself: it may be waiting for a file.
 
 use signal_hook::consts::signal::{SIGINT, SIGTERM, SIGXFSZ};
@@ -9,9 +9,9 @@ use std::time::Duration;
 
 use super::exit;
 
-/// How long the work may take to stop.
+/// Time that the work may take to stop.
 const GRACE: Duration = Duration::from_millis(700);
-/// How often it is looked whether a signal came.
+/// Interval between checks for a signal.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Which signal came, if one did.
@@ -25,7 +25,7 @@ impl Signals {
         let code = Arc::new(AtomicUsize::new(0));
         let again = Arc::new(AtomicBool::new(false));
         for (signal, exit_code) in [(SIGINT, 130), (SIGTERM, 143)] {
-            // The order matters: the first signal finds `again` unset and raises it for the second.
+            // The order matters: the first signal finds `again` unset and sets it for the second.
             flag::register_conditional_shutdown(signal, exit_code, again.clone())?;
             flag::register(signal, again.clone())?;
             flag::register_usize(signal, code.clone(), exit_code as usize)?;
@@ -33,14 +33,14 @@ impl Signals {
                 flag::register(signal, flag.clone())?;
             }
         }
-        // A file over the shell's size limit is to be a failed write, not the end of the program.
+        // A file over the shell's size limit must be a failed write, not the end of the program.
         flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
         let signals = Self { code };
         signals.watch()?;
         Ok(signals)
     }
 
-    /// Ends the program some time after a signal, whatever it is doing: files are whole or not there at any moment.
+    /// Ends the program some time after a signal, whatever it is doing: at any moment, files are whole or not there.
     fn watch(&self) -> std::io::Result<()> {
         let code = self.code.clone();
         let watch = move || {

@@ -7,7 +7,7 @@ use std::io::Write;
 /// Prints help, version or the error; returns the exit code.
 pub fn report(error: &Error) -> u8 {
     if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
-        // A reader that closes the pipe early has seen enough.
+        // A reader that closes the pipe early is not an error.
         let _ = write!(std::io::stdout(), "{}", error.render());
         return exit::DONE;
     }
@@ -16,7 +16,7 @@ pub fn report(error: &Error) -> u8 {
         exit::say_error("a command is missing; see `frazil --help`");
         return exit::REFUSED;
     }
-    // clap prints a headline, maybe a list and a tip, then the usage; the first two say what is wrong.
+    // clap prints a headline, maybe a list and a tip, then the usage; the first two describe the error.
     let told: Vec<&str> = text.lines().take_while(|line| !line.starts_with("Usage:")).collect();
     let told = told.join(" ");
     let told = told.strip_prefix("error:").unwrap_or(&told).trim();

@@ -1,4 +1,4 @@
-//! What the commands that make shots have in common.
+//! Shared by the commands that make shots.
 
 pub(in crate::cli) mod progress;
 pub(in crate::cli) mod shallow;
@@ -18,25 +18,25 @@ use super::session::Session;
 use super::session::exit::{Failure, Phase};
 use progress::FrameProgress;
 
-/// Where a shot goes, and which part of it is made.
+/// The output of a shot, and the part of it to make.
 #[derive(clap::Args)]
 pub struct ShotArgs {
-    /// Folder for the output; made if it is not there.
+    /// Folder for the output; created if it does not exist.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Write these frames only; frames before them are computed when no file has them.
+    /// Write only these frames; earlier frames are computed if no file has them.
     #[arg(long, value_name = "A-B|A-BxN|A,B,C", allow_hyphen_values = true)]
     pub frames: Option<FrameChoice>,
     /// Keep the frames before N, whatever they were made with, and make all others of these stages again.
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     pub from: Option<i32>,
-    /// Put a setting over the scene's, for instance snow.noise.seed=2 or object.1.file=hero.glb.
+    /// Override a setting of the scene, for instance snow.noise.seed=2 or object.1.file=hero.glb.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<Override>,
 }
 
 impl ShotArgs {
-    /// The frames that are wanted.
+    /// The requested frames.
     pub fn frames(&self, scene: &Scene) -> Result<FrameChoice, Failure> {
         let shot_frames = scene.shot().frames;
         let frames = self.frames.clone().unwrap_or_else(|| shot_frames.into());

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 /// Length of one frame on the bar.
 const FRAME: u64 = 1000;
 
-/// Shows which frame was finished and when the last one will be; on a terminal also how far the running frame is.
+/// Shows which frame was finished and the expected end; on a terminal also the progress within the running frame.
 pub struct FrameProgress<'a> {
     ctx: &'a Context,
     bar: Option<ProgressBar>,
@@ -21,10 +21,10 @@ pub struct FrameProgress<'a> {
 }
 
 impl<'a> FrameProgress<'a> {
-    /// Starts the display of `total` frames to be made by steps on `ctx`, besides those that are `there`.
+    /// Starts the display of `total` frames to be made by steps on `ctx`, in addition to the existing ones (`there`).
     pub fn new(ctx: &'a Context, total: usize, there: usize, quiet: bool) -> Self {
         if there > 0 && !quiet {
-            // Progress is a courtesy: a closed stderr is no reason to stop.
+            // Progress is optional: a closed stderr does not stop the run.
             let _ = writeln!(std::io::stderr(), "{there} frames are there, {total} are to be made");
         }
         let terminal = std::io::stderr().is_terminal();
@@ -73,14 +73,14 @@ fn watch(bar: ProgressBar, done: Arc<AtomicUsize>) -> frazil::context::Poll {
     })
 }
 
-/// Moves the bar to so many frames and a fraction of the next; never backwards, though frames are computed ahead of the
+/// Moves the bar to a frame count and a fraction of the next frame; never backwards, though frames are computed ahead of the
 /// files.
 fn advance(bar: &ProgressBar, done: usize, fraction: Option<f32>) {
     let position = done as u64 * FRAME + (fraction.unwrap_or(0.0) * FRAME as f32) as u64;
     bar.set_position(position.max(bar.position()));
 }
 
-/// Time left as `hh:mm:ss`, if the frames to come take as long as those done.
+/// Remaining time as `hh:mm:ss`, if the coming frames take as long as those done.
 fn clock(elapsed: Duration, done: usize, total: usize) -> String {
     let left = elapsed.as_secs_f64() * total.saturating_sub(done) as f64 / done.max(1) as f64;
     let seconds = left.round() as u64;

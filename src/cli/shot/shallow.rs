@@ -12,9 +12,10 @@ use crate::cli::session::exit::{Failure, Phase};
 
 /// Let a little liquid flow over a terrain: blood, water, paint, honey.
 ///
-/// Writes liquid/liquid.%04d.ply (the surface and what is in the air, with velocities, depths, layers, opacities and scalars),
-/// volume/volume.%04d.vdb where the scene asks for it, report/liquid.%04d.json (ml inside, come and gone, steps, times), shot.usda and scene.toml, the scene with every
-/// default filled in. Frames that are there and match are not made again; a folder with frames of other settings is refused.
+/// Writes liquid/liquid.%04d.ply (the surface and the liquid in the air, with velocities, depths, layers, opacities and scalars),
+/// volume/volume.%04d.vdb if the scene asks for it, report/liquid.%04d.json (ml inside, added and removed, steps, times), shot.usda and
+/// scene.toml, the scene with every default filled in. Frames that are there and match are not made again; a folder with frames of other
+/// settings is refused.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -50,14 +51,14 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     Ok(())
 }
 
-/// How long the phases of frames took.
+/// Times of the phases of frames.
 #[derive(Default)]
 struct Times(Vec<Phases>);
 
-/// A phase, in all frames.
+/// A phase, over all frames.
 struct Phases {
     name: &'static str,
-    /// Milliseconds of all frames, and of the slowest.
+    /// Milliseconds: total over all frames, and maximum.
     sum: f64,
     worst: f64,
     count: usize,
@@ -88,7 +89,7 @@ impl Times {
         }
     }
 
-    /// Mean and worst of each phase.
+    /// Mean and maximum of each phase.
     fn into_json(self) -> Value {
         let of =
             |phase: Phases| (phase.name.to_string(), json!({ "mean": phase.mean(), "worst": phase.worst }));

@@ -11,7 +11,7 @@ use crate::cli::session::exit::{Failure, Phase};
 /// Press moving objects into a layer of snow.
 ///
 /// Writes base/base.%04d.vdb (surface, compression, touched), removed/removed.%04d.vdb, grains/, mist/, fog/, snow/, mesh/ and objects/
-/// where the scene asks for it, report/base.%04d.json, shot.usda and scene.toml, the scene with every default filled in. Frames that are there
+/// if the scene asks for it, report/base.%04d.json, shot.usda and scene.toml, the scene with every default filled in. Frames that are there
 /// and match are not made again; a folder with frames of other settings is refused.
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -22,10 +22,10 @@ Examples:
 pub struct Args {
     /// Scene file (TOML).
     scene: PathBuf,
-    /// Make these stages of the scene only (base, grains, mist, volumes, objects); all without it.
+    /// Make only these stages of the scene (base, grains, mist, volumes, objects) [default: all].
     #[arg(long, value_name = "A,B", value_delimiter = ',')]
     stage: Vec<String>,
-    /// Make the cells N times as large: a quick look, into a folder of its own.
+    /// Make the cells N times as large, for a quick preview in a folder of its own.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=100))]
     preview: Option<u16>,
     #[command(flatten)]

@@ -10,10 +10,10 @@ use crate::cli::options::positive;
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
 
-/// Carry a detailed mesh along with the particles of a liquid, frame by frame, without losing its detail.
+/// Carry a detailed mesh along with the particles of a liquid, frame by frame, keeping its detail.
 ///
-/// Writes surface/surface.%04d.ply (with velocities over the coming frame, the distance that each vertex keeps, and where it is
-/// flagged: the liquid merged or split there), report/surface.%04d.json, shot.usda and scene.toml, the scene with every default
+/// Writes surface/surface.%04d.ply (with velocities over the coming frame, the distance that each vertex keeps, and flags where
+/// the liquid merged or split), report/surface.%04d.json, shot.usda and scene.toml, the scene with every default
 /// filled in. Frames that are there and match are not made again; a folder with frames of other settings is refused.
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -21,10 +21,10 @@ Examples:
   frazil surface spot.toml -o out/
   frazil surface -p spot.%04d.bgeo -m spot.ply -o spot/ --fps 25")]
 pub struct Args {
-    /// Scene file (TOML); or -p, and the others below.
+    /// Scene file (TOML); or use -p and the options below.
     #[arg(required_unless_present = "particles", conflicts_with = "particles")]
     scene: Option<PathBuf>,
-    /// Particles: a sequence, of which all frames that are there are taken.
+    /// Particles: a sequence, of which all existing frames are used.
     #[arg(short, long, value_name = "PATTERN")]
     particles: Option<PathBuf>,
     /// Mesh at the first frame, in the particles' space [default: the particles' own surface]
@@ -74,7 +74,7 @@ impl Args {
     }
 }
 
-/// The frames of a sequence that are there, from the first to the last.
+/// The existing frames of a sequence, from the first to the last.
 fn there(particles: &Path) -> frazil::Result<Frames> {
     let Some(pattern) = Pattern::parse(particles) else {
         frazil::io::files::source::open(particles)?;

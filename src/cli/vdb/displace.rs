@@ -17,7 +17,7 @@ pub struct Args {
     /// Grid of the file [default: its first level set]
     #[arg(long, value_name = "NAME")]
     grid: Option<String>,
-    /// Greatest displacement (m), up to 32 cells [default: 2 cells]
+    /// Maximum displacement (m), up to 32 cells [default: 2 cells]
     #[arg(long, value_name = "M")]
     amplitude: Option<f64>,
     /// Size of the largest clumps (m) [default: 8 cells]

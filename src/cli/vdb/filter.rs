@@ -16,7 +16,7 @@ struct Source {
     /// Grid of the file [default: its first level set]
     #[arg(long, value_name = "NAME")]
     grid: Option<String>,
-    /// How distances are kept true [default: first-order; weno5 for an offset beyond the band of distances]
+    /// Scheme that restores true distances [default: first-order; weno5 for an offset beyond the band of distances]
     #[arg(long, value_enum)]
     scheme: Option<SchemeName>,
     #[command(flatten)]
@@ -25,7 +25,7 @@ struct Source {
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum SchemeName {
-    /// Seven times faster; loses a tenth of an offset's way
+    /// Seven times faster; loses a tenth of the offset
     FirstOrder,
     /// OpenVDB's default, fifth order
     Weno5,
@@ -55,7 +55,7 @@ pub struct OffsetArgs {
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  frazil vdb smooth snow.vdb --filter mean --times 2 -o soft.vdb")]
 pub struct SmoothArgs {
-    /// What a voxel becomes
+    /// New value of a voxel
     #[arg(long, value_enum, default_value = "gaussian")]
     filter: Filter,
     /// Reach of the filter (cells)
@@ -72,7 +72,7 @@ pub struct SmoothArgs {
 enum Filter {
     /// Mean of a cube
     Mean,
-    /// Four means in a row
+    /// Four means in succession
     Gaussian,
 }
 

@@ -1,4 +1,4 @@
-//! What .vdb files hold, for `frazil info`.
+//! The contents of .vdb files, for `frazil info`.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use frazil::scene::{changes_since, partial};
 use frazil::vdb::{MetaValue, distances, file, level_set, points};
 use serde_json::{Map, Value, json};
 
-/// A .vdb file's grids: what they are, and on request the area and volume of level sets.
+/// A .vdb file's grids: their descriptions, and on request the area and volume of level sets.
 pub fn grids(path: &Path, measure: bool, ctx: &Context) -> frazil::Result<Vec<Value>> {
     let mut out = Vec::new();
     let grids = file::describe(path)?;

@@ -68,7 +68,7 @@ pub fn run(args: Args, session: &Session) -> std::result::Result<(), Failure> {
     }
 }
 
-/// Where a level set goes and how it is packed.
+/// Output file and packing of a level set.
 #[derive(clap::Args)]
 struct VdbOutput {
     /// File to write (.vdb)
@@ -93,7 +93,7 @@ struct Packing {
 }
 
 impl Packing {
-    /// As the library wants it.
+    /// The library's type for it.
     fn options(&self) -> WriteOptions {
         let compression = match self.compression {
             Codec::Blosc => Compression::Blosc,
@@ -115,7 +115,7 @@ enum Codec {
 }
 
 impl VdbOutput {
-    /// Refuses a name or a folder that cannot be written, or one of the inputs, before any work.
+    /// Refuses, before any work, a name or a folder that cannot be written, or an output that is one of the inputs.
     fn check(&self, inputs: &[&Path]) -> std::result::Result<(), Failure> {
         check_name(&self.output, &["vdb"])?;
         output::check_writable(&self.output).before()?;
@@ -133,7 +133,7 @@ impl VdbOutput {
     }
 }
 
-/// Refuses an output file whose extension says that it holds something else.
+/// Refuses an output file with the extension of another format.
 fn check_name(path: &Path, extensions: &[&str]) -> std::result::Result<(), Failure> {
     let extension = path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase();
     if extensions.contains(&extension.as_str()) {

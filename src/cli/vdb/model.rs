@@ -1,4 +1,4 @@
-//! What `frazil preview` draws of .vdb files.
+//! The parts of .vdb files that `frazil preview` draws.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use frazil::geometry::Points;
 use frazil::scene::{changes_since, partial};
 use frazil::vdb::{FloatGrid, file, points};
 
-/// What is drawn of a file.
+/// The drawn part of a file.
 pub enum Content {
     /// A level set.
     Surface(FloatGrid),
@@ -16,11 +16,11 @@ pub enum Content {
     Points(Points),
 }
 
-/// Name of the fog volume that stands for all of a file: others beside it are temperatures, fuels and the like.
+/// Name of the fog volume that represents a file: others beside it are temperatures, fuels and the like.
 const DENSITY: &str = "density";
 
 /// Reads the first level set of a file; else its fog: the grid called "density", else all fog volumes, else its first grid
-/// of floats; else its points. Grids of vectors are left alone.
+/// of floats; else its points. Grids of vectors are ignored.
 ///
 /// # Errors
 /// A file that cannot be read, or that holds none of these.
@@ -41,7 +41,7 @@ pub fn read(path: &Path) -> frazil::Result<Content> {
         Some(_) => vec![DENSITY],
         None => floats().filter(|grid| grid.class == "fog volume").map(|grid| grid.name.as_str()).collect(),
     };
-    // Of several grids with one name the first is read.
+    // If several grids have the same name, the first is read.
     names.dedup();
     if names.is_empty() {
         return file::read_named(path, None).map(|grid| Content::Fogs(vec![grid]));

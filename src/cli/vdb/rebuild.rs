@@ -26,7 +26,7 @@ pub struct Args {
     /// Stage whose frames are made
     #[arg(long, value_enum, default_value = "base")]
     stage: Of,
-    /// Frames to make
+    /// Frames to rebuild
     #[arg(long, value_name = "N|A-B|A-BxN", allow_hyphen_values = true)]
     frame: FrameChoice,
     /// File to write (.vdb); for several frames their pattern, base.%04d.vdb
@@ -36,7 +36,7 @@ pub struct Args {
     packing: Packing,
 }
 
-/// What can be made whole.
+/// The stages that can be rebuilt.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum Of {
     /// The layer of snow
@@ -45,7 +45,7 @@ enum Of {
     Grains,
 }
 
-/// A cache that is read frame by frame.
+/// A cache, read frame by frame.
 enum Cache {
     Base(Rebuild),
     Grains(RebuildGrains),

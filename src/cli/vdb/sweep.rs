@@ -42,7 +42,7 @@ pub struct Args {
     /// Half width of the band of distances (cells), 3 to 64
     #[arg(long, value_name = "CELLS", default_value = "3", value_parser = positive)]
     half_width: f64,
-    /// How the swept volume is found
+    /// Method to find the swept volume
     #[arg(long, value_enum, default_value = "chain")]
     method: Method,
     /// Steps between sampled poses (method samples)
@@ -86,7 +86,7 @@ impl Args {
     fn check_memory(&self, session: &Session, [from, to]: [&TriMesh; 2]) -> Result<(), Failure> {
         let path = from.positions.iter().zip(&to.positions).map(|(p, q)| (q - p).norm()).fold(0.0, f32::max);
         let round = from.bounds().map_or(0.0, |(low, high)| 4.0 * (high - low).norm());
-        // Of the surface at both ends, and of what its outline sweeps on the way.
+        // The surfaces of both poses, and the area that their outline sweeps in between.
         let area = from.area() + to.area() + f64::from(round * path);
         super::check_surface(session, area, self.cell).before()
     }
@@ -123,7 +123,7 @@ impl Args {
         }
     }
 
-    /// The motion with its first and last time; frames, and the whole of a move or change, count as seconds here.
+    /// The motion with its first and last time; here frames, and the whole of a move or change, count as seconds.
     fn motion(&self) -> Result<(Box<dyn Motion>, f64, f64), Failure> {
         let (motion, from, to) = match &self.mesh[..] {
             [from, to] => {

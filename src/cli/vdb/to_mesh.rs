@@ -18,7 +18,7 @@ pub struct Args {
     /// Grid of the file [default: its first level set]
     #[arg(long, value_name = "NAME")]
     grid: Option<String>,
-    /// Distance from the surface to take (m); below 0 is inside
+    /// Distance of the mesh from the surface (m); below 0 is inside
     #[arg(long, value_name = "M", default_value = "0", value_parser = finite, allow_hyphen_values = true)]
     iso: f64,
     /// Larger triangles where the surface is flat, 0 to 1

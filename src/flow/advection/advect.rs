@@ -1,11 +1,11 @@
-//! Advection: values are carried along the flow (semi-Lagrangian: Stam 1999). Velocities get MacCormack's correction of the blur that
-//! this leaves (Selle, Fedkiw, Kim, Liu and Rossignac 2008), within the range of the values around the position that a value came
-//! from. The density, which has sharp edges, is interpolated by cubic functions instead, within the same range: MacCormack's waves
-//! run behind an edge, and as the range cuts them off there, it holds edges back (by about a cell).
+//! Advection: values are carried along the flow (semi-Lagrangian: Stam 1999). For velocities a MacCormack correction undoes the blur
+//! (Selle, Fedkiw, Kim, Liu and Rossignac 2008), clamped to the range of the values around the departure point. The density, which has
+//! sharp edges, is interpolated by cubic functions instead, clamped to the same range: MacCormack oscillations trail behind an edge, and
+//! where the clamp cuts them off, the edge lags (by about a cell).
 //!
-//! The path of each cell's centre is traced once (midpoint rule), backward and, for the correction, forward; a face takes the
-//! mean of its two cells' paths. All four fields follow these, one after the other: velocities in two passes each, the first guess with
-//! its bounds, then the correction.
+//! The path of each cell's centre is traced once (midpoint rule), backward and, for the correction, forward; a face takes the mean of its
+//! two cells' paths. All four fields follow these paths, one after the other: velocities in two passes each, first the guess with its
+//! bounds, then the correction.
 
 use rayon::prelude::*;
 
@@ -22,36 +22,35 @@ use crate::flow::window::Window;
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::Lanes;
 
-/// How values are carried.
+/// Advection scheme.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scheme {
-    /// First order: stable, blurs.
+    /// First order: stable, diffusive.
     SemiLagrangian,
-    /// Velocities by MacCormack's scheme, of second order, and density by cubic interpolation; no new extremes.
+    /// MacCormack (second order) for velocities and cubic interpolation for the density; no new extrema.
     #[default]
     Bounded,
-    /// The same without bounds: for measurements of the order.
+    /// The same without bounds: to measure the order of convergence.
     Unbounded,
 }
 
-/// How a flow is carried in a step.
+/// How a step advects a flow.
 pub struct Way<'a> {
     /// Velocity (m/s) of the air outside all tiles.
     pub ambient: [f32; 3],
-    /// Cells that a value at 1 m/s moves: the time over the cell's edge (s/m).
+    /// Displacement in cells of a value at 1 m/s: the time over the cell's edge (s/m).
     pub scale: f32,
     pub scheme: Scheme,
-    /// The air around, as it is after the step.
+    /// The surrounding air after the step.
     pub around: Option<&'a Flow>,
-    /// How the density keeps its mass; none: it does so as far as the scheme does.
+    /// How the density conserves its mass; none: only as well as the scheme does.
     pub keeping: Option<Keeping>,
 }
 
-/// Carries velocity (m/s, at lower faces) and density along for a step. The rim keeps what it holds, but for the upper faces of
-/// cells.
+/// Advects velocity (m/s, at lower faces) and density for a step. The rim keeps its values, except for the upper faces of cells.
 ///
 /// # Errors
-/// Cancel; the fields are then of no use.
+/// Cancel; the fields are then invalid.
 pub fn advect(
     ctx: &Context,
     tiles: &Tiles,
@@ -78,8 +77,8 @@ pub fn advect(
     Ok(())
 }
 
-/// Carries a velocity on an axis along the paths. `hat` is room for the first guess, `below` and `above` for its distances from the
-/// least and the greatest value around the position that it came from.
+/// Advects the velocity on an axis along the paths. `hat` is scratch for the first guess, `below` and `above` for its distances from the
+/// minimum and maximum around its departure point.
 ///
 /// # Errors
 /// Cancel.
@@ -100,7 +99,7 @@ fn carry_faces(
         ctx.check()?;
         let live = paths.live(slot, at);
         if live.as_ref().is_none_or(|live| !live.is_whole()) {
-            // Of what lies around, the guess is what it has become there.
+            // From the surrounding air, the guess is its value there after the step.
             *hat = match around {
                 Some(around) if slot >= paths.tiles.active() => {
                     around.read(window, paths.tiles.coords()[slot])
@@ -131,7 +130,7 @@ fn carry_faces(
     })
 }
 
-/// Carries the density along the paths, by way of `to`.
+/// Advects the density along the paths, with `to` as scratch.
 ///
 /// # Errors
 /// Cancel.
@@ -148,7 +147,7 @@ fn carry_density(
     tiles.try_for_each_init(Window::default, |window, (slot, to)| {
         ctx.check()?;
         let near = &paths.tiles.neighbours()[slot];
-        // Into a tile among others without density paths bring none.
+        // No path can bring density into a tile that is surrounded by tiles without density.
         if !near.iter().any(|near| holds.get(*near as usize) == Some(&true)) {
             to.fill(0.0);
             return Ok(());
@@ -227,7 +226,7 @@ fn correct_tile(
     ))
 }
 
-/// Corrects first guesses by half of what the way forth and back changes.
+/// Corrects first guesses by half of the error of the round trip, forward and back.
 #[inline(always)]
 fn correct_rows(
     live: &Live,
@@ -249,12 +248,12 @@ fn correct_rows(
     }
 }
 
-/// A correction within its bounds: one that leaves the range of the values around the position that a value came from ends there.
-/// Nothing jumps: where it was dropped at the bound, the least difference between two flows grew fourfold in ten steps.
+/// Clamps a correction to its bounds, the range of the values around the departure point. The clamp is continuous: when out-of-range
+/// corrections were dropped instead, the smallest difference between two flows grew fourfold in ten steps.
 #[inline(always)]
 fn limited(change: Lanes, below: Lanes, above: Lanes) -> Lanes {
     let zero = Lanes::all(0.0);
-    // Rounding may leave a distance a little under 0.
+    // Rounding may make a distance slightly negative.
     change.max(zero - below.max(zero)).min(above.max(zero))
 }
 

@@ -1,11 +1,11 @@
-//! Conserves the mass of an advected density: what advection loses is put back where it was lost, and what it gains is removed where it
-//! was gained.
+//! Conserves the mass of an advected density: mass that advection loses is restored where it was lost, mass that it gains is removed where
+//! it was gained.
 //!
-//! Every corner of the tiles has a hat: a weight of 1 there that falls linearly to 0 at the corners beside it, so that all hats
-//! together weigh each point once. Along its path each cell carries its mass to a point, and thus into the eight hats around it:
-//! that is the mass that each hat should hold. After advection the hat holds a different mass. The density is then multiplied by factors that
-//! the corners give and that are linear between them: by what each hat should hold over what it holds, so that the mass of all
-//! hats together is right to rounding, and no density farther than a tile from a loss changes.
+//! Every corner of the tiles has a hat function: a weight of 1 there that falls linearly to 0 at the adjacent corners, so that all hats
+//! together weigh each point once. Each cell carries its mass along its path to a point, and thus into the eight hats around it: this is
+//! the mass that each hat should hold. After advection the hat holds a different mass. The density is then multiplied by factors that are
+//! given at the corners and linear in between, the mass that each hat should hold over the mass that it holds, so that the total mass is
+//! right to rounding and no density farther than a tile from a loss changes.
 
 use rayon::prelude::*;
 
@@ -18,35 +18,35 @@ use crate::flow::window::{max, min};
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::Lanes;
 
-/// What becomes of a density besides being carried along.
+/// What happens to a density besides advection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Keeping {
-    /// Share 0..=1 of the mass that stays.
+    /// Share 0..=1 of the mass that remains.
     pub share: f32,
-    /// A density below this fades within some steps; its mass goes to what is beside it.
+    /// Densities below this fade over several steps; their mass goes to neighbouring density.
     pub least: f32,
 }
 
-/// Greatest factor by which density grows in a step: mist of which nearly all was cut off must not come back in what is left.
+/// Largest factor by which density grows in a step: if nearly all the mist of a tile was cut off, its mass must not return in the remainder.
 const MOST_GAIN: f64 = 1.2;
-/// Passes in which a hat that would have to grow by more than that hands the excess on to the hats beside it. What is left after them is spread
-/// over all of the density.
+/// Passes in which a hat that would have to grow by more than this factor passes the excess on to the adjacent hats. What is left after them is
+/// spread over all of the density.
 const PASSES: usize = 6;
-/// In a step a density below `least` loses this share of what it lacks to `least`. It fades slowly on purpose: when it ended at once, flows
-/// that differed by rounding only soon differed by as much as `least`.
+/// In a step a density below `least` loses this share of its difference from `least`. It fades slowly on purpose: when it ended at once,
+/// flows that differed only by rounding soon differed by as much as `least`.
 const FADING: f32 = 0.125;
-/// Rounds of factors. Those that are linear between corners bring a hat only part of the way where the ones beside it need the
-/// contrary; the last round makes the sum of all hats right.
+/// Rounds of factors. Factors that are linear between corners correct a hat only in part where the adjacent hats need the opposite; the
+/// last round makes the sum of all hats right.
 const ROUNDS: usize = 2;
-/// Factors of hats, and the one of all of the density, that differ from 1 by less are rounding: still air must stay so.
+/// Factors of hats, and the global factor of the density, that differ from 1 by less are rounding: still air must stay unchanged.
 const ROUNDING: [f64; 2] = [2.0e-6, 1.0e-7];
-/// Hats on an axis that a tile's mass may go to: those of the corners 8 cells before its first one, at it, 8 and 16 behind it.
+/// Hats on an axis that a tile's mass may go to: those of the corners 8 cells before its first corner, at it, and 8 and 16 cells behind it.
 const HATS: usize = 4;
 /// Masses in the hats around a tile (cells).
 pub type Masses = [f32; HATS * HATS * HATS];
 
-/// The mass (cells) that each corner's hat should hold when the density was carried along; corners are named by the slot of the
-/// tile whose first cell they bound.
+/// The mass (cells) that each corner's hat should hold after advection; corners are indexed by the slot of the tile whose first cell they
+/// bound.
 ///
 /// # Errors
 /// Cancel.
@@ -60,7 +60,7 @@ pub fn carried(ctx: &Context, paths: &Paths<'_>, density: &Field) -> Result<Vec<
     Ok(in_hats(paths.tiles, &masses?))
 }
 
-/// Lets a share of the density stay and what is thin fade, and puts the mass back that hats should hold.
+/// Scales the density by the remaining share, fades thin density and restores the mass that each hat should hold.
 pub fn restore(tiles: &Tiles, density: &mut Field, wanted: &[f64], keeping: Keeping) {
     let thin_out = |value: &mut f32| {
         let kept = *value * keeping.share;
@@ -91,7 +91,7 @@ fn multiply(tiles: &Tiles, density: &mut Field, factors: &[f32]) {
     });
 }
 
-/// The masses of a tile in the hats around it, along paths with an extent.
+/// The masses of a tile in the hats around it, along paths with this extent.
 fn masses(tile: &Tile, ahead: Option<&[&Tile; 3]>, extent: &Extent) -> Masses {
     let holds = tile.iter().any(|value| *value != 0.0);
     if holds { masses_of(tile, ahead, extent) } else { [0.0; HATS * HATS * HATS] }
@@ -131,7 +131,7 @@ fn masses_of_rows(tile: &Tile, ahead: Option<&[&Tile; 3]>, extent: &Extent) -> M
     };
     let mut sums = [zero; HATS * HATS * HATS];
     for four in 0..16 {
-        // A row and its mirror images: in an order that mirrored fields share.
+        // A row and its mirror images: in an order that is the same for mirrored fields.
         let (x, y) = (four >> 2, four & 3);
         let rows = [[x, y], [7 - x, 7 - y], [x, 7 - y], [7 - x, y]].map(|[x, y]| x << 3 | y);
         if rows.iter().all(|row| row_of(tile, *row).iter().all(|value| *value == 0.0)) {
@@ -160,7 +160,7 @@ fn in_hats(tiles: &Tiles, masses: &[Masses]) -> Vec<f64> {
     let of_corner = |corner: usize| {
         let mut sum = 0.0;
         for hat in 0..HATS * HATS * HATS {
-            // Where the tile lies whose hat this is, reached over one that is beside both.
+            // Offset of the tile whose hat this is; a tile two away is reached over one that is adjacent to both.
             let off = [hat / (HATS * HATS), hat / HATS % HATS, hat % HATS].map(|hat| 1 - hat as i32);
             let first = off.map(|x| x.max(-1));
             let next = [0, 1, 2].map(|axis| off[axis] - first[axis]);
@@ -177,7 +177,7 @@ fn in_hats(tiles: &Tiles, masses: &[Masses]) -> Vec<f64> {
     (0..tiles.count()).into_par_iter().with_min_len(16).map(of_corner).collect()
 }
 
-/// The corners' factors, for the masses that their hats should hold and do.
+/// The corners' factors, from the masses that their hats should hold and do hold.
 fn factors(tiles: &Tiles, mut wanted: Vec<f64>, held: &[f64]) -> Vec<f32> {
     let around = |values: &[f64], corner: usize| -> f64 {
         let near = tiles.neighbours()[corner].iter();
@@ -208,7 +208,7 @@ fn factors(tiles: &Tiles, mut wanted: Vec<f64>, held: &[f64]) -> Vec<f32> {
     factors.iter().map(|factor| (factor * rest) as f32).collect()
 }
 
-/// A factor, 1 where it differs from that by rounding only.
+/// A factor, or 1 if it differs from 1 only by rounding.
 fn exact(factor: f64, rounding: f64) -> f64 {
     if (factor - 1.0).abs() > rounding { factor } else { 1.0 }
 }

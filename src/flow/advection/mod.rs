@@ -1,4 +1,4 @@
-//! Advection: along which paths values are carried, and the mass that it keeps.
+//! Advection: the paths that values are carried along, and conservation of mass.
 
 pub(in crate::flow) mod advect;
 pub(in crate::flow) mod conserve;

@@ -1,4 +1,4 @@
-//! Paths of the air in a step: displacements of the cells' centres, to where the air came from and to where it goes.
+//! Paths of the air in a step: displacements of the cells' centres back to where the air came from and ahead to where it goes.
 
 use rayon::prelude::*;
 
@@ -10,10 +10,10 @@ use crate::flow::window::{Span, Window, max, min};
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::Lanes;
 
-/// Largest displacement (cells) of a step; longer ones are cut off.
+/// Maximum displacement (cells) in a step; longer ones are clamped.
 pub const FARTHEST: f32 = 5.0;
 
-/// Where values are placed in their cells.
+/// Where values are located in their cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum At {
     /// At the centres.
@@ -22,7 +22,7 @@ pub enum At {
     Faces(usize),
 }
 
-/// Least and greatest displacement (cells) on each axis.
+/// Minimum and maximum displacement (cells) on each axis.
 pub type Extent = [[f32; 2]; 3];
 
 /// Displacements (cells) of the active cells' centres in a step.
@@ -37,7 +37,7 @@ pub struct Paths<'a> {
 }
 
 impl Paths<'_> {
-    /// The values of a tile that the flow moves: all of an active one, the upper faces of active cells in the rim.
+    /// The values of a tile that the flow moves: all of an active tile, and in the rim the upper faces of active cells.
     pub fn live(&self, slot: usize, at: At) -> Option<Live> {
         if slot < self.tiles.active() {
             return Some(Live { layer: None });
@@ -54,12 +54,12 @@ impl Paths<'_> {
         self.tiles.neighbours()[slot][FACES[2 * axis]] as usize
     }
 
-    /// What the paths back of a tile's values reach.
+    /// The cells that the backward paths of a tile's values reach.
     pub fn back_span(&self, slot: usize, at: At) -> Span {
         self.span(slot, at, 0)
     }
 
-    /// What the paths ahead of a tile's values reach.
+    /// The cells that the forward paths of a tile's values reach.
     pub fn ahead_span(&self, slot: usize, at: At) -> Span {
         self.span(slot, at, 1)
     }
@@ -99,12 +99,12 @@ impl Paths<'_> {
 
 /// The values of a tile that the flow moves.
 pub struct Live {
-    /// The axis on which only the first layer moves; none: all.
+    /// The axis on which only the first layer moves; none: all values move.
     layer: Option<usize>,
 }
 
 impl Live {
-    /// The rows that are moved.
+    /// The rows that move.
     #[inline(always)]
     pub fn rows(&self) -> impl Iterator<Item = usize> {
         let (last, step) = match self.layer {
@@ -115,20 +115,20 @@ impl Live {
         (0..last).step_by(step)
     }
 
-    /// Whether all are moved.
+    /// Whether all values move.
     pub fn is_whole(&self) -> bool {
         self.layer.is_none()
     }
 
-    /// How many values of a row are moved.
+    /// How many values of a row move.
     #[inline(always)]
     pub fn lanes(&self) -> usize {
         if self.layer == Some(2) { 1 } else { 8 }
     }
 }
 
-/// The displacements of a tile's values: of its cells, or of faces, which take the mean of the two cells beside them, or those of
-/// the only one that is active.
+/// The displacements of a tile's values: of its cells, or of faces, which take the mean of the two cells beside them, or the value of the
+/// only active one.
 pub struct Ways<'a> {
     at: At,
     own: Option<[&'a Tile; 3]>,
@@ -182,7 +182,7 @@ fn means(a: [Lanes; 3], b: [Lanes; 3]) -> [Lanes; 3] {
     [0, 1, 2].map(|axis| Lanes::all(0.5) * (a[axis] + b[axis]))
 }
 
-/// Traces the paths back and ahead through a velocity (m/s, at lower faces) in a step. Returns the extents of each tile's.
+/// Traces the paths back and ahead through a velocity (m/s, at lower faces) in a step. Returns the extents of each tile's paths.
 ///
 /// # Errors
 /// Cancel.
@@ -207,14 +207,14 @@ pub fn trace(
     let each = active.map_init(<[Window; 3]>::default, |windows, (slot, (a, b, c, d, e, f))| {
         ctx.check()?;
         let near = &tiles.neighbours()[slot];
-        // A cell's velocity is the mean of its two faces' on each axis; half of the way is half as far.
+        // A cell's velocity is the mean of its two faces' on each axis; half the displacement reaches half as far.
         let most: [f32; 3] = std::array::from_fn(|axis| {
             let above = reach.get(near[FACES[2 * axis + 1]] as usize).map_or(0.0, |reach| reach[axis]);
             0.5 * max(reach[slot][axis], above)
         });
         for (axis, window) in windows.iter_mut().enumerate() {
             let mut ways = most.map(|most| [-most, most]);
-            // Faces lie half a cell from centres; those above are read too.
+            // Faces lie half a cell from centres; the upper ones are read too.
             ways[axis] = [-most[axis], most[axis] + 0.5];
             window.fill(&velocity[axis], near, &Span::moved([8; 3], &ways), ambient[axis]);
         }
@@ -226,7 +226,7 @@ pub fn trace(
     each.collect()
 }
 
-/// Greatest displacement (cells) on each axis in each tile.
+/// Maximum displacement (cells) on each axis in each tile.
 fn reach(tiles: &Tiles, velocity: &[Field; 3], ambient: [f32; 3], scale: f32) -> Vec<[f32; 3]> {
     let of_tile = |slot: usize| {
         [0, 1, 2].map(|axis| {
@@ -238,7 +238,7 @@ fn reach(tiles: &Tiles, velocity: &[Field; 3], ambient: [f32; 3], scale: f32) ->
     (0..tiles.count()).into_par_iter().with_min_len(16).map(of_tile).collect()
 }
 
-/// The least and the greatest value of a tile.
+/// The minimum and maximum of a tile.
 fn extent_of(tile: &Tile) -> [f32; 2] {
     dispatch!(extent_of_rows(tile: &Tile) -> [f32; 2])
 }

@@ -1,5 +1,5 @@
-//! Pressure: the velocity field becomes free of divergence (Chorin 1968), with solids that cover part of a face (Batty, Bertails
-//! and Bridson 2007), by conjugate gradients that one cycle of multigrid preconditions.
+//! Pressure projection: makes the velocity field divergence-free (Chorin 1968), with solids that cover part of a face (Batty, Bertails and
+//! Bridson 2007), by conjugate gradients preconditioned with one multigrid cycle.
 //!
 //! The unknown is p dt / (density x cell), in m/s: its differences are changes of velocity.
 
@@ -21,22 +21,22 @@ use multigrid::Multigrid;
 use pockets::Pockets;
 use stencil::{Task, row_of};
 
-/// What a solve did.
+/// Results of a solve.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Solved {
     /// Iterations of the conjugate gradient method.
     pub iterations: usize,
-    /// Greatest divergence left, times the cell (m/s).
+    /// Largest remaining divergence, times the cell (m/s).
     pub divergence: f32,
-    /// Greatest speed (m/s) on any axis, before.
+    /// Largest speed (m/s) on any axis, before.
     pub fastest: f32,
 }
 
-/// Most iterations.
+/// Maximum number of iterations.
 const MOST: usize = 200;
 
-/// Changes the velocity (m/s, at lower faces) so that its divergence times the cell, in all cells that no solid covers, is at most
-/// `tolerance` times the greatest speed. `pressure` holds the first guess, and then the solution; in the rim, what it is there.
+/// Changes the velocity (m/s, at lower faces) so that, in all cells not covered by solids, its divergence times the cell is at most
+/// `tolerance` times the largest speed. `pressure` holds the initial guess, then the solution; its values in the rim are fixed.
 ///
 /// # Errors
 /// Cancel.
@@ -54,14 +54,14 @@ pub fn project(
     let aim = tolerance * fastest;
     let pockets = Pockets::find(&multigrid.finest);
     divergence(tiles, solids, velocity, guess);
-    // Cells inside solids have no equation: what solids press together there must not reach the coarse levels.
+    // Cells inside solids have no equation: divergence that solids cause there must not reach the coarse levels.
     multigrid.finest.clear_covered(guess);
     pockets.level(guess);
     pockets.level(pressure);
     multigrid.finest.compute(pressure, |slot| Task::Residual(&guess[slot]), residual);
     let mut solved = Solved { iterations: 0, divergence: greatest(residual), fastest };
     let mut energy = 0.0;
-    // What a step leaves is there in the next one again: unless it is next to nothing, it is made less of at least once.
+    // The divergence left by a step carries over into the next one: reduce it at least once, unless it is negligible.
     let is_due = |solved: &Solved| match solved.iterations {
         0 => solved.divergence > 0.01 * aim,
         _ => solved.divergence > aim,
@@ -69,7 +69,7 @@ pub fn project(
     while is_due(&solved) && solved.iterations < MOST {
         ctx.check()?;
         let now = multigrid.cycle(residual, guess, [&mut *spare, &mut *detour]);
-        // The new direction has no part along the old one, though the preconditioner is not symmetric (Notay 2000).
+        // The new direction is made conjugate to the old one even though the preconditioner is not symmetric (Notay 2000).
         let along = if energy > 0.0 { multigrid::product(guess, product) / energy } else { 0.0 };
         follow(direction, guess, -along as f32, solved.iterations == 0);
         energy = multigrid.finest.compute(direction, |_| Task::Product, product);
@@ -96,7 +96,7 @@ fn follow(direction: &mut [Tile], guess: &[Tile], share: f32, is_first: bool) {
     });
 }
 
-/// One step of the method. Returns the greatest residual.
+/// One iteration. Returns the largest residual.
 fn advance(
     pressure: &mut [Tile],
     residual: &mut [Tile],
@@ -117,21 +117,21 @@ fn advance(
     each.reduce(|| 0.0, max)
 }
 
-/// Greatest absolute value.
+/// Largest absolute value.
 fn greatest(field: &[Tile]) -> f32 {
     let of_tile = |tile: &Tile| tile.iter().fold(0.0, |most, value| max(most, value.abs()));
     field.par_iter().with_min_len(64).map(of_tile).reduce(|| 0.0, max)
 }
 
-/// Greatest speed (m/s) on any axis.
+/// Largest speed (m/s) on any axis.
 pub fn fastest(velocity: &[Field; 3]) -> f32 {
     velocity.iter().map(|field| greatest(field)).fold(0.0, max)
 }
 
-/// Leading bits of a float that tell speeds apart: its exponent and seven digits.
+/// Leading bits of a float by which speeds are binned: the exponent and seven mantissa bits.
 const LEADING: u32 = 16;
 
-/// Speed (m/s, rounded up to a float of so few digits) that all values but a share of them keep within.
+/// Speed (m/s, rounded up to a float of these leading bits) that all but a share of the values do not exceed.
 pub fn fastest_but(velocity: &[Field; 3], share: f64) -> f32 {
     let bin = |speed: f32| (speed.abs().to_bits() >> LEADING) as usize;
     let tiles = velocity.iter().map(Vec::len).sum::<usize>();
@@ -159,7 +159,7 @@ pub fn fastest_but(velocity: &[Field; 3], share: f64) -> f32 {
     0.0
 }
 
-/// What flows into each cell (m/s: the divergence times the cell, negative).
+/// Net inflow of each cell (m/s: minus the divergence times the cell).
 pub fn divergence(tiles: &Tiles, solids: &Solids, velocity: &[Field; 3], out: &mut [Tile]) {
     out.par_iter_mut().enumerate().with_min_len(16).for_each(|(slot, out)| {
         for (row, out) in out.chunks_exact_mut(8).enumerate() {
@@ -172,7 +172,7 @@ pub fn divergence(tiles: &Tiles, solids: &Solids, velocity: &[Field; 3], out: &m
     });
 }
 
-/// What flows through the lower and through the upper faces of a row of cells on an axis (m/s).
+/// Flux through the lower and upper faces of a row of cells on an axis (m/s).
 fn fluxes(
     tiles: &Tiles,
     solids: &Solids,
@@ -208,7 +208,7 @@ fn fluxes(
     [lower, upper]
 }
 
-/// Changes the velocity by the gradient of the pressure; covered faces move as the solid does.
+/// Subtracts the pressure gradient from the velocity; covered faces move with the solid.
 fn accelerate(tiles: &Tiles, solids: &Solids, pressure: &Field, velocity: &mut [Field; 3]) {
     for (axis, velocity) in velocity.iter_mut().enumerate() {
         velocity.par_iter_mut().enumerate().with_min_len(16).for_each(|(slot, speed)| {
@@ -220,7 +220,7 @@ fn accelerate(tiles: &Tiles, solids: &Solids, pressure: &Field, velocity: &mut [
             let (here, below) = (&pressure[slot], pressure.get(below).unwrap_or(&ZEROS));
             let faces = solids.faces(slot);
             for (row, speed) in speed.chunks_exact_mut(8).enumerate() {
-                // Of the rim, only the faces of cells move.
+                // In the rim only the faces of active cells change.
                 let moving = match axis {
                     _ if is_active => 8,
                     0 => 8 * usize::from(row < 8),
@@ -265,7 +265,7 @@ mod tests {
         field[3][1] = 30.0;
         let velocity = [field, vec![[0.25; 512]; 40], vec![[-0.5; 512]; 40]];
         assert_eq!(fastest(&velocity), 90.0);
-        // Of 61,440 faces, two are 3.3 in 100,000.
+        // Two of 61,440 faces are a share of 3.3e-5.
         let bulk = fastest_but(&velocity, 4.0e-5);
         assert!((1.5..1.52).contains(&bulk), "{bulk}");
         assert!(fastest_but(&velocity, 2.0e-5) > 29.9 && fastest_but(&velocity, 0.0) > 89.9);

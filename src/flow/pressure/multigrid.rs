@@ -1,11 +1,11 @@
-//! One V-cycle of multigrid: a good guess at the solution of L x = b, the preconditioner of conjugate gradients (McAdams, Sifakis
-//! and Teran 2010).
+//! One V-cycle of multigrid: an approximate solution of L x = b, used as the preconditioner of conjugate gradients (McAdams, Sifakis and
+//! Teran 2010).
 //!
-//! Cells double from level to level; the open share of a coarse face is the mean of its four fine ones. A coarse cell takes part
-//! if one of its eight does and none is outside, where the pressure is 0. Residuals go down as means, corrections come up by
-//! trilinear interpolation. Beside solids as much of a correction is taken as helps. Each level is smoothed by two weighted
-//! Jacobi sweeps before and after, with Chebyshev's weights for the upper half of the frequencies: unlike Gauss and Seidel's,
-//! these do not depend on any order, so that mirrored fields have mirrored results.
+//! Cells double in width from level to level; the open fraction of a coarse face is the mean of its four fine faces. A coarse cell takes
+//! part if one of its eight fine cells does and none of them is outside, where the pressure is 0. Residuals are restricted as means,
+//! corrections are prolonged by trilinear interpolation. Near solids a correction is scaled so that it reduces the error most. Each level
+//! is smoothed by two weighted Jacobi sweeps before and after, with Chebyshev weights for the upper half of the frequencies: unlike
+//! Gauss-Seidel, Jacobi does not depend on an order, so mirrored fields have mirrored results.
 
 use rayon::prelude::*;
 
@@ -16,39 +16,39 @@ use crate::flow::scratch::first;
 use crate::flow::solids::Solids;
 use crate::flow::tiles::{Field, NONE, Tile, Tiles};
 
-/// Weights of two Jacobi sweeps: the inverse roots of Chebyshev's polynomial on [1/3, 2], the eigenvalues (over the diagonal) of
-/// the modes that a coarser level cannot hold. They leave at most 0.34 of those.
+/// Weights of two Jacobi sweeps: the inverse roots of the Chebyshev polynomial on [1/3, 2], the range of eigenvalues (over the diagonal) of
+/// the modes that a coarser level cannot represent. At most 0.34 of these modes remains.
 const WEIGHTS: [f32; 2] = [1.731_9, 0.569_5];
 /// Pairs of sweeps on the coarsest level.
 const LAST: usize = 8;
-/// Most levels.
+/// Maximum number of levels.
 const LEVELS: usize = 7;
 
 /// A level below the finest.
 #[derive(Debug, Default)]
 struct Level {
     operator: Operator,
-    /// Slots of the eight finer tiles under each tile.
+    /// Slots of the eight finer tiles that each tile covers.
     children: Vec<[u32; 8]>,
-    /// For each finer tile, the slot here and its octant.
+    /// For each finer tile, the slot of its coarse tile and its octant.
     parents: Vec<(u32, u8)>,
     b: Field,
     x: Field,
     spare: Field,
-    /// Room for a correction, beside solids.
+    /// Scratch field for a correction near solids.
     detour: Field,
 }
 
 /// The preconditioner.
 #[derive(Debug, Default)]
 pub struct Multigrid {
-    /// The finest level's operator.
+    /// The operator of the finest level.
     pub finest: Operator,
     levels: Vec<Level>,
 }
 
 impl Multigrid {
-    /// Makes it that of the tiles' cells between solids. Fields of its levels are kept.
+    /// Rebuilds it for the cells of these tiles between solids. Reuses the fields of its levels.
     pub fn become_of(&mut self, tiles: &Tiles, solids: &Solids) {
         let is_plain = solids.is_empty() && !self.finest.has_stencils();
         if is_plain && self.finest.tiles.is_of(tiles) {
@@ -120,11 +120,11 @@ fn descend(
     operator.compute(spare, |slot| Task::Smooth(&b[slot], second_weight), x)
 }
 
-/// Adds so much of a correction to x that the error has the least energy. Coarse cells do not see narrow gaps and thin walls, and
-/// interpolation leads through these: taken whole, a correction may be many times too large.
+/// Adds a correction to x, scaled so that the energy of the error is smallest. Coarse cells do not resolve narrow gaps and thin walls, and
+/// interpolation crosses them: unscaled, a correction may be many times too large.
 fn correct(operator: &Operator, correction: &[Tile], b: &[Tile], x: &mut [Tile], spare: &mut [Tile]) {
     let energy = operator.compute(correction, |_| Task::Product, spare);
-    // The operator is symmetric: the correction times L x is L times the correction, times x.
+    // The operator is symmetric: correction . L x = L correction . x.
     let gain = product(correction, b) - product(spare, x);
     let share = if energy > 0.0 { (gain / energy) as f32 } else { 0.0 };
     x.par_iter_mut().zip(correction).with_min_len(64).for_each(|(x, way)| {

@@ -1,5 +1,4 @@
-//! The operator of a level of multigrid: which tiles there are, and the stencils of those near solids and, with wide cells, near
-//! the air outside.
+//! The operator of a multigrid level: its tiles, and the stencils of tiles near solids and, on coarse levels, near the outside air.
 
 use rayon::prelude::*;
 
@@ -11,17 +10,17 @@ use crate::numeric::blocks::Mask;
 /// The operator on a level.
 #[derive(Debug, Default)]
 pub struct Operator {
-    /// Its tiles. The rim holds no unknowns: what a field has there is the pressure outside.
+    /// Its tiles. The rim holds no unknowns: the values of a field there are the outside pressure.
     pub tiles: Tiles,
-    /// How often cells have doubled.
+    /// Number of times that cells have doubled in width.
     level: i32,
-    /// The stencil of each active tile; [`NONE`]: all faces are open.
+    /// The stencil index of each active tile; [`NONE`]: all faces are open.
     index: Vec<u32>,
     stencils: Vec<Stencil>,
 }
 
 impl Operator {
-    /// The operator of the tiles' cells between solids.
+    /// The operator for the cells of the tiles between solids.
     pub fn new(tiles: &Tiles, solids: &Solids) -> Self {
         let above = |slot: usize| {
             [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -47,7 +46,7 @@ impl Operator {
         Self::of(tiles.clone(), 0, &slots, one)
     }
 
-    /// With stencils for these slots. They are large: room is made for as many as there are.
+    /// With stencils for these slots. Stencils are large: capacity is reserved for exactly this many.
     fn of(tiles: Tiles, level: i32, slots: &[usize], one: impl Fn(usize) -> Stencil + Sync) -> Self {
         let mut index = vec![NONE; tiles.active()];
         slots.iter().zip(0..).for_each(|(slot, at)| index[*slot] = at);
@@ -55,7 +54,7 @@ impl Operator {
         Self { tiles, level, index, stencils }
     }
 
-    /// Gives these slots a stencil of open faces.
+    /// Gives these slots a stencil with open faces.
     fn open(&mut self, slots: &[usize]) {
         self.stencils.reserve_exact(slots.len());
         for slot in slots {
@@ -89,14 +88,14 @@ impl Operator {
         Near { own: &field[slot], six: self.tiles.six(field, slot), stencil: self.stencil(slot) }
     }
 
-    /// Computes all tiles of `out`. Returns the sum of x, or for a sweep that of b, times `out`.
+    /// Computes all tiles of `out`. Returns the sum of x times `out`, or, for a sweep, of b times `out`.
     pub fn compute<'a>(&self, x: &[Tile], task: impl Fn(usize) -> Task<'a> + Sync, out: &mut [Tile]) -> f64 {
         let one = |(slot, out): (usize, &mut Tile)| compute(self.near(x, slot), task(slot), out);
         let sums: Vec<f64> = out.par_iter_mut().enumerate().with_min_len(32).map(one).collect();
         sums.iter().sum()
     }
 
-    /// The operator for cells twice as wide, and the slots of the eight tiles under each of its tiles.
+    /// The operator for cells twice as wide, and the slots of the eight fine tiles under each of its tiles.
     pub fn coarser(&self) -> (Self, Vec<[u32; 8]>) {
         let active = &self.tiles.coords()[..self.tiles.active()];
         let mut coords: Vec<Coord> = active.iter().map(|coord| coord.map(|x| x >> 1)).collect();
@@ -117,7 +116,7 @@ impl Operator {
         (coarse, children)
     }
 
-    /// The coarse stencil over eight tiles, but for the faces that bound the outside and the diagonal.
+    /// The coarse stencil over eight tiles, without the diagonal and without the faces next to the outside.
     fn coarse_stencil(&self, children: &[u32; 8]) -> Stencil {
         let mut out = Stencil::open();
         for cell in 0..512 {
@@ -148,7 +147,7 @@ impl Operator {
         out
     }
 
-    /// Completes stencils: faces that bound the outside, the upper faces, which are the next tiles' lower ones, and the diagonal.
+    /// Completes stencils: faces next to the outside, upper faces (the lower faces of the next tiles) and the diagonal.
     fn join(&mut self) {
         self.part_outside();
         let active = self.tiles.active();
@@ -169,7 +168,7 @@ impl Operator {
         });
     }
 
-    /// A tile's upper faces on an axis, which are the lower ones of the tile above; none: that is not active.
+    /// A tile's upper faces on an axis, which are the lower faces of the tile above; none: that tile is not active.
     fn upper(&self, slot: usize, axis: usize) -> Option<[f32; 64]> {
         let above = self.tiles.neighbours()[slot][FACES[2 * axis + 1]] as usize;
         let stencil = (above < self.tiles.active()).then(|| self.stencil(above))?;
@@ -184,7 +183,7 @@ impl Operator {
         slots
     }
 
-    /// Completes the faces between cells of which one is outside.
+    /// Completes the faces between a cell inside and a cell outside.
     fn part_outside(&mut self) {
         // None: the whole tile is inside.
         let outside: Vec<Option<Mask>> = (0..self.tiles.active())
@@ -224,8 +223,8 @@ impl Operator {
         });
     }
 
-    /// How much nearer, in cells, the pressure outside is to the last cells than on the level above. It is known half a finest
-    /// cell behind the last face: 2 / (1 + 2^-level) of the distance of two cells.
+    /// The factor by which the outside pressure is nearer (in cells) to the last cells than on the finer level. It is known half a finest
+    /// cell behind the last face: 2 / (1 + 2^-level), relative to the distance between two cells.
     fn nearer(&self) -> f32 {
         let share = |level: i32| 2.0 / (1.0 + 0.5f32.powi(level));
         share(self.level) / share(self.level - 1)
@@ -246,7 +245,7 @@ pub fn first(axis: usize, at: usize) -> usize {
     }
 }
 
-/// The position of a cell in its layer on an axis.
+/// The position of a cell within its layer on an axis.
 pub fn layer(axis: usize, cell: usize) -> usize {
     match axis {
         0 => cell & 63,
@@ -255,7 +254,7 @@ pub fn layer(axis: usize, cell: usize) -> usize {
     }
 }
 
-/// One of eight fine cells of a coarse cell that begins at `fine`.
+/// One of the eight fine cells of the coarse cell that begins at `fine`.
 fn fine_cell(fine: [usize; 3], part: usize) -> usize {
     (fine[0] + (part >> 2)) << 6 | (fine[1] + (part >> 1 & 1)) << 3 | (fine[2] + (part & 1))
 }

@@ -1,6 +1,5 @@
-//! Pockets: groups of connected cells that solids seal off from the air outside all tiles. The pressure in one is known up to a
-//! constant, and what its walls press out of it cannot leave: the mean inflow of a pocket is set aside, and so is the mean of its
-//! pressure.
+//! Pockets: groups of connected cells that solids cut off from the air outside all tiles. The pressure in a pocket is known up to a
+//! constant, and the net inflow that its walls cause cannot escape: the pocket's mean inflow and its mean pressure are subtracted.
 
 use rayon::prelude::*;
 
@@ -11,19 +10,19 @@ use crate::flow::tiles::{FACES, NONE, Tile};
 /// Label of a cell that does not take part.
 const SOLID: u16 = u16::MAX;
 
-/// The connected parts of a tile.
+/// The connected components of a tile.
 struct Parts {
-    /// Part of each cell; none: the tile is one part.
+    /// Component of each cell; none: the tile is a single component.
     labels: Option<Box<[u16; 512]>>,
     count: u32,
-    /// Whether each part borders on the outside.
+    /// Whether each component touches the outside.
     opens: Vec<bool>,
 }
 
 /// The pockets of a set of tiles.
 #[derive(Default)]
 pub struct Pockets {
-    /// Cells of each pocket: a tile and, unless the whole tile belongs to it, its cells.
+    /// Cells of each pocket: tiles and, for a tile that belongs to it only in part, the cells.
     pockets: Vec<Vec<(u32, Option<Vec<u16>>)>>,
 }
 
@@ -80,7 +79,7 @@ impl Pockets {
         Self { pockets }
     }
 
-    /// Subtracts the mean over each pocket.
+    /// Subtracts each pocket's mean.
     pub fn level(&self, field: &mut [Tile]) {
         for pocket in &self.pockets {
             let (mut sum, mut count) = (0.0f64, 0usize);
@@ -109,7 +108,7 @@ impl Pockets {
     }
 }
 
-/// The parts of a tile, by flooding.
+/// Finds the components of a tile by flood fill.
 fn parts_of(operator: &Operator, slot: usize) -> Parts {
     let active = operator.tiles.active();
     let is_outside = FACES.map(|at| operator.tiles.neighbours()[slot][at] as usize >= active);
@@ -147,7 +146,7 @@ fn parts_of(operator: &Operator, slot: usize) -> Parts {
     Parts { labels: Some(labels), count: opens.len() as u32, opens }
 }
 
-/// The cell of the same tile behind a face.
+/// The cell behind a face, if it is in the same tile.
 fn within(axis: usize, is_upper: bool, cell: usize) -> Option<usize> {
     let step = 64 >> (3 * axis);
     let at = cell / step % 8;
@@ -157,7 +156,7 @@ fn within(axis: usize, is_upper: bool, cell: usize) -> Option<usize> {
     }
 }
 
-/// Open share of a face of a cell.
+/// Open fraction of a face of a cell.
 fn open(stencil: &Stencil, axis: usize, is_upper: bool, cell: usize) -> f32 {
     match (is_upper, within(axis, true, cell)) {
         (false, _) => stencil.lower[axis][cell],
@@ -166,7 +165,7 @@ fn open(stencil: &Stencil, axis: usize, is_upper: bool, cell: usize) -> f32 {
     }
 }
 
-/// Disjoint groups of parts.
+/// Disjoint sets of components.
 struct Groups {
     parents: Vec<u32>,
 }
@@ -186,7 +185,7 @@ impl Groups {
         self.parents[a.max(b) as usize] = a.min(b);
     }
 
-    /// Joins the parts of two tiles through the faces between them.
+    /// Joins the components of two tiles through the faces between them.
     fn join_tiles(&mut self, axis: usize, [below, above]: [(u32, &Parts); 2], stencil: Option<&Stencil>) {
         let part = |(first, parts): (u32, &Parts), cell: usize| match &parts.labels {
             Some(labels) => (labels[cell] != SOLID).then(|| first + u32::from(labels[cell])),

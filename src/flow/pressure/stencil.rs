@@ -1,20 +1,20 @@
-//! The discrete Laplace operator of a tile: L x = sum over the six faces of open (x - neighbour), 0 outside all tiles.
+//! The discrete Laplace operator of a tile: L x = sum over the six faces of open (x - neighbour), with x = 0 outside all tiles.
 
 use crate::flow::tiles::Tile;
 use crate::numeric::blocks::Mask;
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::Lanes;
 
-/// Coefficients of a tile with faces that are not fully open, or with cells that do not take part.
+/// Coefficients of a tile that has faces which are not fully open, or inactive cells.
 #[derive(Debug, Clone)]
 pub struct Stencil {
-    /// Open share of the lower faces on each axis.
+    /// Open fraction of the lower faces on each axis.
     pub lower: [Tile; 3],
-    /// Open share of the tile's own upper faces on each axis, as layers of 8 x 8: (y, z), (x, z), (x, y).
+    /// Open fraction of the tile's own upper faces on each axis, as layers of 8 x 8: (y, z), (x, z), (x, y).
     pub upper: [[f32; 64]; 3],
-    /// Inverse of the sum of each cell's open shares; 0: the cell does not take part.
+    /// Inverse of the sum of each cell's open fractions; 0: the cell takes no part in the solve.
     pub inverse: Tile,
-    /// Cells where the pressure is 0, of levels whose tiles reach beyond the active ones: bit `y << 3 | z` of word `x`.
+    /// Cells where the pressure is 0, on levels whose tiles reach beyond the active ones: bit `y << 3 | z` of word `x`.
     pub outside: Mask,
 }
 
@@ -24,7 +24,7 @@ impl Stencil {
         Self { lower: [[1.0; 512]; 3], upper: [[1.0; 64]; 3], inverse: [1.0 / 6.0; 512], outside: [0; 8] }
     }
 
-    /// Open shares of the lower and the upper faces of a row's cells, on each axis.
+    /// Open fractions of the lower and upper faces of a row's cells, on each axis.
     #[inline(always)]
     pub fn faces(&self, row: usize) -> [[[f32; 8]; 2]; 3] {
         let (x, y) = (row >> 3, row & 7);
@@ -37,7 +37,7 @@ impl Stencil {
         [[lower[0], upper_x], [lower[1], upper_y], [lower[2], upper_z]]
     }
 
-    /// Computes the inverse diagonal; cells that `takes_part` denies get 0.
+    /// Computes the inverse diagonal; cells for which `takes_part` returns false get 0.
     pub fn invert(&mut self, takes_part: impl Fn(usize) -> bool) {
         for row in 0..64 {
             let faces = self.faces(row);
@@ -50,7 +50,7 @@ impl Stencil {
     }
 }
 
-/// Least sum of open shares of a cell that takes part.
+/// Minimum sum of open fractions of a cell that takes part.
 const LEAST: f32 = 1.0e-4;
 
 /// A row of eight values along z.
@@ -59,7 +59,7 @@ pub fn row_of(tile: &Tile, row: usize) -> [f32; 8] {
     std::array::from_fn(|lane| tile[row * 8 + lane])
 }
 
-/// The same, to compute with.
+/// A mutable row of eight values along z.
 #[inline(always)]
 fn lanes_of(tile: &Tile, row: usize) -> Lanes {
     Lanes(row_of(tile, row))
@@ -76,7 +76,7 @@ fn layer_of(layer: &[f32; 64], row: usize) -> [f32; 8] {
     std::array::from_fn(|lane| layer[row * 8 + lane])
 }
 
-/// A tile of an unknown field with the tiles that share a face.
+/// A tile of an unknown field and the tiles that share a face with it.
 #[derive(Clone, Copy)]
 pub struct Near<'a> {
     /// The tile.
@@ -98,7 +98,7 @@ pub enum Task<'a> {
     Smooth(&'a Tile, f32),
 }
 
-/// Computes a tile. Returns the sum of x, or for a sweep that of b, times the output.
+/// Computes a tile. Returns the sum of x times the output, or, for a sweep, of b times the output.
 pub fn compute(near: Near<'_>, task: Task<'_>, out: &mut Tile) -> f64 {
     dispatch!(compute_rows(near: Near<'_>, task: Task<'_>, out: &mut Tile) -> f64)
 }
@@ -115,13 +115,13 @@ fn compute_rows(near: Near<'_>, task: Task<'_>, out: &mut Tile) -> f64 {
     sums.0.iter().map(|sum| f64::from(*sum)).sum()
 }
 
-/// What is done with each row of L x.
+/// What to do with each row of L x.
 trait Rows {
-    /// Takes a row's index, x, L x and inverse diagonal.
+    /// Receives a row's index, x, L x and inverse diagonal.
     fn take(&mut self, row: usize, x: Lanes, product: Lanes, inverse: Lanes);
 }
 
-/// L x, with the sum of x times it.
+/// L x; accumulates the sum of x times L x.
 struct Products<'a> {
     out: &'a mut Tile,
     sums: Lanes,
@@ -135,7 +135,7 @@ impl Rows for Products<'_> {
     }
 }
 
-/// b - L x, with the sum of x times it.
+/// b - L x; accumulates the sum of x times the residual.
 struct Residuals<'a> {
     b: &'a Tile,
     out: &'a mut Tile,
@@ -151,7 +151,7 @@ impl Rows for Residuals<'_> {
     }
 }
 
-/// x + weight / diagonal (b - L x), with the sum of b times it.
+/// x + weight / diagonal (b - L x); accumulates the sum of b times the result.
 struct Smoothed<'a> {
     b: &'a Tile,
     weight: Lanes,
@@ -169,7 +169,7 @@ impl Rows for Smoothed<'_> {
     }
 }
 
-/// Gives each row to what is done with it.
+/// Passes each row to `rows`.
 #[inline(always)]
 fn each_row<R: Rows>(near: &Near<'_>, mut rows: R) -> R {
     match near.stencil {
@@ -196,7 +196,7 @@ fn masked(values: Lanes, inverse: Lanes) -> Lanes {
     zero.is_less(inverse).choose(values, zero)
 }
 
-/// The mean residual b - L x of each 2 x 2 x 2 cells; those that do not take part count as 0.
+/// The mean residual b - L x of each block of 2 x 2 x 2 cells; cells that do not take part count as 0.
 pub fn mean_residuals(near: Near<'_>, b: &Tile, out: &mut [f32; 64]) {
     dispatch!(mean_residual_rows(near: Near<'_>, b: &Tile, out: &mut [f32; 64]))
 }
@@ -233,8 +233,7 @@ fn around(near: &Near<'_>, row: usize, own: Lanes) -> [Lanes; 6] {
     [left, right, down, up, back, front]
 }
 
-/// A row of x and of L x where all faces are open. Terms of opposite neighbours are added first, so that mirrored fields have
-/// mirrored results to the last bit.
+/// A row of x and of L x where all faces are open. Opposite neighbours are added first, so that mirrored fields have bitwise mirrored results.
 #[inline(always)]
 fn plain(near: &Near<'_>, row: usize) -> (Lanes, Lanes) {
     let own = lanes_of(near.own, row);
@@ -242,7 +241,7 @@ fn plain(near: &Near<'_>, row: usize) -> (Lanes, Lanes) {
     (own, Lanes::all(6.0) * own - ((left + right) + (down + up) + (back + front)))
 }
 
-/// The same between faces that are not fully open.
+/// The same where faces are partly closed.
 #[inline(always)]
 fn with_faces(near: &Near<'_>, stencil: &Stencil, row: usize) -> (Lanes, Lanes) {
     let own = lanes_of(near.own, row);

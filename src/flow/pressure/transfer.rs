@@ -1,4 +1,4 @@
-//! Residuals on their way to a coarser level, and corrections on their way back.
+//! Restriction of residuals to a coarser level, and prolongation of corrections back.
 
 use rayon::prelude::*;
 
@@ -8,10 +8,10 @@ use crate::flow::tiles::{NONE, Tile};
 use crate::flow::window::{Span, Window};
 use crate::numeric::cpu::dispatch;
 
-/// Square of the ratio of the cells' widths, which the stencils leave out.
+/// Squared ratio of the cell widths, which the stencils leave out.
 const WIDER: f32 = 4.0;
 
-/// The coarse right side: the residual b - L x, averaged.
+/// The coarse right-hand side: the mean of the residual b - L x.
 pub fn restrict(fine: &Operator, (b, x): (&[Tile], &[Tile]), children: &[[u32; 8]], coarse: &mut [Tile]) {
     coarse.par_iter_mut().zip(children).with_min_len(4).for_each(|(out, children)| {
         for (octant, child) in children.iter().enumerate() {
@@ -29,7 +29,7 @@ pub fn restrict(fine: &Operator, (b, x): (&[Tile], &[Tile]), children: &[[u32; 8
     });
 }
 
-/// Adds the coarse correction, interpolated, to the cells that take part.
+/// Adds the interpolated coarse correction to the cells that take part.
 pub fn prolong(
     coarse: &Operator,
     correction: &[Tile],
@@ -51,7 +51,7 @@ fn add_tile(window: &Window, corner: [i32; 3], stencil: Option<&Stencil>, out: &
     dispatch!(add_rows(window: &Window, corner: [i32; 3], stencil: Option<&Stencil>, out: &mut Tile))
 }
 
-/// A fine cell takes 3/4 of the coarse cell that contains it and 1/4 of the next one on its side.
+/// A fine cell takes 3/4 of the coarse cell that contains it and 1/4 of the nearest other one.
 #[inline(always)]
 fn add_rows(window: &Window, corner: [i32; 3], stencil: Option<&Stencil>, out: &mut Tile) {
     let two = |fine: usize| (fine / 2 + 1, fine / 2 + 2 * (fine & 1));

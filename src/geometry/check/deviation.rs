@@ -1,60 +1,59 @@
-//! How far the surface of one mesh lies from that of another: distances from its points to the nearest positions there. For meshes
-//! with the same triangles also how far their vertices lie apart, and how much these tremble over three frames.
+//! Distances from points of one mesh to the nearest positions on another. For meshes with the same triangles also distances between their
+//! vertices, and how much these jitter over three frames.
 
 use rayon::prelude::*;
 
 use crate::geometry::{DVec3, TriMesh, Vec3};
 
-/// Most triangles in a leaf.
+/// Maximum triangles in a leaf.
 const LEAF: usize = 4;
-/// Points, triangles or leaves of a task.
+/// Points, triangles or leaves per task.
 const GRAIN: usize = 1024;
-/// Nodes that wait at most while the tree is searched: one for each level, of which there are 30 at most.
+/// Maximum nodes that wait during a search: one for each level, of which there are at most 30.
 const WAITING: usize = 64;
-/// A triangle whose first corner has a smaller sine is degenerate: it is searched as its edges, which lie within this part
-/// of its length.
+/// A triangle whose first corner has a smaller sine is degenerate: its edges are searched instead, which lie within this fraction of its
+/// length.
 const NEEDLE: f64 = 1e-8;
-/// Distances up to this part of the largest coordinate are rounding in 64 bits, and count as none; the numbers of a mesh are 6e-8
-/// of them apart.
+/// Distances up to this fraction of the largest coordinate are rounding in 64 bits, and count as 0; 32-bit mesh coordinates are spaced 6e-8
+/// of it.
 const ROUNDING: f64 = 1e-12;
-/// Shares of a triangle's area that its centre and each of its corners stand for: with them the sum over a triangle is the integral
-/// of anything quadratic.
+/// Weights of a triangle's centre and of each corner, as shares of its area: exact for quadratic integrands.
 const CENTRE: f64 = 0.75;
 const CORNER: f64 = 1.0 / 12.0;
-/// Share of the points that [`Deviation::p95`] keeps.
+/// Fraction of the points that lie within [`Deviation::p95`].
 const MOST: f64 = 0.95;
 
-/// Least and greatest corner of a box (m).
+/// Minimum and maximum corner of a box (m).
 type Span = (Vec3, Vec3);
-/// The box around nothing.
+/// The empty box.
 const NOWHERE: Span = (Vec3::new(FAR, FAR, FAR), Vec3::new(-FAR, -FAR, -FAR));
 const FAR: f32 = f32::INFINITY;
-/// The middle of a triangle (m), and its index.
+/// Centre of a triangle (m), and its index.
 type Item = (Vec3, u32);
 
-/// Distances of points, in short.
+/// Summary of the distances of points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
     /// Mean (m).
     pub mean: f64,
-    /// The least distance (m) that 95 % of the points keep within.
+    /// 95th percentile (m).
     pub p95: f64,
     /// Largest (m).
     pub max: f64,
-    /// The point (m) that has the largest: of several the first.
+    /// The point (m) with the largest distance; the first if there are several.
     pub max_at: DVec3,
 }
 
-/// Distances from a mesh to the surface of another: of the vertices that triangles name, and of the triangles' centres. Each point
-/// counts as much as the area that it stands for: three quarters of a triangle's is its centre's, a twelfth each corner's. Points
-/// of a mesh without any area count the same. None where one of the two has no triangles.
+/// Distances from a mesh to the surface of another, at the vertices that its triangles use and at the triangles' centres. Each point is
+/// weighted by the area that it represents: three quarters of a triangle's area for its centre, a twelfth for each corner. On a mesh
+/// without area all points weigh the same. `None` if either mesh has no triangles.
 pub fn from_surface(mesh: &TriMesh, to: &NearestTree) -> Option<Deviation> {
     let samples: Vec<Vec<Sample>> = points(mesh).par_chunks(GRAIN).map(|points| to.samples(points)).collect();
     Deviation::of(&samples.concat())
 }
 
-/// Distances from the vertices of a mesh to the same vertices of another, which has the same triangles. Those that triangles name
-/// count, all the same; none where there are no triangles.
+/// Distances from the vertices of a mesh to the same vertices of another with the same triangles. Only vertices that triangles use count,
+/// with equal weights; `None` without triangles.
 pub fn from_vertices(mesh: &TriMesh, to: &TriMesh) -> Option<Deviation> {
     let pairs = mesh.positions.iter().zip(&to.positions);
     let far = pairs.map(|(from, to)| {
@@ -64,8 +63,8 @@ pub fn from_vertices(mesh: &TriMesh, to: &TriMesh) -> Option<Deviation> {
     Deviation::of(&of_vertices(mesh, far))
 }
 
-/// Lengths of the second differences of each vertex' position, x(n - 1) - 2 x(n) + x(n + 1), over three frames of meshes with the same
-/// triangles: 0 where a vertex moves evenly. Vertices that triangles name count, all the same; none where there are no triangles.
+/// Lengths of the second differences of each vertex position, x(n - 1) - 2 x(n) + x(n + 1), over three frames of meshes with the same
+/// triangles: 0 where a vertex moves uniformly. Only vertices that triangles use count, with equal weights; `None` without triangles.
 pub fn second_differences([before, here, after]: [&TriMesh; 3]) -> Option<Deviation> {
     let positions = before.positions.iter().zip(&here.positions).zip(&after.positions);
     let far = positions.map(|((before, here), after)| {
@@ -80,7 +79,7 @@ pub fn second_differences([before, here, after]: [&TriMesh; 3]) -> Option<Deviat
 struct Sample {
     at: DVec3,
     distance: f64,
-    /// How much it counts.
+    /// Its weight.
     weight: f64,
 }
 
@@ -94,7 +93,7 @@ impl Deviation {
         let sum: f64 = samples.iter().map(|sample| weight(sample) * sample.distance).sum();
         let mut order: Vec<(f64, f64)> =
             samples.iter().map(|sample| (sample.distance, weight(sample))).collect();
-        // Stable, so that the sum over weights has one order.
+        // Stable, so that the weighted sum has a fixed order.
         order.par_sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut within = 0.0;
         let last = order.iter().find(|(_, weight)| {
@@ -102,13 +101,13 @@ impl Deviation {
             within >= MOST * total
         });
         let max = farthest.distance;
-        // A mean of equal numbers may round to more.
+        // Rounding may lift the mean of equal numbers above them.
         let mean = (sum / total).min(max);
         Some(Self { mean, p95: last.map_or(max, |(distance, _)| *distance), max, max_at: farthest.at })
     }
 }
 
-/// The vertices that triangles name, out of all with their distances (m).
+/// The vertices that triangles use, out of all with their distances (m).
 fn of_vertices(mesh: &TriMesh, far: impl Iterator<Item = (DVec3, f64)>) -> Vec<Sample> {
     let mut named = vec![false; mesh.positions.len()];
     mesh.triangles.as_flattened().iter().for_each(|&vertex| named[vertex as usize] = true);
@@ -116,7 +115,7 @@ fn of_vertices(mesh: &TriMesh, far: impl Iterator<Item = (DVec3, f64)>) -> Vec<S
     of_named.map(|((at, distance), _)| Sample { at, distance, weight: 1.0 }).collect()
 }
 
-/// The points of a mesh (m), each with the area (m2) that it stands for: vertices that triangles name, then centres.
+/// The points of a mesh (m), each with the area (m2) that it represents: the vertices that triangles use, then the centres.
 fn points(mesh: &TriMesh) -> Vec<(DVec3, f64)> {
     let mut areas: Vec<Option<f64>> = vec![None; mesh.positions.len()];
     let mut centres = Vec::with_capacity(mesh.triangles.len());
@@ -132,26 +131,26 @@ fn points(mesh: &TriMesh) -> Vec<(DVec3, f64)> {
     vertices.filter_map(|(position, area)| Some((position.cast::<f64>(), area?))).chain(centres).collect()
 }
 
-/// The triangles of a mesh in a binary tree of boxes, for the position of its surface that is nearest to a point.
+/// The triangles of a mesh in a binary tree of boxes, for nearest-position queries.
 pub struct NearestTree {
-    /// Of each node; the children of node i are 2 i + 1 and 2 i + 2.
+    /// One for each node; the children of node i are 2 i + 1 and 2 i + 2.
     boxes: Vec<Span>,
     /// In the order of the leaves, which are the last nodes and share them evenly.
     facets: Vec<Facet>,
-    /// Levels below the first node.
+    /// Levels below the root.
     levels: u32,
     /// Largest coordinate (m).
     reach: f64,
 }
 
-/// The position of a mesh that is nearest to a point.
+/// The position on a mesh that is nearest to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nearest {
     /// The position (m).
     pub position: DVec3,
-    /// How far it is from the point (m): 0 up to 1e-12 of the largest coordinate.
+    /// Distance to the point (m); 0 if it is at most 1e-12 of the largest coordinate.
     pub distance: f64,
-    /// The triangle that it lies on; of several any one.
+    /// The triangle that it lies on; any one if there are several.
     pub triangle: usize,
 }
 
@@ -164,7 +163,7 @@ pub(in crate::geometry) struct Found {
 }
 
 impl NearestTree {
-    /// Sorts a mesh's triangles into a tree; positions are finite and indices in range.
+    /// Sorts a mesh's triangles into a tree; positions must be finite and indices in range.
     pub fn new(mesh: &TriMesh) -> Self {
         let count = mesh.triangles.len();
         let mut levels = 0u32;
@@ -174,7 +173,7 @@ impl NearestTree {
         let corners =
             |triangle: u32| mesh.triangles[triangle as usize].map(|vertex| mesh.positions[vertex as usize]);
         let middle = |triangle: u32| {
-            // Thirds first: the sum of three stays in 32 bits.
+            // Divided first: the sum of three then fits in 32 bits.
             let [a, b, c] = corners(triangle).map(|corner| corner / 3.0);
             (a + b + c, triangle)
         };
@@ -198,16 +197,16 @@ impl NearestTree {
         Self { boxes, facets, levels, reach }
     }
 
-    /// The position that is nearest to a point (m); none without triangles.
+    /// The position that is nearest to a point (m); `None` without triangles.
     pub fn nearest(&self, point: DVec3) -> Option<Nearest> {
         let found = self.search(point, None)?;
         let triangle = self.facets[found.facet].triangle as usize;
         Some(Nearest { position: found.position, distance: self.distance(point, &found), triangle })
     }
 
-    /// The distances of points, each with what it counts.
+    /// The distances of points, each with its weight.
     fn samples(&self, points: &[(DVec3, f64)]) -> Vec<Sample> {
-        // Points that follow each other mostly lie beside each other: the facet of the last one is near to the next.
+        // Consecutive points are mostly neighbours: the last one's facet is a good first guess.
         let mut guess = None;
         let sample = |&(at, weight): &(DVec3, f64)| {
             let found = self.search(at, guess)?;
@@ -222,7 +221,7 @@ impl NearestTree {
         if distance <= ROUNDING * self.reach.max(from.amax()) { 0.0 } else { distance }
     }
 
-    /// The nearest position; with the number of a facet that is thought to be near, in less time.
+    /// The nearest position; faster with the number of a facet that is probably near.
     fn search(&self, point: DVec3, guess: Option<usize>) -> Option<Found> {
         let mut best = guess.map(|facet| self.facets[facet].found(point, facet));
         let mut bound = best.map_or(f64::INFINITY, |found| found.square);
@@ -259,12 +258,12 @@ impl NearestTree {
     }
 }
 
-/// Where the items of a node of a level start, out of `count`; those of its children share them evenly.
+/// Where the items of a node at a level start, out of `count`; its children share them evenly.
 fn starts(count: usize, level: u32, node: usize) -> usize {
     (node * count) >> level
 }
 
-/// Sorts the items of a node of a level, out of `count`, so that each node below has its own.
+/// Sorts the items of a node at a level, out of `count`, so that each node below has its own items.
 fn sort(items: &mut [Item], count: usize, levels: u32, level: u32, node: usize) {
     if level == levels {
         return;
@@ -281,7 +280,7 @@ fn sort(items: &mut [Item], count: usize, levels: u32, level: u32, node: usize) 
     );
 }
 
-/// The square of the distance of a point from a box (m2): 0 inside.
+/// Squared distance of a point from a box (m2): 0 inside.
 fn square_to((low, high): &Span, point: DVec3) -> f64 {
     let beyond = |axis: usize| {
         let [low, high] = [low, high].map(|corner| f64::from(corner[axis]));
@@ -308,9 +307,9 @@ impl Facet {
         Self { corners, triangle, is_needle }
     }
 
-    /// Its position nearest to a point: over the face where the point lies on the inner side of all edges, else on one of these
-    /// (Ericson, Real-Time Collision Detection, 2005, 5.1.5). The regions are told by planes along the edges and not, as there, by
-    /// products of projections, whose rounding grows with the square of a needle's length.
+    /// The position nearest to a point: on the face if the point lies on the inner side of all edges, else on one of these (Ericson,
+    /// Real-Time Collision Detection, 2005, 5.1.5). Planes along the edges separate the regions, not, as there, products of projections,
+    /// whose rounding grows with the square of a needle's length.
     pub(in crate::geometry) fn found(&self, point: DVec3, facet: usize) -> Found {
         let [a, b, c] = self.corners.map(|corner| corner.cast::<f64>());
         let edges = [(a, b), (b, c), (c, a)];
@@ -330,12 +329,12 @@ impl Facet {
     }
 }
 
-/// The position of an edge that is nearest to a point.
+/// The position on an edge that is nearest to a point.
 fn nearest_of_edge(point: DVec3, from: DVec3, to: DVec3) -> DVec3 {
     let along = to - from;
     let square = along.norm_squared();
     let way = (point - from).dot(&along);
-    // The ends are met to the last bit.
+    // Exact at the ends.
     if way <= 0.0 || square == 0.0 {
         from
     } else if way >= square {
@@ -349,7 +348,7 @@ fn nearest_of_edge(point: DVec3, from: DVec3, to: DVec3) -> DVec3 {
 mod tests {
     use super::*;
 
-    /// Numbers from -1 to 1, the same in each run.
+    /// Numbers from -1 to 1, the same in every run.
     struct Random(u64);
 
     impl Random {
@@ -363,7 +362,7 @@ mod tests {
         }
     }
 
-    /// Loose triangles of all sizes: some are needles, some without area.
+    /// Random triangles of all sizes: some are needles, some have no area.
     fn litter(seed: u64, count: usize) -> TriMesh {
         let mut random = Random(seed);
         let triangle = |n: usize| {
@@ -413,10 +412,10 @@ mod tests {
                 let point = (a + b + c) / 3.0 + random.vector(scale).cast::<f64>() * size;
                 let found = facet.found(point, 0);
                 let close = 1e-6 * size * size;
-                // The nearest position of a convex set: all of the set lies behind the plane through it across the way to the point.
+                // The nearest position of a convex set: all of the set lies behind the plane through it that faces the point.
                 let way = point - found.position;
                 assert!([a, b, c].iter().all(|corner| way.dot(&(corner - found.position)) <= close));
-                // It belongs to the triangle: the triangles that it makes with the edges are no larger than the whole.
+                // It lies in the triangle: its triangles with the edges are together no larger than the whole.
                 let area = |p: DVec3, q: DVec3, r: DVec3| (q - p).cross(&(r - p)).norm();
                 let position = found.position;
                 let parts = area(position, a, b) + area(position, b, c) + area(position, c, a);
@@ -450,12 +449,12 @@ mod tests {
         let plane = square(-8.0, 0.0, 16.0);
         let mut sheet = square(0.0, 0.0, 1.0);
         sheet.append(&square(2.0, 0.25, 3.0));
-        // One that no triangle names.
+        // A vertex that no triangle uses.
         sheet.positions.push(Vec3::new(0.0, 100.0, 0.0));
         let found = from_surface(&sheet, &NearestTree::new(&plane)).unwrap();
         assert!((found.mean - 0.25 * 9.0 / 10.0).abs() < 1e-12, "{found:?}");
         assert_eq!((found.p95, found.max, found.max_at), (0.25, 0.25, DVec3::new(2.0, 0.25, 0.0)));
-        // With the small one above it is less than a tenth that is far.
+        // Here only the small square is off the plane: less than a tenth of the area.
         let mut sheet = square(0.0, 0.25, 1.0);
         sheet.append(&square(2.0, 0.0, 5.0));
         let found = from_surface(&sheet, &NearestTree::new(&plane)).unwrap();

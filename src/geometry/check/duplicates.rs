@@ -1,19 +1,19 @@
-//! Triangles and parts that are there twice.
+//! Duplicate triangles and parts.
 
 use rayon::prelude::*;
 
 use super::edges::{Use, imbalance, is_same_edge, parts_of};
 
-/// What is there twice among triangles.
+/// Duplicates among triangles.
 pub(in crate::geometry) struct Doubles {
-    /// Of each triangle whether it goes: it has the vertices of one before it, in any order.
+    /// For each triangle, whether it is removed: it has the vertices of an earlier one, in any order.
     pub(in crate::geometry) is_double: Vec<bool>,
-    /// Of each triangle whether there is one that is turned the other way.
+    /// For each triangle, whether it has a duplicate of the opposite orientation.
     pub(in crate::geometry) is_two_sided: Vec<bool>,
 }
 
 impl Doubles {
-    /// Of triangles with these edges. Doubled triangles stay where they are the common walls of closed parts, which cancel.
+    /// Duplicates among triangles with these edges. Doubled triangles that are the common walls of closed parts cancel, and stay.
     pub(in crate::geometry) fn of(triangles: &[[u32; 3]], uses: &[Use]) -> Self {
         let count = triangles.len();
         let mut out = Self { is_double: vec![false; count], is_two_sided: vec![false; count] };
@@ -53,15 +53,15 @@ impl Doubles {
     }
 }
 
-/// Which of so many triangles are of parts that lie on one before them, triangle by triangle: their keys are the same. Only parts of
-/// some triangles are compared.
+/// Marks the triangles of parts that coincide with an earlier part, triangle by triangle: their keys are the same. `is_compared` selects
+/// parts by their first triangle.
 pub fn copies<K: Ord + Copy + Send>(
     parts: &[u32],
     is_compared: impl Fn(usize) -> bool,
     key: impl Fn(usize) -> K,
 ) -> Vec<bool> {
     let mut is_copy = vec![false; parts.len()];
-    // Parts that are alike have as many triangles, and the same least key: only such are compared.
+    // Equal parts have the same number of triangles and the same minimum key: only such parts are compared.
     let mut marks: Vec<(u32, Option<K>)> = vec![(0, None); parts.len()];
     for (at, &part) in parts.iter().enumerate() {
         let (count, least) = &mut marks[part as usize];
@@ -84,7 +84,7 @@ pub fn copies<K: Ord + Copy + Send>(
         .map(|(at, part)| (*part, key(at as usize), at))
         .collect();
     order.par_sort_unstable();
-    // The sort is stable: of parts at the same position the first stays first.
+    // The sort is stable: of equal parts the first stays first.
     let mut bodies: Vec<&[(u32, K, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
     let keys = |body: &&[(u32, K, u32)]| -> Vec<K> { body.iter().map(|one| one.1).collect() };
     bodies.sort_by_cached_key(|body| (body.len(), keys(body)));
@@ -107,7 +107,7 @@ mod tests {
         let back = TETRAHEDRON.map(|[a, b, c]| [a, c, b]);
         assert_eq!(of(&[&TETRAHEDRON[..], &back].concat()), [[false; 4], [true; 4]].concat());
         assert_eq!(of(&[&TETRAHEDRON[..], &back[..1]].concat()), [false, false, false, false, true]);
-        // Another on its face 0: the wall is there from both sides.
+        // Another tetrahedron on its face 0: the wall is there from both sides.
         let other = [[1, 2, 0], [1, 0, 4], [2, 1, 4], [0, 2, 4]];
         assert_eq!(of(&[TETRAHEDRON, other].concat()), vec![false; 8]);
     }

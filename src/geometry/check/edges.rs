@@ -1,18 +1,18 @@
-//! Edges of triangles, the parts that hang together by them, and neighbours that agree about which side is out.
+//! Edges of triangles, the parts that they connect, and neighbours that agree on which side is out.
 
 use super::topology::Sets;
 
-/// An edge, lesser vertex first, and a triangle that has it.
+/// An edge, smaller vertex index first, and a triangle that has it.
 pub type Use = ([u32; 2], u32);
 
-/// Of an edge that no second triangle has.
+/// Of an edge without a second triangle.
 const NONE: u32 = u32::MAX;
-/// The smallest closed part, a tetrahedron, has so many triangles.
+/// Triangles of the smallest closed part, a tetrahedron.
 const SMALLEST: u32 = 4;
 
-/// The edges of triangles among so many vertices, sorted, each with all triangles that have it.
+/// The edges of triangles over `vertices` vertices, sorted, each with all triangles that have it.
 pub fn edge_uses(vertices: usize, triangles: &[[u32; 3]]) -> Vec<Use> {
-    // Sorted by counting after the lesser vertex, then by comparing: few edges begin at one vertex.
+    // Counting sort by the smaller vertex, then comparisons: few edges begin at one vertex.
     let mut next = vec![0usize; vertices + 1];
     triangles.iter().flat_map(sides).for_each(|ends| next[ends[0] as usize + 1] += 1);
     (0..vertices).for_each(|vertex| next[vertex + 1] += next[vertex]);
@@ -24,7 +24,7 @@ pub fn edge_uses(vertices: usize, triangles: &[[u32; 3]]) -> Vec<Use> {
             *position += 1;
         }
     }
-    // Each position has moved on to the end of its vertex.
+    // Each offset has advanced to the end of its vertex.
     let mut begin = 0;
     for &end in &next[..vertices] {
         uses[begin..end].sort_unstable();
@@ -33,12 +33,12 @@ pub fn edge_uses(vertices: usize, triangles: &[[u32; 3]]) -> Vec<Use> {
     uses
 }
 
-/// The edges of a triangle, lesser vertex first.
+/// The edges of a triangle, smaller vertex index first.
 pub fn sides(&[a, b, c]: &[u32; 3]) -> [[u32; 2]; 3] {
     [[a, b], [b, c], [c, a]].map(|[from, to]| [from.min(to), from.max(to)])
 }
 
-/// Whether two uses are of the same edge.
+/// Whether two uses belong to the same edge.
 pub fn is_same_edge(a: &Use, b: &Use) -> bool {
     a.0 == b.0
 }
@@ -48,18 +48,18 @@ pub fn runs(triangle: &[u32; 3], [from, to]: [u32; 2]) -> bool {
     (0..3).any(|side| triangle[side] == from && triangle[(side + 1) % 3] == to)
 }
 
-/// How many more of the triangles of an edge run along it from its first end to its second than back.
+/// Triangles of an edge that run along it from its first end to its second, minus those that run back.
 pub fn imbalance(triangles: &[[u32; 3]], run: &[Use]) -> i32 {
     run.iter().map(|&(ends, triangle)| if runs(&triangles[triangle as usize], ends) { 1 } else { -1 }).sum()
 }
 
-/// Which side of a triangle an edge is.
+/// Index of an edge among the sides of a triangle.
 pub fn side(triangle: &[u32; 3], ends: [u32; 2]) -> usize {
-    // It begins behind the corner that is not on it.
+    // The side begins after the corner that is not on it.
     triangle.iter().position(|vertex| !ends.contains(vertex)).map_or(0, |apart| (apart + 1) % 3)
 }
 
-/// The part of each of so many triangles, named by its first triangle.
+/// The part of each of `count` triangles, named by its first triangle.
 pub fn parts_of(count: usize, uses: &[Use]) -> Vec<u32> {
     let mut sets = Sets::new(count);
     uses.windows(2)
@@ -68,7 +68,7 @@ pub fn parts_of(count: usize, uses: &[Use]) -> Vec<u32> {
     (0..count as u32).map(|triangle| sets.root(triangle)).collect()
 }
 
-/// Which triangles are of parts that are closed as they are, each edge with two triangles that agree.
+/// Marks the triangles of parts that are already closed: each edge has two triangles that agree.
 pub fn sound(triangles: &[[u32; 3]], uses: &[Use], parts: &[u32]) -> Vec<bool> {
     let mut is_sound = vec![true; parts.len()];
     for run in uses.chunk_by(is_same_edge) {
@@ -81,18 +81,18 @@ pub fn sound(triangles: &[[u32; 3]], uses: &[Use], parts: &[u32]) -> Vec<bool> {
     parts.iter().map(|&part| is_sound[part as usize] && counts[part as usize] >= SMALLEST).collect()
 }
 
-/// Which triangles have to be turned round so that neighbours agree.
+/// Which triangles must be flipped so that neighbours agree.
 pub struct Agreement {
-    /// Of each triangle whether it is to be turned.
+    /// For each triangle, whether it must be flipped.
     pub turned: Vec<bool>,
-    /// The patch of each triangle, named by its first triangle: what hangs together by edges with two triangles.
+    /// The patch of each triangle, named by its first triangle: triangles connected by edges that have exactly two.
     pub patch: Vec<u32>,
-    /// The patches that have one side only (a Mobius strip, a Klein bottle), in which no choice makes all agree; ascending.
+    /// The patches with only one side (a Mobius strip, a Klein bottle), where no choice makes all agree; ascending.
     pub one_sided: Vec<u32>,
 }
 
-/// Finds which triangles to turn so that two which are alone on an edge run along it opposite ways, as far as a surface has two
-/// sides. In each patch the orientation that has more area stays.
+/// Finds which triangles to flip so that the two triangles of each edge with exactly two run along it in opposite directions, as far as the
+/// surface has two sides. In each patch the orientation with more area stays.
 pub fn agree(triangles: &[[u32; 3]], uses: &[Use], area: impl Fn(usize) -> f64) -> Agreement {
     let mut beside = vec![[NONE; 3]; triangles.len()];
     for run in uses.chunk_by(is_same_edge) {
@@ -120,7 +120,7 @@ pub fn agree(triangles: &[[u32; 3]], uses: &[Use], area: impl Fn(usize) -> f64) 
         while reached < patch.len() {
             let at = patch[reached] as usize;
             reached += 1;
-            // Turned against the first of the patch.
+            // Flipped relative to the first of the patch.
             let turned = out.turned[at];
             areas[usize::from(turned)] += area(at);
             for side in 0..3 {
@@ -159,7 +159,7 @@ mod tests {
         turned[2].swap(1, 2);
         let agreement = agree(&turned, &edge_uses(4, &turned), |_| 1.0);
         assert_eq!((agreement.turned, agreement.one_sided), (vec![false, false, true, false], vec![]));
-        // A band of five triangles whose ends meet upside down.
+        // A band of five triangles, closed with a half twist.
         let strip: Vec<[u32; 3]> = (0..5).map(|at| [at, (at + 1) % 5, (at + 2) % 5]).collect();
         assert_eq!(agree(&strip, &edge_uses(5, &strip), |_| 1.0).one_sided, vec![0]);
     }

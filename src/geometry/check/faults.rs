@@ -11,27 +11,27 @@ use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::spatial::near_pairs::Near;
 use crate::geometry::{DVec3, TriMesh};
 
-/// Triangles a task looks at.
+/// Triangles per task.
 const GRAIN: usize = 512;
-/// Volumes of parts up to this many cubes of their size are none: rounding makes as much.
+/// Volumes of parts up to this many cubes of their size count as 0: rounding produces as much.
 const ROUNDING: f64 = 1e-12;
 
-/// Faults and properties of a mesh. Vertices at the same position count as one, and so do those within rounding of one another on open
-/// edges ([`Weld`]), but in `by_index`. Every count is exact for the 32-bit coordinates that this leaves, without tolerance, but for
-/// `inverted_parts`, which go by volumes and rays in 64 bits.
+/// Faults and properties of a mesh. Except in `by_index`, vertices at the same position count as one, and so do vertices on open edges that
+/// are within rounding of one another ([`Weld`]). Every count is exact, without tolerance, for the resulting 32-bit coordinates; only
+/// `inverted_parts` depends on volumes and rays in 64 bits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Faults {
-    /// Vertices that no triangle names.
+    /// Vertices that no triangle uses.
     pub unused_vertices: usize,
-    /// Vertices that share their position with one before them.
+    /// Vertices that share their position with an earlier one.
     pub doubled_vertices: usize,
-    /// Vertices on open edges that are joined with one before them within rounding.
+    /// Vertices on open edges that are joined with an earlier one within rounding.
     pub near_vertices: usize,
-    /// Vertices on open edges that are within rounding of others, but which of them are one is not clear ([`Weld::ambiguous`]).
+    /// Vertices on open edges that are within rounding of others, where it is not clear which belong together ([`Weld::ambiguous`]).
     pub ambiguous_vertices: usize,
-    /// Triangles with two corners at the same position, or without area; nothing below counts them.
+    /// Triangles with two corners at the same position, or without area; not counted below.
     pub degenerate: usize,
-    /// Triangles with the corners of one before them, in any order; nothing below counts them.
+    /// Triangles with the corners of an earlier one, in any order; not counted below.
     pub doubled_triangles: usize,
     /// Edges with one triangle.
     pub open_edges: usize,
@@ -39,35 +39,35 @@ pub struct Faults {
     pub holes: usize,
     /// Edges with more than two triangles.
     pub crowded_edges: usize,
-    /// Edges whose two triangles disagree about which side is out.
+    /// Edges whose two triangles disagree on which side is out.
     pub turned_edges: usize,
-    /// Vertices whose triangles do not form one fan, closed or with two ends: where parts touch in a vertex, and both ends
-    /// of each crowded edge.
+    /// Vertices whose triangles do not form one ring, closed or open: where parts touch in a vertex, and both ends of each non-manifold
+    /// edge.
     pub non_manifold_vertices: usize,
-    /// Connected parts; those that touch in a vertex are one.
+    /// Connected parts; parts that touch in a vertex are one.
     pub parts: usize,
-    /// Parts (apart where they touch in a vertex only) whose volume has another sign than the whole's, so that there is
-    /// nothing inside them: but for cavities, whose outermost corners lie within parts of the whole's sign. Counted where
-    /// all edges have two triangles that agree.
+    /// Parts whose volume has the opposite sign of the whole mesh's, so that they enclose nothing; here parts that touch only in a vertex
+    /// are separate. Cavities, whose outermost corners lie within parts of the whole's sign, do not count. Counted only where all edges
+    /// have two triangles that agree.
     pub inverted_parts: usize,
     /// Area (m2).
     pub area: f64,
-    /// Enclosed volume (m3), negative when the mesh is inside out; means little where it is open.
+    /// Enclosed volume (m3), negative if the mesh is inside out; of little meaning if it is open.
     pub volume: f64,
-    /// Pairs of triangles without a common corner that pass through each other.
+    /// Pairs of triangles without a common corner that intersect.
     pub crossings: usize,
-    /// Pairs of triangles with one common corner that pass through each other.
+    /// Pairs of triangles with one common corner that intersect.
     pub corner_crossings: usize,
-    /// Pairs of triangles with a common edge that are folded onto each other: in one plane, on the same side of it.
+    /// Pairs of triangles with a common edge that are folded onto each other: coplanar, on the same side of it.
     pub folds: usize,
-    /// Pairs of triangles without a common edge that cover the same area of a plane.
+    /// Pairs of triangles without a common edge that overlap in a plane.
     pub overlaps: usize,
-    /// Pairs of triangles that touch elsewhere than in a common corner, and do not pass through each other: a corner on a
-    /// face or an edge, an edge across an edge.
+    /// Pairs of triangles that touch elsewhere than in a common corner without intersecting: a corner on a face or an edge, an edge across
+    /// an edge.
     pub touches: usize,
-    /// Handles, summed over the parts, when the surface is closed and no edge is crowded.
+    /// Handles, summed over the parts; only if the surface is closed and has no non-manifold edge.
     pub genus: Option<i64>,
-    /// The mesh as its indices have it, with all triangles, and vertices at the same position apart.
+    /// The mesh by its indices alone: all triangles count, and vertices at the same position are separate.
     pub by_index: Topology,
 }
 
@@ -113,15 +113,14 @@ impl Faults {
         }
     }
 
-    /// Whether the mesh bounds a solid without doubt once vertices at the same position are joined: closed, each edge with two
-    /// triangles that agree, and no part inside out, unless all are. Whether it does as it is,
-    /// [`Topology::is_watertight`] of `by_index` says.
+    /// Whether the mesh clearly bounds a solid once vertices at the same position are joined: closed, each edge with two triangles that
+    /// agree, and no part inside out, unless all are. Whether it does so unjoined, [`Topology::is_watertight`] of `by_index` says.
     pub fn is_solid(&self) -> bool {
         let faults = [self.open_edges, self.crowded_edges, self.turned_edges, self.inverted_parts];
         self.parts > 0 && faults == [0; 4]
     }
 
-    /// Whether no two triangles meet but in common corners and edges.
+    /// Whether triangles meet only in common corners and edges.
     pub fn is_embedded(&self) -> bool {
         let pairs = [self.crossings, self.corner_crossings, self.folds, self.overlaps, self.touches];
         pairs == [0; 5] && self.doubled_triangles == 0
@@ -129,7 +128,7 @@ impl Faults {
 }
 
 /// Pairs of triangles (numbers, ascending) that meet elsewhere than in common corners and edges, exactly; vertices at the same position are
-/// common. A triangle that lies on one before it is paired with that; those without an area are left out.
+/// common. A triangle that coincides with an earlier one is paired with it; triangles without area are left out.
 pub fn meeting_pairs(mesh: &TriMesh) -> Vec<[u32; 2]> {
     let same = coincident(mesh.positions.iter().map(|p| p.cast()));
     let position = |corners: [u32; 3]| corners.map(|vertex| mesh.positions[vertex as usize]);
@@ -155,8 +154,8 @@ pub fn meeting_pairs(mesh: &TriMesh) -> Vec<[u32; 2]> {
     pairs
 }
 
-/// Holes of a mesh: connected sets of edges with one triangle, as [`Faults::holes`]; in 64 bits, where rounding decides
-/// whether a triangle has an area. `same` has for each vertex the first one that is the same corner ([`Weld::firsts`]).
+/// Holes of a mesh: connected sets of edges with one triangle, as [`Faults::holes`]; in 64 bits, where rounding decides whether a triangle
+/// has an area. For each vertex, `same` gives the first one that is the same corner ([`Weld::firsts`]).
 pub fn holes(positions: &[DVec3], triangles: &[[u32; 3]], same: &[u32]) -> usize {
     let flat = |corners: [u32; 3]| {
         let [a, b, c] = corners.map(|vertex| positions[vertex as usize]);
@@ -166,14 +165,14 @@ pub fn holes(positions: &[DVec3], triangles: &[[u32; 3]], same: &[u32]) -> usize
     groups(positions.len(), survey.open.into_iter())
 }
 
-/// Area (m2) of the triangles that count: all but those with the corners of one before them.
+/// Area (m2) of the triangles that count: all except those with the corners of an earlier one.
 pub fn counted_area(mesh: &TriMesh) -> f64 {
     let places: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
     let kept = kept(&mesh.triangles, &Weld::of(&places, &mesh.triangles).firsts, |_| false).kept;
     TriMesh { positions: mesh.positions.clone(), triangles: kept }.area()
 }
 
-/// The triangles that count, with joined corners, and how many do not.
+/// The triangles that count, with joined corners, and the number of those that do not.
 struct Kept {
     kept: Vec<[u32; 3]>,
     degenerate: usize,
@@ -192,11 +191,11 @@ fn kept(triangles: &[[u32; 3]], same: &[u32], flat: impl Fn([u32; 3]) -> bool) -
 /// A connected part of a mesh.
 struct Part<'a> {
     triangles: &'a [usize],
-    /// Signed (m3); 0 where rounding decides.
+    /// Signed volume (m3); 0 where rounding decides.
     volume: f64,
 }
 
-/// A direction along which no edges of made meshes run.
+/// A direction that no edges of modelled meshes follow.
 const ASLANT: DVec3 = DVec3::new(0.5773, 0.6533, 0.4896);
 
 impl<'a> Part<'a> {
@@ -218,7 +217,7 @@ impl<'a> Part<'a> {
         triangles.iter().flat_map(|&triangle| mesh.corners(triangle))
     }
 
-    /// Whether its outermost corners lie within others, which turn outward (1) or inside out (-1).
+    /// Whether its outermost corners lie within others, which face outward (1) or inward (-1).
     fn is_within(&self, mesh: &TriMesh, others: &Bvh, turn: i32) -> bool {
         let corners = || Self::corners(mesh, self.triangles);
         (0..3).all(|axis| {
@@ -229,7 +228,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// See [`Faults::inverted_parts`]: of a closed mesh with such a volume, whose triangles belong to these bodies.
+/// See [`Faults::inverted_parts`]; for a closed mesh of this volume, with the component of each triangle.
 fn inverted_parts(mesh: &TriMesh, body: &[u32], volume: f64) -> usize {
     let mut order: Vec<usize> = (0..body.len()).collect();
     order.sort_by_key(|&triangle| body[triangle]);
@@ -256,7 +255,7 @@ struct Pairs {
 }
 
 impl Pairs {
-    /// Of triangles with an area each, and corners by position.
+    /// Requires triangles with an area, and corners joined by position.
     fn of(mesh: &TriMesh) -> Self {
         let near = Near::of(mesh);
         let corners =
@@ -274,7 +273,7 @@ impl Pairs {
         triangles.map(of_triangle).reduce(Self::default, Self::with)
     }
 
-    /// Counts a pair with so many common corners.
+    /// Counts a pair with `common` common corners.
     fn count(&mut self, meeting: Meeting, common: usize) {
         match (meeting, common) {
             (Meeting::Apart, _) => {}

@@ -1,29 +1,29 @@
-//! How two triangles meet, decided by exact signs: no rounding, no tolerance.
+//! How two triangles meet, decided by exact signs, without rounding or tolerance.
 //!
-//! The cases are those of P. Guigue and O. Devillers, *Fast and Robust Triangle-Triangle Overlap Test Using Orientation
-//! Predicates* (Journal of Graphics Tools 8, 2003), with corners and edges in common. Two triangles whose planes differ meet
-//! along the line in which the planes do; the sign of four points orders the ends of both triangles there.
+//! The cases are those of P. Guigue and O. Devillers, *Fast and Robust Triangle-Triangle Overlap Test Using Orientation Predicates*
+//! (Journal of Graphics Tools 8, 2003), extended to common corners and edges. Two triangles whose planes differ meet along the line where
+//! the planes do; the sign of four points orders the ends of both triangles on it.
 
 use super::predicates::{orient2d, orient3d};
 use crate::geometry::Vec3;
 
-/// How two triangles meet elsewhere than in the corners, or the edge, that they have in common.
+/// How two triangles meet outside the corners, or the edge, that they have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Meeting {
     /// Nowhere.
     Apart,
-    /// In points that are within at most one of them: a corner on a face, an edge across an edge.
+    /// In points that are inside at most one of them: a corner on a face, an edge across an edge.
     Touch,
     /// In one plane, over an area.
     Overlap,
-    /// Through each other: at an angle, in points that are within both.
+    /// Through each other: at an angle, in points that are inside both.
     Cross,
 }
 
 type Triangle = [Vec3; 3];
 
-/// How two triangles meet. Corners at the same position are in common; both have an area ([`super::predicates::is_flat`]), and
-/// finite coordinates.
+/// How two triangles meet. Corners at the same position are common; both must have an area ([`super::predicates::is_flat`]) and finite
+/// coordinates.
 pub fn meeting(first: &[Vec3; 3], second: &[Vec3; 3]) -> Meeting {
     let common = first.map(|corner| second.iter().position(|other| *other == corner));
     match common {
@@ -38,12 +38,12 @@ pub fn meeting(first: &[Vec3; 3], second: &[Vec3; 3]) -> Meeting {
     }
 }
 
-/// A triangle that begins with another of its corners.
+/// The triangle rotated to begin with another corner.
 fn from(triangle: &Triangle, corner: usize) -> Triangle {
     [0, 1, 2].map(|next| triangle[(corner + next) % 3])
 }
 
-/// Triangles whose first two corners, of the first, are in common: they lie on each other when folded along the edge.
+/// Triangles whose first two corners, as the first has them, are common: they overlap if folded along the edge.
 fn along_edge(first: &Triangle, second: &Triangle) -> Meeting {
     let [a, b, c] = *first;
     let Some(&apex) = second.iter().find(|corner| !first.contains(corner)) else { return Meeting::Overlap };
@@ -51,7 +51,7 @@ fn along_edge(first: &Triangle, second: &Triangle) -> Meeting {
     if folded { Meeting::Overlap } else { Meeting::Apart }
 }
 
-/// Triangles whose first corner is in common.
+/// Triangles whose first corner is common.
 fn at_corner(first: &Triangle, second: &Triangle) -> Meeting {
     let view = View::of(first);
     if !wedges_meet(view, first, second) {
@@ -66,14 +66,14 @@ fn at_corner(first: &Triangle, second: &Triangle) -> Meeting {
     if one_sided(&on_first) || one_sided(&on_second) {
         return Meeting::Apart;
     }
-    // Each has a stretch of the common line that begins at the corner: the same way, or away from each other.
+    // Each covers an interval of the common line that begins at the corner: in the same direction, or in opposite ones.
     if (on_first[0] - on_first[1]) * (on_second[0] - on_second[1]) > 0 {
         return Meeting::Apart;
     }
     if straddles(&on_first) && straddles(&on_second) { Meeting::Cross } else { Meeting::Touch }
 }
 
-/// Triangles without a corner in common.
+/// Triangles without a common corner.
 fn without_corner(first: &Triangle, second: &Triangle) -> Meeting {
     let view = View::of(first);
     if beside(view, first, second, -1) || beside(View::of(second), second, first, -1) {
@@ -90,7 +90,7 @@ fn without_corner(first: &Triangle, second: &Triangle) -> Meeting {
     if one_sided(&on_second) {
         return Meeting::Apart;
     }
-    // Each has a stretch of the common line, between the two edges that leave its lone corner.
+    // Each covers an interval of the common line, between the two edges that leave its lone corner.
     let ([p, p1, p2], [q, q1, q2]) = (from(first, lone(on_second)), from(second, lone(on_first)));
     let order = [[p1, q1], [p1, q2], [p2, q1], [p2, q2]].map(|[end, other]| orient3d(p, end, q, other));
     if one_sided(&order) {
@@ -100,7 +100,7 @@ fn without_corner(first: &Triangle, second: &Triangle) -> Meeting {
     if through { Meeting::Cross } else { Meeting::Touch }
 }
 
-/// The sides of a triangle's plane on which the corners of another lie.
+/// On which sides of a triangle's plane the corners of another lie.
 fn sides([a, b, c]: &Triangle, other: &Triangle) -> [i32; 3] {
     other.map(|corner| orient3d(*a, *b, *c, corner))
 }
@@ -113,7 +113,7 @@ fn straddles(signs: &[i32]) -> bool {
     signs.contains(&1) && signs.contains(&-1)
 }
 
-/// The corner that has both others behind it, or both before it.
+/// The corner that is alone on its side of the plane.
 fn lone(signs: [i32; 3]) -> usize {
     let apart = |&corner: &usize| {
         let [a, b] = [signs[(corner + 1) % 3], signs[(corner + 2) % 3]];
@@ -122,7 +122,7 @@ fn lone(signs: [i32; 3]) -> usize {
     (0..3).find(apart).unwrap_or(0)
 }
 
-/// Two axes along which a triangle is seen counter-clockwise, and with an area.
+/// Two axes along which a triangle appears counter-clockwise, with an area.
 #[derive(Clone, Copy)]
 struct View(usize, usize);
 
@@ -130,7 +130,7 @@ impl View {
     fn of(triangle: &Triangle) -> Self {
         let [a, b, c] = *triangle;
         let normal = (b - a).cast::<f64>().cross(&(c - a).cast::<f64>());
-        // Any that shows an area does; the widest decides most questions without exact sums.
+        // Any with an area will do; the widest decides most cases without exact sums.
         for next in 0..3 {
             let axis = (normal.iamax() + next) % 3;
             let view = Self((axis + 1) % 3, (axis + 2) % 3);
@@ -149,8 +149,8 @@ impl View {
     }
 }
 
-/// Whether, in a view that shows `triangle` counter-clockwise, the line of one of its edges has all of another beside it:
-/// strictly (`most` is -1), or with corners on the line (0).
+/// Whether, in a view that shows `triangle` counter-clockwise, the line of one of its edges separates it from another: strictly (`most` is
+/// -1), or with corners on the line (0).
 fn beside(view: View, triangle: &Triangle, other: &Triangle, most: i32) -> bool {
     (0..3).any(|edge| {
         let (a, b) = (triangle[edge], triangle[(edge + 1) % 3]);
@@ -158,7 +158,7 @@ fn beside(view: View, triangle: &Triangle, other: &Triangle, most: i32) -> bool 
     })
 }
 
-/// Whether triangles of one plane have an area in common.
+/// Whether coplanar triangles overlap in an area.
 fn areas_meet(view: View, first: &Triangle, second: &Triangle) -> bool {
     let second = counter_clockwise(view, second);
     !beside(view, first, &second, 0) && !beside(view, &second, first, 0)
@@ -169,13 +169,13 @@ fn counter_clockwise(view: View, triangle: &Triangle) -> Triangle {
     if view.turn(a, b, c) < 0 { [a, c, b] } else { [a, b, c] }
 }
 
-/// Whether, in a view of the first, the wedges in which two triangles lie at their common first corner share more than that.
-/// Where they do not, the triangles do not meet, whatever their planes.
+/// Whether, in a view of the first, the wedges that two triangles span at their common first corner share more than that corner. If not,
+/// the triangles do not meet, whatever their planes.
 fn wedges_meet(view: View, first: &Triangle, second: &Triangle) -> bool {
     let [v, a, b] = *first;
     let [_, c, d] = counter_clockwise(view, second);
     let within = |a: Vec3, b: Vec3, point: Vec3| view.turn(v, a, point) >= 0 && view.turn(v, point, b) >= 0;
-    // A second one seen from its edge is two rays.
+    // A second triangle seen edge-on is two rays.
     within(a, b, c) || within(a, b, d) || (view.turn(v, c, d) != 0 && (within(c, d, a) || within(c, d, b)))
 }
 
@@ -201,8 +201,8 @@ mod tests {
         cross(less(b, a), less(c, a))
     }
 
-    /// Whether a plane parts two triangles, which may be edges: `strictly`, or so that their insides have no point in
-    /// common. If any does, one of finitely many directions does.
+    /// Whether a plane separates two triangles, which may be edges: `strictly`, or so that their interiors have no common point. If any
+    /// plane does, one of finitely many directions does.
     fn parted(first: [Whole; 3], second: [Whole; 3], strictly: bool) -> bool {
         let edges = |t: [Whole; 3]| [less(t[1], t[0]), less(t[2], t[1]), less(t[0], t[2])];
         let (of_first, of_second) = (edges(first), edges(second));
@@ -223,7 +223,7 @@ mod tests {
         })
     }
 
-    /// The definition, by planes that part.
+    /// The definition, by separating planes.
     fn by_planes(first: [Whole; 3], second: [Whole; 3]) -> Meeting {
         let is_flat = second.iter().all(|&corner| dot(normal(first), less(corner, first[0])) == 0);
         if !parted(first, second, false) {
@@ -272,18 +272,18 @@ mod tests {
 
     #[test]
     fn one_step_of_a_coordinate_decides() {
-        // An edge of the second ends under, on or above the first, whose plane is x + y + z = 1.
+        // An edge of the second ends below, on or above the first, whose plane is x + y + z = 1.
         let plane = [Vec3::x(), Vec3::y(), Vec3::z()];
         let tip = |z: f32| [Vec3::new(0.25, 0.25, z), Vec3::new(1.0, 1.0, 1.0), Vec3::new(1.0, 1.5, 1.0)];
         let at = |z: f32| meeting(&plane, &tip(z));
         assert_eq!(at(0.5f32.next_down()), Meeting::Cross);
         assert_eq!((at(0.5), at(0.5f32.next_up())), (Meeting::Touch, Meeting::Apart));
-        // With a corner in common.
+        // With a common corner.
         let flat = [Vec3::zeros(), Vec3::new(2.0, -1.0, 0.0), Vec3::new(2.0, 1.0, 0.0)];
         let at = |z: f32| meeting(&flat, &[Vec3::zeros(), Vec3::new(1.0, 0.0, 1.0), Vec3::new(1.0, 0.0, z)]);
         let least = f32::from_bits(1);
         assert_eq!((at(-least), at(0.0), at(least)), (Meeting::Cross, Meeting::Touch, Meeting::Apart));
-        // With an edge in common.
+        // With a common edge.
         let leaning = [Vec3::zeros(), Vec3::y(), Vec3::new(1.0, 0.25, 1.0)];
         let at = |z: f32| meeting(&leaning, &[Vec3::y(), Vec3::zeros(), Vec3::new(1.0, 0.5, z)]);
         assert_eq!((at(1f32.next_down()), at(1f32.next_up())), (Meeting::Apart, Meeting::Apart));

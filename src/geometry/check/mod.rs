@@ -1,4 +1,4 @@
-//! What a mesh is: its topology, faults and orientation, decided by exact predicates.
+//! Properties of a mesh: its topology, faults and orientation, decided by exact predicates.
 
 pub mod deviation;
 pub mod duplicates;

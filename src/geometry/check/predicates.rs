@@ -1,9 +1,9 @@
-//! Exact orientation of points with 32-bit coordinates: signs of determinants that no rounding decides.
+//! Exact orientation of points with 32-bit coordinates: signs of determinants, never decided by rounding.
 //!
-//! After J. R. Shewchuk, *Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates* (Discrete &
-//! Computational Geometry 18, 1997): 64-bit arithmetic decides where the determinant exceeds the bound of its error (bounds A
-//! of 4.2 and 4.3); else its terms are summed without error as an expansion (theorem 10). Products of two coordinates have
-//! 48 bits and those of three 72, within the range of exponents: nothing overflows or underflows.
+//! After J. R. Shewchuk, *Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates* (Discrete & Computational
+//! Geometry 18, 1997): 64-bit arithmetic decides where the determinant exceeds its error bound (bounds A of 4.2 and 4.3); else its terms
+//! are summed without error as an expansion (theorem 10). Products of two coordinates have 48 bits and those of three 72, within the range
+//! of exponents: nothing overflows or underflows.
 
 use crate::geometry::{DVec3, Vec3};
 
@@ -20,8 +20,8 @@ pub fn orient2d(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> i32 {
     decided(left - right, BOUND_2D * (left.abs() + right.abs())).unwrap_or_else(|| exact_2d(a, b, c))
 }
 
-/// The sign of (b - a) x (c - a) . (d - a): 1 when d lies on the side of triangle abc from which its corners are seen
-/// counter-clockwise, -1 on the other, 0 in its plane: exact for all finite coordinates.
+/// The sign of (b - a) x (c - a) . (d - a): 1 if d lies on the side of triangle abc from which its corners appear counter-clockwise, -1 on
+/// the other, 0 in its plane: exact for all finite coordinates.
 pub fn orient3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i32 {
     let [a, b, c, d] = [a, b, c, d].map(|p| p.cast::<f64>());
     let (u, v, w) = (b - a, c - a, d - a);
@@ -40,7 +40,7 @@ pub fn is_flat(corners: &[Vec3; 3]) -> bool {
     along(0, 1) && along(1, 2) && along(2, 0)
 }
 
-/// The sign of a value whose error is at most `bound`, where that tells it. A bound of 0 is that of terms which all vanish.
+/// The sign of a value with an error of at most `bound`, if that decides it. A bound of 0 means that all terms vanish.
 fn decided(value: f64, bound: f64) -> Option<i32> {
     (value.abs() > bound || bound == 0.0).then(|| sign(value))
 }
@@ -62,7 +62,7 @@ fn exact_3d(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i32 {
     sign_of_sum(minors.into_iter().flat_map(triple_product))
 }
 
-/// Twelve numbers whose sum is p . (q x r), each without rounding.
+/// Twelve numbers that sum to p . (q x r), each exact.
 fn triple_product([p, q, r]: [DVec3; 3]) -> impl Iterator<Item = f64> {
     (0..3).flat_map(move |x| {
         let (y, z) = ((x + 1) % 3, (x + 2) % 3);
@@ -71,7 +71,7 @@ fn triple_product([p, q, r]: [DVec3; 3]) -> impl Iterator<Item = f64> {
     })
 }
 
-/// Two numbers of at most 27 bits with this sum: each may be multiplied with 24 bits without rounding.
+/// Two numbers of at most 27 bits with this sum: each can be multiplied by a 24-bit number without rounding.
 fn halves(value: f64) -> [f64; 2] {
     let high = f64::from_bits(value.to_bits() & (u64::MAX << 27));
     [high, value - high]
@@ -79,7 +79,7 @@ fn halves(value: f64) -> [f64; 2] {
 
 /// The sign of an exact sum.
 fn sign_of_sum(terms: impl Iterator<Item = f64>) -> i32 {
-    // An expansion: parts that do not overlap, ascending, so that the last has the sign of all.
+    // An expansion: components that do not overlap, ascending, so that the last has the sign of the sum.
     let mut parts: Vec<f64> = Vec::with_capacity(48);
     for term in terms {
         let mut carried = term;
@@ -102,7 +102,7 @@ fn sign_of_sum(terms: impl Iterator<Item = f64>) -> i32 {
 mod tests {
     use super::*;
 
-    /// Whole numbers from -range to range.
+    /// Integers from -range to range.
     fn random(range: i64) -> impl FnMut() -> i64 {
         let mut state = 7u64;
         move || {
@@ -135,7 +135,7 @@ mod tests {
         for round in 0..2_000 {
             let mut point = || [near(), near(), near()];
             let [a, b, c] = [point(), point(), point()];
-            // In the plane of the others, and beside it by less than rounding tells in larger numbers.
+            // In the plane of the others, and off it by less than rounding resolves for larger numbers.
             let (s, t) = (round % 7 - 3, round % 5 - 2);
             let mut d = [0, 1, 2].map(|x| a[x] + s * (b[x] - a[x]) + t * (c[x] - a[x]));
             assert_eq!(by_floats([a, b, c, d]), [0; 2], "{a:?} {b:?} {c:?} {d:?}");
@@ -155,14 +155,14 @@ mod tests {
 
     #[test]
     fn coordinates_of_very_different_sizes_are_no_obstacle() {
-        // Differences with 1 are lost in 64 bits.
+        // Differences from 1 are lost in 64 bits.
         let far = (1u64 << 60) as f32;
         let left = |y: f32| orient2d([-far, -far], [far, far], [1.0, y]);
         assert_eq!([left(1f32.next_down()), left(1.0), left(1f32.next_up())], [-1, 0, 1]);
         let [a, b, c] = [Vec3::new(far, far, 0.0), Vec3::new(far, far, 1.0), Vec3::new(-far, -far, 0.0)];
         let beside = |y: f32| orient3d(a, b, c, Vec3::new(1.0, y, 0.0));
         assert_eq!([beside(1f32.next_down()), beside(1.0), beside(1f32.next_up())], [1, 0, -1]);
-        // The least and the greatest numbers there are.
+        // The smallest and the largest numbers.
         let (least, greatest) = (f32::from_bits(1), f32::MAX);
         let [a, b, c] = [Vec3::zeros(), Vec3::new(greatest, 0.0, greatest), Vec3::new(0.0, greatest, 0.0)];
         let beside = |z: f32| orient3d(a, b, c, Vec3::new(least, greatest, z));

@@ -1,29 +1,29 @@
-//! How the triangles of a mesh hang together by their indices: edges, fans around vertices, parts.
+//! How the triangles of a mesh are connected by their indices: edges, vertex rings, parts.
 
 use rayon::prelude::*;
 
-/// Whether a mesh is a closed 2-manifold as its indices have it, wherever its vertices lie, and what keeps it from that.
+/// Whether a mesh is a closed 2-manifold by its indices alone, wherever its vertices lie, and if not, why.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Topology {
     /// Triangles.
     pub triangles: usize,
-    /// Triangles that name a vertex twice; nothing else counts them.
+    /// Triangles that use a vertex twice; nothing else counts them.
     pub collapsed_triangles: usize,
-    /// Triangles with the vertices of one before them, in any order; they count everywhere else, too.
+    /// Triangles with the vertices of an earlier one, in any order; everything else counts them too.
     pub doubled_triangles: usize,
     /// Edges with one triangle.
     pub open_edges: usize,
     /// Edges with more than two triangles.
     pub crowded_edges: usize,
-    /// Edges whose two triangles disagree about which side is out.
+    /// Edges whose two triangles disagree on which side is out.
     pub turned_edges: usize,
-    /// Vertices whose triangles do not form one fan, closed or with two ends: where parts touch in a vertex, and both ends
-    /// of each crowded edge.
+    /// Vertices whose triangles do not form one ring, closed or open: where parts touch in a vertex, and both ends of each non-manifold
+    /// edge.
     pub non_manifold_vertices: usize,
 }
 
 impl Topology {
-    /// Surveys triangles that name some of so many vertices.
+    /// Surveys triangles over `vertices` vertices.
     pub fn of(vertices: usize, triangles: &[[u32; 3]]) -> Self {
         let whole: Vec<[u32; 3]> = triangles.iter().copied().filter(|corners| !collapsed(*corners)).collect();
         let survey = Survey::of(vertices, &whole);
@@ -38,8 +38,8 @@ impl Topology {
         }
     }
 
-    /// Whether it has a triangle and no fault: closed, each edge with two triangles that agree about which side is out,
-    /// each vertex with one fan. The surface may still pass through itself ([`super::faults::Faults::is_embedded`]).
+    /// Whether it has a triangle and no fault: closed, each edge with two triangles that agree on which side is out, each vertex with one
+    /// ring. The surface may still intersect itself ([`super::faults::Faults::is_embedded`]).
     pub fn is_watertight(&self) -> bool {
         let faults = [
             self.collapsed_triangles,
@@ -53,14 +53,14 @@ impl Topology {
     }
 }
 
-/// Where triangles, with three different vertices each out of so many, do not hang together as a closed 2-manifold: vertices, and edges
-/// (lesser vertex first).
+/// The vertices, and the edges (smaller vertex index first), where triangles do not form a closed 2-manifold; each triangle has three
+/// different vertices.
 pub fn faulty(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u32; 2]>) {
     let survey = Survey::of(vertices, triangles);
     (survey.non_manifold, [survey.open, survey.crowded, survey.turned].concat())
 }
 
-/// The bodies of a mesh: numbers of triangles with three different vertices each that hang together by edges, ascending.
+/// The components of a mesh: indices of triangles that edges connect, ascending; each triangle has three different vertices.
 pub fn bodies(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
     let mut sets = Sets::new(triangles.len());
     for pair in halves(triangles).windows(2).filter(|pair| pair[0].0 == pair[1].0) {
@@ -75,20 +75,20 @@ pub fn bodies(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
         .collect()
 }
 
-/// Edges and fans of triangles with three different vertices each.
+/// Edges and vertex rings of triangles with three different vertices each.
 pub(in crate::geometry) struct Survey {
-    /// Edges with one triangle, lesser vertex first.
+    /// Edges with one triangle, smaller vertex index first.
     pub(in crate::geometry) open: Vec<[u32; 2]>,
-    /// Edges with more than two triangles, lesser vertex first.
+    /// Edges with more than two triangles, smaller vertex index first.
     pub(in crate::geometry) crowded: Vec<[u32; 2]>,
-    /// Edges whose two triangles disagree, lesser vertex first.
+    /// Edges whose two triangles disagree, smaller vertex index first.
     pub(in crate::geometry) turned: Vec<[u32; 2]>,
     /// See [`Topology::non_manifold_vertices`].
     pub(in crate::geometry) non_manifold: Vec<u32>,
     edges: usize,
-    /// Fans of all vertices.
+    /// Number of rings of all vertices.
     fans: usize,
-    /// Of each triangle the first one of its body: the part that hangs together by edges.
+    /// For each triangle the first one of its component: the triangles that edges connect.
     pub(in crate::geometry) body: Vec<u32>,
     bodies: usize,
     triangles: usize,
@@ -137,8 +137,8 @@ impl Survey {
         }
     }
 
-    /// Handles, summed over all bodies, where the surface is closed and no edge crowded. A vertex with several fans counts as
-    /// that many, and bodies that touch in one are apart.
+    /// Handles, summed over all components, if the surface is closed and has no non-manifold edge. A vertex with several rings counts as
+    /// that many, and components that touch only there are separate.
     pub(in crate::geometry) fn genus(&self) -> Option<i64> {
         let closed = self.open.is_empty() && self.crowded.is_empty() && self.triangles > 0;
         let euler = self.fans as i64 - self.edges as i64 + self.triangles as i64;
@@ -146,12 +146,12 @@ impl Survey {
     }
 }
 
-/// Whether a triangle names a vertex twice.
+/// Whether a triangle uses a vertex twice.
 pub(in crate::geometry) fn collapsed([a, b, c]: [u32; 3]) -> bool {
     a == b || b == c || c == a
 }
 
-/// Of each triangle whether none before it has the same vertices, in any order.
+/// For each triangle, whether no earlier one has the same vertices, in any order.
 pub(in crate::geometry) fn firsts(triangles: &[[u32; 3]]) -> Vec<bool> {
     let sorted = |(mut corners, index): ([u32; 3], u32)| {
         corners.sort_unstable();
@@ -166,7 +166,7 @@ pub(in crate::geometry) fn firsts(triangles: &[[u32; 3]]) -> Vec<bool> {
     firsts
 }
 
-/// Edges (lesser vertex first), each with the corner where one of its triangles begins to run along it; sorted.
+/// Edges (smaller vertex index first), each with the corner where one of its triangles begins to run along it; sorted.
 fn halves(triangles: &[[u32; 3]]) -> Vec<([u32; 2], u32)> {
     let of_triangle = |([a, b, c], first): ([u32; 3], u32)| {
         let half = |i: u32, j: u32, corner: u32| ([i.min(j), i.max(j)], 3 * first + corner);
@@ -177,18 +177,18 @@ fn halves(triangles: &[[u32; 3]]) -> Vec<([u32; 2], u32)> {
     halves
 }
 
-/// The corner behind one, in the same triangle.
+/// The next corner of the same triangle.
 fn after(corner: u32) -> u32 {
     if corner % 3 == 2 { corner - 2 } else { corner + 1 }
 }
 
-/// Count of connected parts of triangles of so many vertices; those that meet in a vertex hang together.
+/// Number of connected parts of triangles over `vertices` vertices; parts that meet in a vertex are connected.
 pub fn parts(vertices: usize, triangles: &[[u32; 3]]) -> usize {
     groups(vertices, triangles.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c]]))
 }
 
-/// For each of so many vertices the sum of its neighbours' values, and how many have one: in each triangle around it the vertex that comes
-/// next.
+/// For each vertex the sum of its neighbours' values, and how many have one. Each triangle around a vertex contributes the next vertex in
+/// its order.
 pub fn around<T: Default + Copy + std::ops::AddAssign>(
     vertices: usize,
     triangles: &[[u32; 3]],
@@ -207,7 +207,7 @@ pub fn around<T: Default + Copy + std::ops::AddAssign>(
     sums
 }
 
-/// Count of connected groups among those of so many vertices that links name.
+/// Number of connected groups of the vertices that links use.
 pub(in crate::geometry) fn groups(vertices: usize, links: impl Iterator<Item = [u32; 2]>) -> usize {
     let (mut sets, mut named) = (Sets::new(vertices), vec![false; vertices]);
     for link in links {
@@ -217,7 +217,7 @@ pub(in crate::geometry) fn groups(vertices: usize, links: impl Iterator<Item = [
     sets.roots().filter(|&vertex| named[vertex]).count()
 }
 
-/// Disjoint sets: each index leads to a lesser one of its set, the least to itself.
+/// Disjoint sets: each index points to a smaller one of its set, the smallest to itself.
 #[derive(Clone)]
 pub(in crate::geometry) struct Sets(Vec<u32>);
 
@@ -273,9 +273,9 @@ mod tests {
         let mut with_needle = TETRAHEDRON.to_vec();
         with_needle.push([3, 1, 3]);
         assert_eq!(faults(4, &with_needle), [1, 0, 0, 0, 0, 0]);
-        // Both sides of one triangle: closed, but no surface.
+        // Both sides of one triangle: closed, but not a surface.
         assert_eq!(faults(3, &[[0, 1, 2], [2, 1, 0]]), [0, 1, 0, 0, 0, 0]);
-        // Two triangles that share a vertex only; then joined by a third to one open fan.
+        // Two triangles that share only a vertex; then joined by a third into one open ring.
         assert_eq!(faults(5, &[[0, 1, 2], [0, 3, 4]]), [0, 0, 6, 0, 0, 1]);
         assert_eq!(faults(5, &[[0, 1, 2], [0, 3, 4], [0, 2, 3]]), [0, 0, 5, 0, 0, 0]);
         // Three triangles on an edge.

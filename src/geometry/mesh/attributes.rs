@@ -8,15 +8,15 @@ use crate::geometry::{TriMesh, Uvs};
 pub enum Number {
     /// 8-bit integers.
     I8,
-    /// 8-bit integers without a sign.
+    /// Unsigned 8-bit integers.
     U8,
     /// 16-bit integers.
     I16,
-    /// 16-bit integers without a sign.
+    /// Unsigned 16-bit integers.
     U16,
     /// 32-bit integers.
     I32,
-    /// 32-bit integers without a sign.
+    /// Unsigned 32-bit integers.
     U32,
     /// 32-bit floats.
     F32,
@@ -41,7 +41,7 @@ impl Number {
     }
 }
 
-/// What has one number each.
+/// The elements that an array has numbers for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum On {
     /// Every vertex.
@@ -53,7 +53,7 @@ pub enum On {
 }
 
 impl On {
-    /// How many numbers an array of a mesh of so many vertices and triangles has.
+    /// Length of an array of a mesh with these numbers of vertices and triangles.
     pub fn count(self, vertices: usize, faces: usize) -> usize {
         match self {
             Self::Vertices => vertices,
@@ -63,32 +63,32 @@ impl On {
     }
 }
 
-/// An array of numbers; of vectors and colours each component is one.
+/// An array of numbers; each component of a vector or colour is an array of its own.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshArray {
     /// Name, as in the file.
     pub name: String,
-    /// What has one number each.
+    /// The elements that it has numbers for.
     pub on: On,
     /// Type of the numbers in the file.
     pub number: Number,
-    /// The numbers: 64 bits hold those of every type.
+    /// The numbers: 64 bits hold every type.
     pub values: Vec<f64>,
 }
 
-/// A mesh in triangles with all that it carries.
+/// A triangle mesh with everything that it carries.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct DetailedMesh {
     /// Positions (m) and triangles.
     pub mesh: TriMesh,
     /// Texture coordinates.
     pub uvs: Option<Uvs>,
-    /// Other arrays; of corners three for each triangle.
+    /// Other arrays; those of corners have three numbers for each triangle.
     pub arrays: Vec<MeshArray>,
 }
 
 impl DetailedMesh {
-    /// A mesh without vertices and faces that carries arrays of the same names.
+    /// A mesh without vertices and faces whose arrays have the same names.
     pub fn emptied(&self) -> Self {
         let uvs = self.uvs.as_ref().map(|uvs| Uvs {
             positions: Vec::new(),
@@ -102,7 +102,7 @@ impl DetailedMesh {
         Self { mesh: TriMesh::default(), uvs, arrays: arrays.collect() }
     }
 
-    /// The mesh without the vertices that no triangle names, and without their numbers; the others keep their order.
+    /// The mesh without the vertices that no triangle uses, and without their numbers; the others keep their order.
     pub fn without_unused(self) -> Self {
         let Some(used) = used(self.mesh.positions.len(), &self.mesh.triangles) else { return self };
         let kept = |array: MeshArray| match array.on {
@@ -122,7 +122,7 @@ impl DetailedMesh {
         Self { mesh: self.mesh.without_unused(), uvs, arrays }
     }
 
-    /// The numbers of the vertices in an array of this name; of one of vectors with parts NAMEx, NAMEy and NAMEz their lengths.
+    /// The numbers of the vertices in the array of this name; for a vector with the components NAMEx, NAMEy and NAMEz, the lengths.
     pub fn of_vertices(&self, name: &str) -> Option<Vec<f64>> {
         let find = |name: &str| {
             self.arrays
@@ -140,7 +140,7 @@ impl DetailedMesh {
 }
 
 impl MeshArray {
-    /// The same for triangles: `corners` are theirs among those of the faces, `faces` the faces that they are of.
+    /// The same for triangles: `corners` are their corners among those of the faces, `faces` the faces that they come from.
     pub(in crate::geometry) fn of_triangles(self, corners: &[[usize; 3]], faces: &[usize]) -> Self {
         let values = match self.on {
             On::Vertices => self.values,

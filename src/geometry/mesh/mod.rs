@@ -18,10 +18,10 @@ pub struct TriMesh {
 }
 
 impl TriMesh {
-    /// A closed box between two opposite corners (m), the first the lesser one on each axis; triangles are seen from
-    /// outside counter-clockwise.
+    /// A closed box between two opposite corners (m), the first the minimum on each axis; triangles are counter-clockwise seen from
+    /// outside.
     pub fn cuboid(low: [f32; 3], high: [f32; 3]) -> Self {
-        // Bit n of a vertex' index says which end it has on axis n.
+        // Bit n of a vertex index is the end that it has on axis n.
         let position = |n: u32| {
             Vec3::from([0, 1, 2].map(|axis| if n >> axis & 1 == 0 { low[axis] } else { high[axis] }))
         };
@@ -33,7 +33,7 @@ impl TriMesh {
     /// Checks that there is a triangle, that positions are finite and indices in range.
     ///
     /// # Errors
-    /// Names the first vertex or triangle at fault, counted from 1.
+    /// Names the first invalid vertex or triangle, counted from 1.
     pub fn validate(&self) -> Result<()> {
         validate(&self.positions, self.triangles.iter().map(|triangle| triangle.as_slice()))
     }
@@ -43,7 +43,7 @@ impl TriMesh {
         self.triangles[triangle].map(|index| self.positions[index as usize].cast())
     }
 
-    /// Least and greatest corner (m) of the triangles; none without any. Vertices that no triangle names do not count.
+    /// Minimum and maximum corner (m) of the triangles; `None` without any. Vertices that no triangle uses do not count.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         self.corner_positions().map(|p| (p, p)).reduce(|(low, high), (l, h)| (low.inf(&l), high.sup(&h)))
     }
@@ -58,7 +58,7 @@ impl TriMesh {
         self.triangles.as_flattened().iter().map(|&vertex| self.positions[vertex as usize])
     }
 
-    /// Unit normals of the vertices: means over the triangles around, weighted by their areas; zero where there is none.
+    /// Unit normals of the vertices: means over the triangles around, weighted by area; zero where there is none.
     pub fn normals(&self) -> Vec<Vec3> {
         let mut sums = vec![DVec3::zeros(); self.positions.len()];
         for (triangle, corners) in self.triangles.iter().enumerate() {
@@ -90,7 +90,7 @@ impl TriMesh {
         (0..self.triangles.len()).map(twice).sum::<f64>() / 2.0 + 0.0
     }
 
-    /// Edges, as (lesser vertex, greater vertex), with how often the triangles run along them each way.
+    /// Edges, smaller vertex index first, with the number of triangles that run along them minus those that run back.
     fn edge_uses(&self) -> Vec<((u32, u32), i32)> {
         let mut edges: Vec<((u32, u32), i32)> = self
             .triangles
@@ -114,7 +114,7 @@ impl TriMesh {
         edges.chunk_by(|a, b| a.0 == b.0).all(|uses| uses.len() == 2 && uses[0].1 + uses[1].1 == 0)
     }
 
-    /// Vertices less edges plus faces, over the vertices that are used: 2 for a sphere.
+    /// Vertices minus edges plus faces, counting only used vertices: 2 for a sphere.
     pub fn euler_characteristic(&self) -> i64 {
         let mut used: Vec<u32> = self.triangles.as_flattened().to_vec();
         used.sort_unstable();
@@ -129,7 +129,7 @@ impl TriMesh {
         self
     }
 
-    /// The mesh without the vertices that no triangle names; the others keep their order.
+    /// The mesh without the vertices that no triangle uses; the others keep their order.
     pub fn without_unused(self) -> Self {
         let Some(used) = used(self.positions.len(), &self.triangles) else { return self };
         let positions = used.iter().map(|&vertex| self.positions[vertex as usize]).collect();
@@ -144,7 +144,7 @@ impl TriMesh {
     }
 }
 
-/// The vertices out of so many that triangles name, ascending; none when they name all.
+/// The vertices out of `count` that triangles use, ascending; `None` if they use all.
 pub fn used(count: usize, triangles: &[[u32; 3]]) -> Option<Vec<u32>> {
     let mut named = vec![false; count];
     triangles.as_flattened().iter().for_each(|&vertex| named[vertex as usize] = true);
@@ -152,7 +152,7 @@ pub fn used(count: usize, triangles: &[[u32; 3]]) -> Option<Vec<u32>> {
     named.contains(&false).then(used)
 }
 
-/// Triangles re-indexed to the vertices `used`, which ascend and include all that they name.
+/// Triangles re-indexed to the vertices `used`, which ascend and include all that they use.
 pub fn renumbered(triangles: &[[u32; 3]], used: &[u32]) -> Vec<[u32; 3]> {
     let mut positions = vec![0; used.last().map_or(0, |&last| last as usize + 1)];
     used.iter().zip(0..).for_each(|(&vertex, position)| positions[vertex as usize] = position);
@@ -165,10 +165,10 @@ pub fn spacing(coordinate: f64) -> f64 {
     f64::from(at.next_up()) - f64::from(at)
 }
 
-/// A sentence about vertices or particles so far from the origin (in a file's unit of `scale` m) that their 32-bit coordinates are
-/// coarse against a cell (m), with what to do about it.
+/// A sentence about vertices or particles so far from the origin (in a file's unit of `scale` m) that their 32-bit coordinates are coarse
+/// relative to a cell (m), with advice.
 pub fn too_far(name: &str, farthest: f64, scale: f64, cell: f64, advice: &str) -> Option<String> {
-    // Rounding by half the gap may cost as much as the default tolerance of a sweep: 0.02 cell.
+    // Rounding by half the gap may use up the default tolerance of a sweep: 0.02 cell.
     let gap = spacing(farthest) * scale;
     (gap > 0.04 * cell).then(|| {
         format!(
@@ -179,7 +179,7 @@ pub fn too_far(name: &str, farthest: f64, scale: f64, cell: f64, advice: &str) -
     })
 }
 
-/// As [`too_far`], of a mesh as it is read (m), against the mean length of its edges.
+/// As [`too_far`], for a mesh as it is read (m), relative to the mean length of its edges.
 pub fn is_coarse(name: &str, mesh: &TriMesh, advice: &str) -> Option<String> {
     let lengths = (0..mesh.triangles.len()).map(|triangle| {
         let [a, b, c] = mesh.corners(triangle);
@@ -189,7 +189,7 @@ pub fn is_coarse(name: &str, mesh: &TriMesh, advice: &str) -> Option<String> {
     too_far(name, mesh.farthest(), 1.0, edge, advice)
 }
 
-/// What to do about a mesh too far from the origin: by a key of a scene, and by an option of a command.
+/// Advice for a mesh too far from the origin: a key of a scene, or an option of a command.
 pub const BY_KEY: &str = "give it an `origin` nearby, which is subtracted in 64 bits, or save it near the origin and bring it there by keys";
 /// See [`BY_KEY`].
 pub const BY_OPTION: &str =
@@ -202,10 +202,10 @@ pub fn farthest<'a>(positions: impl Iterator<Item = &'a DVec3>) -> f64 {
 
 /// For each position the index of the first equal one.
 pub fn coincident(positions: impl Iterator<Item = DVec3>) -> Vec<u32> {
-    // Adding zero makes -0 and 0 the same.
+    // Adding zero turns -0 into 0.
     let keys: Vec<[u64; 3]> =
         positions.map(|p| [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f64::to_bits)).collect();
-    // Open addressing, at most half full: several times faster than a map, and needed in every step of a host.
+    // Open addressing, at most half full: several times faster than a map; a host needs this in every step.
     let bits = (2 * keys.len().max(1)).next_power_of_two().ilog2().max(1);
     let mut slots = vec![u32::MAX; 1 << bits];
     let home = |key: &[u64; 3]| {

@@ -1,4 +1,4 @@
-//! Meshes of polygons, and their triangles.
+//! Polygon meshes, and their triangulation.
 
 use super::validate;
 use crate::error::{Error, Result};
@@ -7,12 +7,12 @@ use crate::geometry::triangulate::ear_clipping::turn;
 use crate::geometry::triangulate::monotone;
 use crate::geometry::{DVec3, DetailedMesh, MeshArray, TriMesh, Uvs, Vec3};
 
-/// Most corners of a polygon: cutting it takes some 300 bytes for each, which no limit of memory sees.
+/// Maximum corners of a polygon: cutting it takes some 300 bytes for each, which no memory limit sees.
 const MOST_CORNERS: usize = 1 << 22;
-/// Corners of a polygon that is cut ear by ear: of larger ones the worst would take minutes.
+/// Maximum corners of a polygon that is cut ear by ear: larger ones could take minutes.
 const FEW_CORNERS: usize = 500;
 
-/// Polygons as in files: with any number of corners, convex or not, hardly ever quite flat.
+/// Polygons as in files: with any number of corners, convex or not, rarely exactly planar.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PolygonMesh {
     /// Vertex positions (m).
@@ -28,7 +28,7 @@ pub struct PolygonMesh {
 }
 
 impl PolygonMesh {
-    /// Adds a polygon; one of fewer than three corners is passed over.
+    /// Adds a polygon; polygons of fewer than three corners are skipped.
     pub fn push(&mut self, polygon: impl IntoIterator<Item = u32>) {
         let begin = self.corners.len();
         self.corners.extend(polygon);
@@ -41,7 +41,7 @@ impl PolygonMesh {
     /// Checks that there is a polygon, that positions are finite and indices in range.
     ///
     /// # Errors
-    /// Names the first vertex or face at fault, counted from 1; a face of more than 4,194,304 corners is one.
+    /// Names the first invalid vertex or face, counted from 1; a face of more than 4,194,304 corners is invalid.
     pub fn validate(&self) -> Result<()> {
         validate(&self.positions, self.polygons())?;
         match self.polygons().position(|polygon| polygon.len() > MOST_CORNERS) {
@@ -58,27 +58,26 @@ impl PolygonMesh {
         begins.zip(&self.ends).map(|(&begin, &end)| &self.corners[begin as usize..end as usize])
     }
 
-    /// Whether another mesh has the same vertices and polygons, wherever the vertices are.
+    /// Whether another mesh has the same vertices and polygons, regardless of positions.
     pub fn has_faces_of(&self, other: &Self) -> bool {
         self.positions.len() == other.positions.len()
             && self.corners == other.corners
             && self.ends == other.ends
     }
 
-    /// The polygons as triangles: a fan where the polygon is convex, else ears cut off one after another,
-    /// or of large polygons pieces that rise along an axis.
+    /// The polygons as triangles: a fan if the polygon is convex, else by ear clipping, or large polygons by monotone pieces.
     pub fn triangles(&self) -> Vec<[u32; 3]> {
         let mut out = Vec::with_capacity(self.triangle_count());
         self.cut_all(|_, polygon, triangle| out.push(triangle.map(|corner| polygon[corner])));
         out
     }
 
-    /// The mesh in triangles.
+    /// The mesh as triangles.
     pub fn into_triangles(self) -> TriMesh {
         TriMesh { triangles: self.triangles(), positions: self.positions }
     }
 
-    /// The mesh in triangles, with its texture coordinates.
+    /// The mesh as triangles, with its texture coordinates.
     pub fn into_textured(mut self) -> (TriMesh, Option<Uvs>) {
         let uvs = self.uvs.take().map(|uvs| match uvs.corners {
             Some(_) => {
@@ -91,7 +90,7 @@ impl PolygonMesh {
         (self.into_triangles(), uvs)
     }
 
-    /// The mesh in triangles, with all that it carries.
+    /// The mesh as triangles, with everything that it carries.
     pub fn into_detailed(mut self) -> DetailedMesh {
         let arrays = std::mem::take(&mut self.arrays);
         if arrays.is_empty() {
@@ -111,7 +110,7 @@ impl PolygonMesh {
         self.corners.len().saturating_sub(2 * self.ends.len())
     }
 
-    /// Cuts all polygons: where each begins in `corners`, its vertices, and a triangle of its corners.
+    /// Cuts all polygons: calls `each` with where one begins in `corners`, its vertices, and a triangle of its corners.
     fn cut_all(&self, mut each: impl FnMut(usize, &[u32], [usize; 3])) {
         let mut begin = 0;
         for polygon in self.polygons() {
@@ -125,7 +124,7 @@ impl PolygonMesh {
             return each([0, 1, 2]);
         }
         let fan = |each: &mut dyn FnMut([usize; 3])| (1..polygon.len() - 1).for_each(|i| each([0, i, i + 1]));
-        // Indices beyond the vertices are left for the check of the whole mesh to refuse.
+        // Indices out of range are refused by the check of the whole mesh.
         let positions: Option<Vec<DVec3>> =
             polygon.iter().map(|&i| self.positions.get(i as usize).map(|p| p.cast())).collect();
         let Some(positions) = positions else { return fan(&mut each) };
@@ -139,7 +138,7 @@ impl PolygonMesh {
     }
 }
 
-/// Positions in the plane that a polygon mostly lies in (Newell's normal), counter-clockwise.
+/// Positions in the polygon's best plane (Newell's normal), counter-clockwise.
 fn flattened(positions: &[DVec3]) -> Vec<[f64; 2]> {
     let next = positions.iter().cycle().skip(1);
     let normal: DVec3 =
@@ -193,7 +192,7 @@ mod tests {
         }
     }
 
-    /// A star of so many corners, every other one nearer to the centre, in a turned plane.
+    /// A star with `count` corners, every second one nearer to the centre, in a tilted plane.
     fn star(count: usize) -> PolygonMesh {
         let corner = |i: usize| {
             let (angle, radius) = (i as f64 / count as f64 * std::f64::consts::TAU, [1.0, 0.6][i % 2]);
@@ -202,7 +201,7 @@ mod tests {
         flat(&(0..count).map(corner).collect::<Vec<_>>())
     }
 
-    /// A wall that winds inward and back out: whatever is cut, long thin triangles are left.
+    /// A wall that winds inward and back out: cutting it always leaves long thin triangles.
     fn spiral(count: usize) -> PolygonMesh {
         let half = count / 2;
         let corner = |i: usize| {
@@ -214,10 +213,10 @@ mod tests {
         flat(&(0..count).map(corner).collect::<Vec<_>>())
     }
 
-    /// A square wave over a bar, whose teeth reach up from y = 1, and down from -1 if on both sides; turned by an angle.
+    /// A square wave over a bar, with teeth that reach up from y = 1 and, with two sides, down from -1; turned by an angle.
     fn comb(count: usize, sides: usize, angle: f64) -> PolygonMesh {
         let teeth = count / 4 / sides;
-        // Every other two corners are on the same tooth's or gap's side.
+        // Every two consecutive corners are on the same side of a tooth or gap.
         let across = |k: usize| k as f64 * 0.5 + 0.03 * (k % 7) as f64;
         let wave = |i: usize| [across(i.div_ceil(2)), 1.0 + 200.0 * (i % 4 / 2) as f64];
         let mut points: Vec<[f64; 2]> = (0..4 * teeth).map(|i| wave(i + 1)).collect();
@@ -229,7 +228,7 @@ mod tests {
         let (sin, cos) = angle.sin_cos();
         let turned = |p: &[f64; 2]| [(p[0] * cos - p[1] * sin) as f32, (p[0] * sin + p[1] * cos) as f32];
         let mut mesh = flat(&points.iter().map(turned).collect::<Vec<_>>());
-        // In a sloping plane 32-bit numbers would tilt its long slivers.
+        // In a sloping plane, 32-bit rounding would tilt its long slivers.
         mesh.positions.iter_mut().for_each(|p| p.y = 0.0);
         mesh
     }
@@ -274,14 +273,14 @@ mod tests {
         assert!(start.elapsed().as_secs_f64() < 10.0, "{} s", start.elapsed().as_secs_f64());
     }
 
-    /// Area of a polygon by its corners, with its sign, and of its triangles without.
+    /// Signed area of a polygon by its corners, and unsigned area of its triangles.
     fn areas(points: &[[f64; 2]], triangles: &[[usize; 3]]) -> (f64, f64) {
         let around = (0..points.len()).map(|i| turn(points[0], points[i], points[(i + 1) % points.len()]));
         let parts = triangles.iter().map(|t| turn(points[t[0]], points[t[1]], points[t[2]]).abs());
         (around.sum(), parts.sum())
     }
 
-    /// Whether the triangles' sides, but for those inside, are the polygon's.
+    /// Whether the triangles' sides, except inner ones, are the polygon's.
     fn has_its_sides(count: usize, triangles: &[[usize; 3]]) -> bool {
         let mut sides = std::collections::HashMap::new();
         for [a, b, c] in triangles {
@@ -304,7 +303,7 @@ mod tests {
         };
         for round in 0..300 {
             let count = 3 + (random() * 60.0) as usize;
-            // Around a centre at growing angles it is simple; on few positions many corners are doubled.
+            // Around a centre at growing angles it is simple; with few distinct positions many corners are doubled.
             let simple = round % 3 == 0;
             let few = |value: f64| (value * 5.0).floor();
             let points: Vec<[f64; 2]> = (0..count)

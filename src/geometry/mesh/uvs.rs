@@ -6,16 +6,16 @@ pub const NONE: u32 = u32::MAX;
 /// Texture coordinates: u to the right, v upward.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Uvs {
-    /// The coordinates; where `corners` is none, one pair for each vertex.
+    /// The coordinates; one pair for each vertex if `corners` is `None`.
     pub positions: Vec<[f32; 2]>,
     /// Indices into `positions`, one for each corner of the faces, in their order.
     pub corners: Option<Vec<u32>>,
-    /// Corners that the file gives no coordinates: they have 0, 0.
+    /// Corners without coordinates in the file: they have 0, 0.
     pub missing: usize,
 }
 
 impl Uvs {
-    /// Those of so many vertices and triangles to which nothing gives any: 0, 0; of corners, or of vertices.
+    /// Coordinates 0, 0 for meshes without any, with these numbers of vertices and triangles; by corner, or by vertex.
     pub fn nothing(has_corners: bool, vertices: usize, faces: usize) -> Self {
         match has_corners {
             true => Self { positions: vec![[0.0; 2]], corners: Some(vec![0; 3 * faces]), missing: 3 * faces },
@@ -23,8 +23,8 @@ impl Uvs {
         }
     }
 
-    /// Coordinates of the corners of faces: `at` has an index into `positions`, or [`NONE`], for each of the `vertices` that
-    /// the corners are. Where all corners of every vertex agree, they are the vertices' own. None when no corner has any.
+    /// Coordinates of the corners of faces: for each corner `at` has an index into `positions`, or [`NONE`], and `vertices` its vertex. If
+    /// all corners of every vertex agree, coordinates are stored by vertex. `None` if no corner has any.
     pub fn of_corners(
         mut positions: Vec<[f32; 2]>,
         mut at: Vec<u32>,
@@ -42,7 +42,7 @@ impl Uvs {
         let mut own: Vec<Option<[f32; 2]>> = vec![None; count];
         let agrees = |(&vertex, &index): (&u32, &u32)| {
             let position = positions[index as usize];
-            // Vertices out of range are refused when the mesh is checked.
+            // Vertices out of range are refused by the check of the mesh.
             own.get_mut(vertex as usize).is_none_or(|own| *own.get_or_insert(position) == position)
         };
         if vertices.iter().zip(&at).all(agrees) {
@@ -52,15 +52,15 @@ impl Uvs {
         Some(Self { positions, corners: Some(at), missing })
     }
 
-    /// The same for triangles whose corners are these of the faces' corners.
+    /// The same for triangles, whose corners index those of the faces.
     pub fn of_triangles(self, triangles: &[[usize; 3]]) -> Self {
         let corners =
             self.corners.map(|corners| triangles.as_flattened().iter().map(|&c| corners[c]).collect());
         Self { corners, ..self }
     }
 
-    /// Those of several meshes in triangles, one after another, each with its numbers of vertices and triangles. A mesh
-    /// without any gets 0, 0. None when no mesh has any.
+    /// Coordinates of several triangle meshes, one after another, each with its numbers of vertices and triangles. A mesh without any gets
+    /// 0, 0. `None` if no mesh has any.
     pub fn joined<'a>(
         parts: impl Iterator<Item = (Option<&'a Self>, usize, &'a [[u32; 3]])> + Clone,
     ) -> Option<Self> {
@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn corners_that_agree_are_vertices_and_a_seam_keeps_them_apart() {
         let vertices = [0, 2, 1, 1, 2, 3];
-        // The same coordinates may be there twice.
+        // The same coordinates may occur twice.
         let uvs = Uvs::of_corners(POSITIONS.to_vec(), vec![0, 1, 2, 2, 3, 0], &vertices, 5).unwrap();
         assert_eq!(uvs.positions, [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0], [0.0, 0.0]]);
         assert_eq!((uvs.corners, uvs.missing), (None, 0));

@@ -1,54 +1,54 @@
-//! Corners that are one: at the same position, or apart by no more than the rounding of the file that they come from.
+//! Welding: corners at the same position, or no further apart than the rounding of their file, are one.
 //!
-//! Triangle soup (.stl, and .obj or .ply as many programs export them) gives each triangle corners of its own, and programs that compute
-//! a corner once for each triangle round it differently each time. Corners at equal positions are always joined. Where that leaves
-//! edges with one triangle, corners on such edges are joined too if they are within rounding; a mesh that is closed as it is costs
-//! one pass over its edges, and a mesh that is open by more than rounding stays open. Whether the triangles share their corners
-//! elsewhere does not matter: seams of texture coordinates are joined by the same rule.
+//! Triangle soup (.stl, and .obj or .ply as many programs export them) gives each triangle its own corners, and programs that compute a
+//! corner once for each triangle may round it differently each time. Corners at equal positions are always joined. If that leaves edges
+//! with one triangle, corners on such edges are joined too if they are within rounding; a mesh that is closed already costs one pass over
+//! its edges, and a mesh that is open by more than rounding stays open. Whether the triangles share their corners elsewhere does not
+//! matter: seams of texture coordinates are joined by the same rule.
 //!
-//! Three rounds, each for the edges that the one before has left open:
+//! Three rounds, each for the edges that the previous one left open:
 //!
-//! 1. Within [`STEPS`] neighbouring 32-bit numbers on each axis, by each coordinate itself.
+//! 1. Within [`STEPS`] adjacent 32-bit numbers on each axis, at the precision of each coordinate.
 //! 2. The same, but steps are no finer than at half the mesh's extent: programs that turn a mesh leave 1e-9 in one triangle and 0 in
 //!    another, which by their own size are millions of steps apart. Only where it closes a part wholly: it may not bridge a slit of a
 //!    mesh that is open anyway.
 //! 3. Chains of corners, each within rounding of the next and the ends further apart. Only where it closes a part, and reported.
 //!
-//! The nearest corners are joined first, and never both ends of an edge: a triangle that is as thin as the rounding is kept.
+//! The nearest corners are joined first, and never both ends of an edge: a triangle as thin as the rounding is kept.
 
 use super::coincident;
 use crate::geometry::DVec3;
 use crate::geometry::check::topology::Sets;
 
-/// Corners may lie so many neighbouring 32-bit numbers apart on each axis.
+/// Corners may be this many adjacent 32-bit numbers apart on each axis.
 pub const STEPS: i64 = 4;
-/// Most corners that one is compared with: more within rounding cannot be told apart.
+/// Maximum corners that one is compared with: more within rounding cannot be told apart.
 const MOST_NEAR: usize = 64;
-/// Edge (steps) of the cells in which corners are looked up: few corners have to look into a second one.
+/// Edge (steps) of the cells used to look up corners: few corners need a second cell.
 const CELL: i64 = 4 * STEPS;
 
 /// Which vertices of a mesh are one corner.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Weld {
-    /// For each vertex the first one that is the same corner; itself where there is none before it.
+    /// For each vertex the first one that is the same corner: itself if there is no earlier one.
     pub firsts: Vec<u32>,
-    /// Joined vertices (ascending) that are not at their first one's position.
+    /// Joined vertices (ascending) that are not at the position of their first vertex.
     pub near: Vec<u32>,
-    /// Vertices (ascending) for which rounding does not decide which corner they are: those of chains that were joined, and those that
-    /// are still on an edge with one triangle though others lie within rounding.
+    /// Vertices (ascending) for which rounding does not decide which corner they are: those of joined chains, and those that are still on
+    /// an edge with one triangle although others lie within rounding.
     pub ambiguous: Vec<u32>,
 }
 
 impl Weld {
-    /// Of positions (in the unit and around the origin in which they were read, so that their rounding is known) and triangles
-    /// whose indices are in range.
+    /// Welds positions, in the unit and around the origin of their file, so that their rounding is known; the triangles' indices must be in
+    /// range.
     pub fn of(positions: &[DVec3], triangles: &[[u32; 3]]) -> Self {
         let firsts = coincident(positions.iter().copied());
         let boundary = Boundary::of(triangles, &firsts);
         Self::with_boundary(positions, triangles, firsts, &boundary)
     }
 
-    /// As [`Weld::of`], where the vertices at equal positions and the boundary that they leave are known.
+    /// As [`Weld::of`], if the vertices at equal positions and the boundary that they leave are known.
     pub fn with_boundary(
         positions: &[DVec3],
         triangles: &[[u32; 3]],
@@ -75,7 +75,7 @@ impl Weld {
         rounds.finish(firsts, undecided)
     }
 
-    /// What to say about vertices that rounding does not decide; none where there are none.
+    /// The warning about vertices that rounding does not decide; `None` if there are none.
     pub fn warning(&self) -> Option<String> {
         let first = self.ambiguous.first()?;
         let (count, s) = (self.ambiguous.len(), if self.ambiguous.len() == 1 { "" } else { "s" });
@@ -87,7 +87,7 @@ impl Weld {
         ))
     }
 
-    /// Copies to each vertex that is not at its first one's position the value of that one.
+    /// Copies to each vertex that is not at its first vertex' position the value of that vertex.
     pub fn unify<T: Copy>(&self, values: &mut [T]) {
         for &vertex in &self.near {
             values[vertex as usize] = values[self.firsts[vertex as usize] as usize];
@@ -95,22 +95,22 @@ impl Weld {
     }
 }
 
-/// What vertices at equal positions leave open: vertices on edges with one triangle, and all edges between these.
+/// What is open after joining equal positions: vertices on edges with one triangle, and all edges between these.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Boundary {
     /// Ascending; each the first one at its position.
     vertices: Vec<u32>,
-    /// Edges by indices into `vertices` (the lesser first), ascending, with how many triangles each has.
+    /// Edges by indices into `vertices` (the smaller first), ascending, with their numbers of triangles.
     edges: Vec<([u32; 2], u32)>,
 }
 
 impl Boundary {
-    /// Of triangles whose vertices have these first ones; triangles that name one of these twice do not count.
+    /// `firsts` has the first vertex at the same position for each; triangles that use one of these twice do not count.
     pub fn of(triangles: &[[u32; 3]], firsts: &[u32]) -> Self {
         let named = |corners: &[u32; 3]| corners.map(|vertex| firsts[vertex as usize]);
         let whole = || triangles.iter().map(named).filter(|[a, b, c]| a != b && b != c && c != a);
         let sides = |[a, b, c]: [u32; 3]| [[a, b], [b, c], [c, a]].map(|[i, j]| [i.min(j), i.max(j)]);
-        // Sorted by counting after the lesser vertex: few edges begin at one vertex.
+        // Counting sort by the smaller vertex: few edges begin at one vertex.
         let mut begins = vec![0u32; firsts.len() + 1];
         whole().flat_map(sides).for_each(|[least, _]| begins[least as usize + 1] += 1);
         (0..firsts.len()).for_each(|vertex| begins[vertex + 1] += begins[vertex]);
@@ -152,26 +152,26 @@ impl Boundary {
     }
 }
 
-/// Measures coordinates in steps.
+/// Converts coordinates to steps.
 #[derive(Clone, Copy)]
 struct Ruler {
     /// Coordinates below this count in steps of `step`.
     from: f32,
-    /// 0: all coordinates count in steps of their own.
+    /// 0: every coordinate counts in its own steps.
     step: f64,
 }
 
 impl Ruler {
     const OWN: Self = Self { from: 0.0, step: 0.0 };
 
-    /// With steps no finer than at half the longest side of positions; none where they have no extent.
+    /// With steps no finer than at half the longest side of positions; `None` if they have no extent.
     fn of_extent(positions: &[[f32; 3]]) -> Option<Self> {
         let side = |axis: usize| {
             let of_axis = || positions.iter().map(|position| position[axis]);
             of_axis().fold(f32::MIN, f32::max) - of_axis().fold(f32::MAX, f32::min)
         };
         let half = 0.5 * (0..3).map(side).fold(0.0, f32::max);
-        // A power of two is where steps change.
+        // Steps change at powers of two.
         let from = f32::from_bits(half.to_bits() & 0x7f80_0000);
         (from > 0.0 && from.is_finite()).then(|| Self { from, step: super::spacing(f64::from(from)) })
     }
@@ -180,7 +180,7 @@ impl Ruler {
         positions.iter().map(|position| position.map(|coordinate| self.steps(coordinate))).collect()
     }
 
-    /// The count of steps from 0 to a coordinate; neighbouring 32-bit numbers have neighbouring counts, where steps are no coarser.
+    /// The number of steps from 0 to a coordinate; adjacent 32-bit numbers have adjacent counts unless steps are coarser.
     fn steps(self, coordinate: f32) -> i64 {
         let bits = |value: f32| i64::from(value.to_bits());
         let size = coordinate.abs();
@@ -194,7 +194,7 @@ impl Ruler {
     }
 }
 
-/// For each vertex of a boundary those at the other ends of its edges.
+/// For each vertex of a boundary, the other ends of its edges.
 struct Links {
     begins: Vec<u32>,
     ends: Vec<u32>,
@@ -220,17 +220,17 @@ impl Links {
     }
 }
 
-/// The boundary's vertices as they are joined, round by round.
+/// The joined vertices of the boundary, round by round.
 #[derive(Clone)]
 struct Rounds<'a> {
     boundary: &'a Boundary,
     links: &'a Links,
     sets: Sets,
-    /// For each vertex the next one of its set, in a ring.
+    /// For each vertex the next one of its set, as a ring.
     next: Vec<u32>,
-    /// Of the first vertex of each set whether it was joined as a chain.
+    /// For the first vertex of each set, whether it was joined as a chain.
     is_chained: Vec<bool>,
-    /// How often two sets have become one.
+    /// Number of merges of two sets.
     joined: usize,
 }
 
@@ -241,14 +241,14 @@ impl<'a> Rounds<'a> {
         Self { boundary, links, sets: Sets::new(count), next, is_chained: vec![false; count], joined: 0 }
     }
 
-    /// Joins open vertices with these coordinates (steps), the nearest first. Returns which ones had another within rounding and were
-    /// not joined with it.
+    /// Joins open vertices with these coordinates (steps), the nearest first. Returns those that had another within rounding but were not
+    /// joined with it.
     fn join(&mut self, steps: &[[i64; 3]], chains: bool) -> Vec<u32> {
         let is_open = self.open();
         let open: Vec<u32> = (0..steps.len() as u32).filter(|&vertex| is_open[vertex as usize]).collect();
         let (mut pairs, mut undecided) = near_pairs(steps, &open);
         pairs.sort_unstable();
-        // The box of each set: of all its members, joined in this round or before.
+        // The box of each set, over all members, joined in this round or before.
         let mut boxes: Vec<[[i64; 3]; 2]> = steps.iter().map(|&at| [at, at]).collect();
         for vertex in 0..steps.len() as u32 {
             let root = self.sets.root(vertex);
@@ -273,7 +273,7 @@ impl<'a> Rounds<'a> {
         undecided
     }
 
-    /// Makes one of two sets; returns its first vertex.
+    /// Merges two sets; returns the first vertex.
     fn unite(&mut self, roots: [u32; 2]) -> u32 {
         let is_chained = roots.iter().any(|&root| self.is_chained[root as usize]);
         self.sets.join(roots[0], roots[1]);
@@ -284,7 +284,7 @@ impl<'a> Rounds<'a> {
         root
     }
 
-    /// Whether an edge leads from one set to another.
+    /// Whether an edge connects two sets.
     fn share_an_edge(&mut self, [from, to]: [u32; 2]) -> bool {
         let mut at = from;
         loop {
@@ -298,7 +298,7 @@ impl<'a> Rounds<'a> {
         }
     }
 
-    /// The edges as they are joined now, ascending, with how many triangles each has.
+    /// The edges after joining, ascending, with their numbers of triangles.
     fn edges(&mut self) -> Vec<([u32; 2], u32)> {
         let mut edges = Vec::with_capacity(self.boundary.edges.len());
         for &([a, b], uses) in &self.boundary.edges {
@@ -330,8 +330,7 @@ impl<'a> Rounds<'a> {
         self.edges().iter().any(|(_, uses)| *uses == 1)
     }
 
-    /// Takes over what a round has joined in parts of the mesh that have no edge with one triangle then; parts are what hangs together
-    /// by vertices.
+    /// Adopts what a round joined, in parts of the mesh (connected by vertices) that then have no edge with one triangle.
     fn accept(&mut self, mut tried: Self, triangles: &[[u32; 3]], firsts: &[u32]) {
         let mut parts = Sets::new(firsts.len());
         for corners in triangles {
@@ -365,7 +364,7 @@ impl<'a> Rounds<'a> {
         let vertices = &self.boundary.vertices;
         let is_open = self.open();
         undecided.retain(|&vertex| is_open[vertex as usize]);
-        // A third triangle on an edge that joining has made.
+        // Joining may have made edges with a third triangle.
         let edges = self.edges();
         let is_joined = |vertex: u32| self.next[vertex as usize] != vertex;
         let odd = edges.iter().filter(|(_, uses)| *uses > 2 && uses % 2 == 1).flat_map(|(ends, _)| *ends);
@@ -376,7 +375,7 @@ impl<'a> Rounds<'a> {
         let mut ambiguous: Vec<u32> = undecided.into_iter().map(|vertex| vertices[vertex as usize]).collect();
         ambiguous.sort_unstable();
         ambiguous.dedup();
-        // Vertices of the boundary are the first ones at their positions, and sets are named by their least.
+        // Boundary vertices are the first at their positions, and sets are named by their smallest vertex.
         let mut named: Vec<u32> = (0..firsts.len() as u32).collect();
         for (&vertex, &root) in vertices.iter().zip(&roots) {
             named[vertex as usize] = vertices[root as usize];
@@ -395,14 +394,14 @@ fn united([low, high]: [[i64; 3]; 2], [other_low, other_high]: [[i64; 3]; 2]) ->
     ]
 }
 
-/// The largest distance of two vertices on an axis and the sum of their distances (steps), and the vertices.
+/// The largest distance of two vertices on an axis and the sum over the axes (steps), and the vertices.
 type NearPair = ([i64; 2], [u32; 2]);
 
-/// Pairs of some vertices (the lesser first) within [`STEPS`] on each axis, each after the largest of its distances and after their
-/// sum; and the vertices that have too many others around them.
+/// Pairs of vertices (the smaller first) within [`STEPS`] on each axis, with their distances, and the vertices that have too many others
+/// around them.
 fn near_pairs(steps: &[[i64; 3]], some: &[u32]) -> (Vec<NearPair>, Vec<u32>) {
     let cell = |at: [i64; 3]| at.map(|step| step.div_euclid(CELL));
-    // Open addressing, at most half full; each slot leads to the last vertex of its cell, and that to the one before it.
+    // Open addressing, at most half full; each slot leads to the last vertex of its cell, and each vertex to the one before it.
     let bits = (2 * some.len().max(1)).next_power_of_two().ilog2().max(1);
     let home = |key: [i64; 3]| {
         let mixed = key.iter().fold(0u64, |hash, &part| {

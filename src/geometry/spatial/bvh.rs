@@ -2,7 +2,7 @@
 
 use crate::geometry::{DVec3, TriMesh, Vec3};
 
-/// Most triangles in a leaf.
+/// Maximum triangles in a leaf.
 const LEAF: usize = 4;
 
 /// Triangles of a mesh in a binary tree of boxes, split at medians.
@@ -12,7 +12,7 @@ pub struct Bvh {
     corners: Vec<[Vec3; 3]>,
 }
 
-/// Children of an inner node are the next node and `right`; a leaf has `count` triangles from `first`.
+/// The children of an inner node are the next node and `right`; a leaf has `count` triangles from `first`.
 struct Node {
     low: Vec3,
     high: Vec3,
@@ -24,7 +24,7 @@ struct Node {
 /// Where a ray meets a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RayHit {
-    /// Along the ray, in lengths of its direction.
+    /// Along the ray, in multiples of its direction's length.
     pub distance: f64,
     /// The triangle.
     pub triangle: usize,
@@ -73,7 +73,7 @@ impl Bvh {
         index as u32
     }
 
-    /// The first triangle that a ray meets before `limit`.
+    /// The first triangle that a ray hits before `limit`.
     pub fn ray(&self, origin: DVec3, direction: DVec3, limit: f64) -> Option<RayHit> {
         let mut best = None;
         self.walk(origin, direction, limit, |hit| {
@@ -83,7 +83,7 @@ impl Bvh {
         best
     }
 
-    /// Shows the triangles whose boxes touch a box.
+    /// Calls `see` with the triangles whose boxes touch a box.
     pub fn in_box(&self, low: Vec3, high: Vec3, mut see: impl FnMut(usize)) {
         let apart = |a: Vec3, b: Vec3| (0..3).any(|axis| a[axis] > high[axis] || b[axis] < low[axis]);
         let mut stack: Vec<u32> = if self.nodes.is_empty() { Vec::new() } else { vec![0] };
@@ -105,7 +105,7 @@ impl Bvh {
         }
     }
 
-    /// Whether a ray meets any triangle before `limit`.
+    /// Whether a ray hits any triangle before `limit`.
     pub fn any_hit(&self, origin: DVec3, direction: DVec3, limit: f64) -> bool {
         let mut found = false;
         self.walk(origin, direction, limit, |_| {
@@ -115,15 +115,15 @@ impl Bvh {
         found
     }
 
-    /// How many triangles a ray leaves through, less those that it enters through: how often a closed mesh surrounds its
-    /// origin. A ray that meets a common edge of triangles counts both.
+    /// Number of triangles that a ray leaves through, minus those that it enters through: how many times a closed mesh surrounds its
+    /// origin. A ray that hits a common edge of triangles counts both.
     pub fn surrounding(&self, origin: DVec3, direction: DVec3) -> i32 {
         let mut sum = 0;
         self.crossings(origin, direction, |_, way| sum += way);
         sum
     }
 
-    /// Shows all triangles that a ray passes through, with 1 where it leaves through their front and -1 where it enters.
+    /// Calls `see` with all triangles that a ray passes through: with 1 if it leaves through the front, -1 if it enters.
     pub fn crossings(&self, origin: DVec3, direction: DVec3, mut see: impl FnMut(usize, i32)) {
         self.walk(origin, direction, f64::INFINITY, |hit| {
             let [a, b, c] = self.corners[hit.triangle].map(|corner| corner.cast::<f64>());
@@ -173,7 +173,7 @@ fn enters(node: &Node, origin: DVec3, inverse: DVec3, limit: f64) -> bool {
     for axis in 0..3 {
         let a = (f64::from(node.low[axis]) - origin[axis]) * inverse[axis];
         let b = (f64::from(node.high[axis]) - origin[axis]) * inverse[axis];
-        // A ray inside a slab that it runs along gives NaN, which min and max ignore.
+        // A ray that runs along a slab's side gives NaN, which min and max ignore.
         near = near.max(a.min(b));
         far = far.min(a.max(b));
     }

@@ -1,4 +1,4 @@
-//! Triangles found by where they are.
+//! Spatial queries for triangles.
 
 pub mod bvh;
 pub(in crate::geometry) mod near_pairs;

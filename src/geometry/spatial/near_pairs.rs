@@ -1,20 +1,19 @@
-//! Pairs of triangles that may meet, found without looking at every pair.
+//! Pairs of triangles that may meet, found without comparing all pairs.
 //!
-//! Boxes tell most triangles apart, but not those around one vertex: all their boxes have it. Where many triangles have a
-//! vertex in common, a hub, these are told apart by the arcs in which they are seen from it: two triangles share more than
-//! the hub only where their arcs meet.
+//! Boxes separate most triangles, but not those around a common vertex, which all their boxes contain. If many triangles share a vertex, a
+//! hub, they are separated by the arcs in which the hub sees them: two triangles share more than the hub only if their arcs meet.
 
 use std::cmp::Reverse;
 
 use super::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh, Vec3};
 
-/// Most triangles around a vertex that is no hub.
+/// Maximum triangles around a vertex that is not a hub.
 const MOST: u32 = 16;
-/// What boxes of arcs are widened by, in radii of the sphere that they lie on: far more than rounding to 32 bits costs.
+/// Margin of arc boxes, in radii of the sphere that they lie on: far more than rounding to 32 bits costs.
 const MARGIN: f64 = 1e-6;
 
-/// Least and greatest corner of a box (m).
+/// Minimum and maximum corner of a box (m).
 type Span = (Vec3, Vec3);
 
 /// The triangles of a mesh, in trees of boxes.
@@ -22,7 +21,7 @@ pub(in crate::geometry) struct Near<'a> {
     mesh: &'a TriMesh,
     /// Triangles without a hub.
     others: Boxes,
-    /// Triangles with one; of several, the one with most triangles has them.
+    /// Triangles with a hub; with several, the one with most triangles.
     fans: Vec<Fan>,
     /// The fans, as one box each.
     all_fans: Boxes,
@@ -30,7 +29,7 @@ pub(in crate::geometry) struct Near<'a> {
     fan_of: Vec<Option<usize>>,
 }
 
-/// The triangles of a hub, by where they are and by where they are seen from it.
+/// The triangles of a hub, by position and by the arc in which the hub sees them.
 struct Fan {
     hub: u32,
     boxes: Boxes,
@@ -38,7 +37,7 @@ struct Fan {
 }
 
 impl<'a> Near<'a> {
-    /// Sorts triangles with an area each, and corners by position.
+    /// Requires triangles with an area, and corners joined by position.
     pub(in crate::geometry) fn of(mesh: &'a TriMesh) -> Self {
         let mut near = Self {
             mesh,
@@ -65,8 +64,8 @@ impl<'a> Near<'a> {
         near
     }
 
-    /// Shows triangles that a triangle may meet elsewhere than in common corners and edges, or along a common edge; over
-    /// all triangles every such pair is seen once, from one of its two sides.
+    /// Calls `see` with the triangles that a triangle may meet elsewhere than in common corners and edges, or along a common edge; over all
+    /// triangles every such pair is seen once, from one of its two sides.
     pub(in crate::geometry) fn of_triangle(&self, triangle: usize, mut see: impl FnMut(usize)) {
         let (own, here) = (self.fan_of[triangle], span(self.mesh, triangle));
         self.others.touching(here, |other| {
@@ -89,7 +88,7 @@ impl<'a> Near<'a> {
     }
 }
 
-/// The hub of each triangle: of its corners the one with most triangles around it, where these are many.
+/// The hub of each triangle: the corner with most triangles around it, if these are many.
 fn hubs(mesh: &TriMesh) -> Vec<Option<u32>> {
     let mut around = vec![0u32; mesh.positions.len()];
     mesh.triangles.as_flattened().iter().for_each(|&vertex| around[vertex as usize] += 1);
@@ -106,14 +105,14 @@ fn span(mesh: &TriMesh, triangle: usize) -> Span {
     (a.inf(&b).inf(&c), a.sup(&b).sup(&c))
 }
 
-/// A box around the arc in which a triangle is seen from one of its corners, on the unit sphere around that.
+/// A box around the arc in which a corner sees its triangle, on the unit sphere around the corner.
 fn arc(mesh: &TriMesh, triangle: usize, hub: u32) -> Span {
     let corners = mesh.triangles[triangle];
     let position = |vertex: u32| mesh.positions[vertex as usize].cast::<f64>();
     let first = corners.iter().position(|&corner| corner == hub).unwrap_or(0);
     let end = |next: usize| (position(corners[(first + next) % 3]) - position(hub)).normalize();
     let (a, b) = (end(1), end(2));
-    // Half the sum reaches to the middle of the chord; the arc rises above the chord by what is left of the radius.
+    // Half the sum reaches the middle of the chord; the arc rises above the chord by the rest of the radius.
     let rise = DVec3::repeat(1.0 - (a + b).norm() / 2.0 + MARGIN);
     ((a.inf(&b) - rise).cast(), (a.sup(&b) + rise).cast())
 }
@@ -132,13 +131,13 @@ impl Boxes {
         let nowhere = (Vec3::repeat(f32::INFINITY), Vec3::repeat(f32::NEG_INFINITY));
         let around = |(low, high): Span, (a, b): &Span| (low.inf(a), high.sup(b));
         let whole = boxes.iter().fold(nowhere, around);
-        // Each as a triangle that has this box.
+        // Each box as a triangle with these bounds.
         let positions = boxes.iter().flat_map(|&(low, high)| [low, high]).collect();
         let triangles = (0..boxes.len() as u32).map(|n| [2 * n, 2 * n, 2 * n + 1]).collect();
         Self { tree: Bvh::new(&TriMesh { positions, triangles }), numbers, whole }
     }
 
-    /// Shows the numbers of the boxes that touch a box.
+    /// Calls `see` with the numbers of the boxes that touch a box.
     fn touching(&self, (low, high): Span, mut see: impl FnMut(usize)) {
         self.tree.in_box(low, high, |at| see(self.numbers[at]));
     }

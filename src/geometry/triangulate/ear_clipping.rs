@@ -1,8 +1,8 @@
-//! Polygons cut into triangles, ear by ear.
+//! Triangulation of polygons by ear clipping.
 //!
-//! A corner is an ear when its triangle turns the polygon's way round and holds no other corner. Corners lie in a tree of
-//! boxes, so that a triangle is compared with those near it, and cutting an ear changes only whether its two neighbours
-//! are ears: n corners take some n log n steps, or n^2 where most triangles are long and thin. A limit of steps ends that.
+//! A corner is an ear if its triangle has the polygon's orientation and contains no other corner. Corners lie in a tree of boxes, so that a
+//! triangle is compared only with those near it, and cutting an ear affects only its two neighbours: n corners take some n log n steps, or
+//! n^2 if most triangles are long and thin. A limit on the steps bounds that.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -10,10 +10,9 @@ use std::collections::BinaryHeap;
 /// A point of the plane.
 pub type Point = [f64; 2];
 
-/// Corners of a box of the tree that are compared one by one.
+/// Maximum corners of a leaf box, compared one by one.
 const LEAF: usize = 8;
-/// Boxes that are looked at, for each corner, before no more ears are looked for: more than a polygon of so many corners
-/// can take.
+/// Maximum boxes visited per corner, before the search for ears is given up: more than a polygon of the allowed size needs.
 const LOOKS: usize = 1200;
 
 /// Twice the area of a triangle, positive when it is counter-clockwise.
@@ -21,8 +20,8 @@ pub fn turn(a: Point, b: Point, c: Point) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Triangles of a counter-clockwise polygon of at least three corners, two fewer than corners. Always the ear with the
-/// least index is cut; a polygon that crosses itself may have none: its widest corner then goes.
+/// Triangles of a counter-clockwise polygon of at least three corners, two fewer than corners. The ear with the smallest index is cut
+/// first; a polygon that crosses itself may have none: then its widest corner is cut.
 pub fn triangles(points: &[Point]) -> Vec<[usize; 3]> {
     let mut ring = Ring::new(points);
     let mut out = Vec::with_capacity(points.len() - 2);
@@ -33,7 +32,7 @@ pub fn triangles(points: &[Point]) -> Vec<[usize; 3]> {
     }
     let last = ring.first();
     let [before, at, after] = ring.around(last);
-    // In the order of their indices, as long as they are counter-clockwise so.
+    // In the order of their indices, as far as that is counter-clockwise.
     let mut three = [before, at, after];
     let least = (0..3).min_by_key(|&i| three[i]).unwrap_or(0);
     three.rotate_left(least);
@@ -41,24 +40,24 @@ pub fn triangles(points: &[Point]) -> Vec<[usize; 3]> {
     out
 }
 
-/// The corners that are left, each with its neighbours.
+/// The remaining corners, each with its neighbours.
 struct Ring<'a> {
     points: &'a [Point],
     before: Vec<usize>,
     after: Vec<usize>,
     is_left: Vec<bool>,
     near: Boxes,
-    /// Corners that were ears when they were put in.
+    /// Corners that were ears when they were added.
     ears: BinaryHeap<Reverse<usize>>,
     is_ear: Vec<bool>,
-    /// Corners with the turn that they had when they were put in.
+    /// Corners with their turn when they were added.
     wide: BinaryHeap<Wide>,
     turns: Vec<f64>,
-    /// Boxes that may still be looked at.
+    /// Boxes that may still be visited.
     looks: usize,
 }
 
-/// A corner by its turn, then by its index.
+/// A corner, ordered by its turn, then by its index.
 #[derive(PartialEq)]
 struct Wide(f64, Reverse<usize>);
 
@@ -154,12 +153,12 @@ struct Boxes {
 struct Node {
     low: Point,
     high: Point,
-    /// Points that are left below it.
+    /// Remaining points below it.
     left: usize,
     parent: usize,
     /// The first of two children, or none.
     children: Option<[usize; 2]>,
-    /// Its points in the order.
+    /// Its points in `order`.
     range: std::ops::Range<usize>,
 }
 
@@ -211,7 +210,7 @@ impl Boxes {
         }
     }
 
-    /// Whether a counter-clockwise triangle holds a point that is left, on its sides too, other than its corners.
+    /// Whether a counter-clockwise triangle contains a remaining point, even on its sides, other than its corners.
     fn any_within(&self, points: &[Point], triangle: [Point; 3], looks: &mut usize) -> bool {
         let sides = [0, 1, 2].map(|i| (triangle[i], triangle[(i + 1) % 3]));
         let holds = |p: Point| sides.iter().all(|&(a, b)| turn(a, b, p) >= 0.0) && !triangle.contains(&p);

@@ -1,4 +1,4 @@
-//! Polygons cut into triangles.
+//! Triangulation of polygons.
 
 pub(crate) mod ear_clipping;
 pub(crate) mod monotone;

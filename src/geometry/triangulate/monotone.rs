@@ -1,17 +1,17 @@
-//! Large polygons cut into triangles by a line that sweeps over them.
+//! Triangulation of large polygons by a sweep line.
 //!
-//! Diagonals from the corners at which the polygon turns back against the sweep cut it into pieces that are monotone
-//! along x, and each of those is cut from left to right (de Berg et al., Computational Geometry, 3rd ed., sections 3.2 and
-//! 3.3): n corners take some n log n steps. Predicates are exact, on whole numbers. A polygon that touches or crosses itself
-//! may get diagonals that cross, or pieces that are not monotone: the former are left out, the latter cut ear by ear.
+//! Diagonals from the corners where the polygon turns back against the sweep cut it into pieces that are monotone along x, and each of
+//! those is cut from left to right (de Berg et al., Computational Geometry, 3rd ed., sections 3.2 and 3.3): n corners take some n log n
+//! steps. Predicates are exact, on integers. For a polygon that touches or crosses itself, diagonals may cross, or pieces not be monotone:
+//! the former are left out, the latter cut ear by ear.
 
 use super::ear_clipping;
 use super::ear_clipping::Point;
 
-/// Size of the square that the points are rounded into: finer than the 24 bits of their coordinates, and twice an area
-/// still fits 64 bits.
+/// Size of the square that the points are rounded into: finer than the 24 bits of their coordinates, and twice an area still fits in 64
+/// bits.
 const SQUARE: f64 = (1u64 << 30) as f64;
-/// Edges in a run of the list that the line crosses.
+/// Edges in a run of the list of edges that the sweep line crosses.
 const RUN: usize = 256;
 
 /// Triangles of a counter-clockwise polygon of at least three corners, two fewer than corners.
@@ -57,8 +57,7 @@ fn turn(a: [i64; 2], b: [i64; 2], c: [i64; 2]) -> i64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Cuts off corners that are doubled, or from which the polygon goes back the way that it came; gives those that are left,
-/// at least three.
+/// Cuts off corners that are doubled, or where the polygon turns back on itself; returns the rest, at least three.
 fn without_spikes(positions: &[[i64; 2]], out: &mut Vec<[usize; 3]>) -> Vec<usize> {
     let mut ring: Vec<usize> = Vec::with_capacity(positions.len());
     let is_spike = |a: usize, b: usize, c: usize| {
@@ -94,8 +93,8 @@ fn without_spikes(positions: &[[i64; 2]], out: &mut Vec<[usize; 3]>) -> Vec<usiz
     ring[begin..end].to_vec()
 }
 
-/// The sweep from left to right. Corners are in the order of their positions, then of their indices; an edge is named by the
-/// corner that it leaves. Of the edges that the line crosses those with the polygon above them are kept, upward.
+/// The sweep from left to right. Corners are ordered by position, then by index; an edge is named by the corner that it leaves. Of the
+/// edges that the line crosses, those with the polygon above them are kept, ordered upward.
 struct Sweep<'a> {
     positions: &'a [[i64; 2]],
     rank: &'a [usize],
@@ -142,7 +141,7 @@ impl<'a> Sweep<'a> {
         let [comes_from_left, goes_left] = [before, after].map(|other| self.rank[other] < self.rank[corner]);
         let is_convex = turn(self.positions[before], self.positions[corner], self.positions[after]) > 0;
         if comes_from_left {
-            // A start, a split, or a corner of a lower side put it there.
+            // A start, a split, or a corner of a lower side inserted it.
             self.join_merged(before, corner);
             self.remove(before);
         }
@@ -169,7 +168,7 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    /// A diagonal to an edge's helper if that waits for one.
+    /// A diagonal to an edge's helper if that is a merge corner.
     fn join_merged(&mut self, edge: usize, corner: usize) {
         let helper = self.helper[edge] as usize;
         if self.is_merge[helper] {
@@ -187,7 +186,8 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    /// The position in the list below which all edges lie below a corner: a run, by its position in the order, and a position in it.
+    /// Where a corner belongs in the list, all edges before it being below the corner: the run's index in the order, and an index in the
+    /// run.
     fn position(&self, corner: usize, other: usize) -> Option<(usize, usize)> {
         let run = self.order.partition_point(|&run| self.is_above(self.runs[run][0], corner, other));
         let run = run.checked_sub(1)?;
@@ -201,7 +201,7 @@ impl<'a> Sweep<'a> {
         Some(self.runs[self.order[run]][at.max(1) - 1] as usize)
     }
 
-    /// Puts in the edge that leaves a corner.
+    /// Inserts the edge that leaves a corner.
     fn insert(&mut self, corner: usize, after: usize) {
         self.helper[corner] = corner as u32;
         if self.order.is_empty() {
@@ -231,16 +231,16 @@ impl<'a> Sweep<'a> {
     }
 }
 
-/// The pieces that diagonals cut a polygon of so many corners into, each counter-clockwise. Diagonals that cross one before
-/// them, or are sides, are left out.
+/// The pieces into which diagonals cut a polygon of `count` corners, each counter-clockwise. Diagonals that cross an earlier one, or are
+/// sides, are left out.
 fn pieces(count: usize, diagonals: Vec<[usize; 2]>) -> Vec<Vec<usize>> {
     let mut cuts: Vec<(usize, usize)> = diagonals.iter().map(|&[a, b]| (a.min(b), a.max(b))).collect();
     cuts.retain(|&(low, high)| high - low > 1 && (low, high) != (0, count - 1));
-    // Those that begin at the same corner from the outermost on.
+    // Of those that begin at the same corner, the outermost first.
     cuts.sort_unstable_by_key(|&(low, high)| (low, count - high));
     cuts.dedup();
     let mut out = Vec::new();
-    // The cuts that the current corner is within, with their pieces so far; the whole polygon is the first.
+    // The open cuts around the current corner, with their pieces so far; the whole polygon is the first.
     let mut open: Vec<(usize, Vec<usize>)> = vec![(count, Vec::new())];
     let mut cuts = cuts.into_iter().peekable();
     for corner in 0..count {
@@ -288,7 +288,7 @@ fn cut_monotone(positions: &[[i64; 2]], rank: &[usize], piece: &[usize], out: &m
         };
         let (top, was_lower) = stack[stack.len() - 1];
         if stack.len() > 1 && (was_lower != is_lower || lower > upper) {
-            // All that is waited for is seen from the other side.
+            // All waiting corners are visible from the other side.
             for pair in stack.windows(2) {
                 let ((a, _), (b, _)) = (pair[0], pair[1]);
                 if was_lower { add(a, b, next) } else { add(b, a, next) }

@@ -11,13 +11,13 @@ use crate::error::{Error, Result};
 /// Extension of files that are not finished.
 const PART: &str = "part";
 
-/// Files begun by this process.
+/// Number of files begun by this process.
 static TURN: AtomicU64 = AtomicU64::new(0);
-/// Those of them that are not finished.
+/// Files that are not finished.
 static BEGUN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Writes a file through a temporary neighbour that is synced and renamed; nothing is left behind on failure.
-/// A link stays a link; a device or a pipe is written to as it is.
+/// Writes a file through a temporary neighbour that is synced and renamed; a failure leaves nothing behind. A link stays a link; devices
+/// and pipes are written to directly.
 ///
 /// # Errors
 /// What the operating system reports.
@@ -25,7 +25,7 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     write(path, |out| out.write_all(bytes))
 }
 
-/// As [`write_bytes`], with the content from a function.
+/// As [`write_bytes`], with contents written by a function.
 ///
 /// # Errors
 /// What the operating system or the function reports.
@@ -37,14 +37,14 @@ pub fn write(path: &Path, content: impl FnOnce(&mut dyn Write) -> std::io::Resul
     attempt.map_err(|error| Error::io(path, "write", error))
 }
 
-/// Whether a path is to be written to as it is: a device, a pipe, an open file of this process.
+/// Whether a path must be written to directly: a device, a pipe, an open file of this process.
 pub fn is_stream(path: &Path) -> bool {
     matches!(target(path), Target::Stream)
 }
 
 /// The kind of file at a path.
 enum Target {
-    /// A file that can be replaced, links followed; or nothing yet.
+    /// A file that can be replaced (links are followed), or does not exist yet.
     File(PathBuf),
     /// Something else.
     Stream,
@@ -64,10 +64,10 @@ fn target(path: &Path) -> Target {
     }
 }
 
-/// Whether a path is a name of a file that a process has open, such as /dev/stdout behind `> file`.
+/// Whether a path names a file that a process has open, such as /dev/stdout after `> file`.
 fn is_open_file(path: &Path) -> bool {
     let mut path = path.to_path_buf();
-    // As many links as the system follows.
+    // The maximum number of links that the system follows.
     for _ in 0..40 {
         let folder = path.parent().and_then(|folder| std::fs::canonicalize(folder).ok());
         if folder.is_some_and(|folder| folder.starts_with("/proc")) {
@@ -79,7 +79,7 @@ fn is_open_file(path: &Path) -> bool {
     false
 }
 
-/// Existing contents are kept: an open file grows.
+/// Appends to existing contents: an open file grows.
 fn straight(path: &Path, content: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> std::io::Result<()> {
     let mut out = BufWriter::new(File::options().append(true).open(path)?);
     content(&mut out)?;
@@ -91,7 +91,7 @@ fn through_neighbour(
     content: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> std::io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
-    // Two processes or threads that write the same file do not share a neighbour.
+    // Processes or threads that write the same file use different temporary files.
     let turn = TURN.fetch_add(1, Ordering::Relaxed);
     name.push(format!(".{}-{turn}.{PART}", std::process::id()));
     let part = path.with_file_name(name);
@@ -110,9 +110,9 @@ fn through_neighbour(
     done
 }
 
-/// Removes the unfinished files of this process: for a process that ends at once.
+/// Removes the unfinished files of this process, for a process that is about to exit.
 pub fn abandon() {
-    // A writer that holds the lock holds it for an instant.
+    // The lock is only ever held briefly.
     if let Ok(begun) = BEGUN.lock() {
         begun.iter().for_each(|part| {
             let _ = std::fs::remove_file(part);
@@ -120,7 +120,7 @@ pub fn abandon() {
     }
 }
 
-/// The name of the file that an unfinished neighbour was to become; none for other names.
+/// The final name of an unfinished temporary file; none for other names.
 pub fn finished_name(name: &str) -> Option<&str> {
     let (name, turn) = name.strip_suffix(PART)?.strip_suffix('.')?.rsplit_once('.')?;
     let (process, turn) = turn.split_once('-')?;

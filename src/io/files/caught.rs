@@ -12,21 +12,21 @@ thread_local! {
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Reads a file with code that may panic on unforeseen damage.
+/// Reads a file with code that may panic on unexpected damage.
 ///
 /// # Errors
-/// What `read` returns; for a panic, that the file is damaged; [`Error::Cancelled`] once readers are to stop.
+/// What `read` returns; for a panic, that the file is damaged; [`Error::Cancelled`] once readers must stop.
 pub fn caught<T>(path: &Path, read: impl FnOnce() -> Result<T>) -> Result<T> {
     keep_quiet();
     DEPTH.set(DEPTH.get() + 1);
     let outcome = catch_unwind(AssertUnwindSafe(read));
     DEPTH.set(DEPTH.get() - 1);
-    // The error of a reader that was stopped does not matter.
+    // If readers were stopped, the error itself does not matter.
     source::check()?;
     outcome.unwrap_or_else(|_| Err(Error::file(path, "the file is damaged: it contradicts itself")))
 }
 
-/// Panics of readers become errors and are not printed; others go to the previous panic hook.
+/// Panics of readers become errors and are not printed; other panics go to the previous panic hook.
 fn keep_quiet() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {

@@ -1,4 +1,4 @@
-//! Hashes of content: which file is which, and whether it is whole (XXH3, 128 bits; no secret is kept with it).
+//! Hashes of contents, to identify files and check that they are complete (XXH3, 128 bits; not for security).
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use xxhash_rust::xxh3::Xxh3;
 
 use crate::error::{Error, Result};
 
-/// A hash in the making.
+/// A hash being computed.
 #[derive(Default)]
 pub struct Hasher(Xxh3);
 
@@ -17,7 +17,7 @@ impl Hasher {
         self
     }
 
-    /// Adds a text with its length, so that "ab" + "c" is not "a" + "bc".
+    /// Adds a text preceded by its length, so that "ab" + "c" differs from "a" + "bc".
     pub fn add_text(&mut self, text: &str) -> &mut Self {
         self.add(&(text.len() as u64).to_le_bytes()).add(text.as_bytes())
     }

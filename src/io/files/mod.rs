@@ -1,4 +1,4 @@
-//! Files as such: read as a whole or not at all, written whole or not at all, hashed, numbered.
+//! File handling: files are read whole or not at all, written whole or not at all, hashed and numbered.
 
 pub mod atomic;
 #[doc(hidden)]

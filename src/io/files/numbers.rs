@@ -1,18 +1,18 @@
-//! Arrays of numbers as particle files have them: of any type, in either byte order or as text.
+//! Arrays of numbers in particle files: of any type, in either byte order or as text.
 
 use super::{source, text};
 
-/// Bytes that deflate makes of one, at most.
+/// Maximum number of bytes that deflate expands a byte to.
 const MOST_INFLATED: u64 = 1032;
-/// Numbers between two looks at whether to stop.
+/// Numbers between two checks of the stop flag.
 const PIECE: usize = 1 << 20;
 
-/// Bytes that so many deflated ones can become, at most.
+/// Maximum number of bytes that this many deflated bytes can expand to.
 pub(in crate::io) fn most_inflated(bytes: usize) -> u64 {
     (bytes as u64).saturating_mul(MOST_INFLATED)
 }
 
-/// The order of a number's bytes.
+/// Byte order of a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::io) enum Order {
     Little,
@@ -34,7 +34,7 @@ pub(in crate::io) enum Kind {
     F64,
 }
 
-/// Numbers of one type; integers keep all of their 64 bits.
+/// Numbers of one type; integers keep all their 64 bits.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::io) enum Numbers {
     Whole(Vec<i64>),
@@ -57,7 +57,7 @@ impl Kind {
         matches!(self, Self::F32 | Self::F64)
     }
 
-    /// Whether 32 bits with a sign hold all of its integers.
+    /// Whether 32-bit signed integers can hold all of its values.
     pub fn fits_int(self) -> bool {
         matches!(self, Self::I8 | Self::U8 | Self::I16 | Self::U16 | Self::I32)
     }
@@ -67,10 +67,10 @@ impl Kind {
         if self.is_real() { Numbers::Real(Vec::new()) } else { Numbers::Whole(Vec::new()) }
     }
 
-    /// Adds the numbers of these bytes; a rest that is no whole number is left out.
+    /// Appends the numbers in these bytes; an incomplete last one is ignored.
     ///
     /// # Errors
-    /// An unsigned integer over 2^63 - 1; a reader that is to stop.
+    /// An unsigned integer over 2^63 - 1; the stop flag.
     pub fn decode(self, bytes: &[u8], order: Order, out: &mut Numbers) -> Result<(), String> {
         for piece in bytes.chunks(PIECE * self.size()) {
             if source::is_stopped() {
@@ -114,14 +114,14 @@ impl Kind {
         Ok(())
     }
 
-    /// Adds a number that is written as text.
+    /// Appends a number written as text.
     ///
     /// # Errors
-    /// A word that is no number of this type.
+    /// A word that is not a number of this type.
     pub fn read_word(self, word: &[u8], out: &mut Numbers) -> Result<(), String> {
         let text = std::str::from_utf8(word).unwrap_or("");
         let read = match (self, out) {
-            // By way of 64 bits some numbers would be rounded twice.
+            // Parsed as 64 bits first, some numbers would be rounded twice.
             (Self::F32, Numbers::Real(values)) => {
                 text::number::<f32>(word).map(|value| values.push(value.into()))
             }
@@ -136,7 +136,7 @@ impl Kind {
 }
 
 impl Numbers {
-    /// How many there are.
+    /// Number of values.
     pub fn count(&self) -> usize {
         match self {
             Self::Whole(values) => values.len(),
@@ -152,7 +152,7 @@ impl Numbers {
         }
     }
 
-    /// Adds those of another array of the same type.
+    /// Appends those of another array of the same type.
     pub fn append(&mut self, other: Self) {
         match (self, other) {
             (Self::Whole(values), Self::Whole(more)) => values.extend(more),

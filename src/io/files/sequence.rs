@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// Most digits of a frame number.
+/// Maximum number of digits of a frame number.
 const MOST_DIGITS: usize = 32;
 
-/// A file's name with a position for the frame number, in a folder.
+/// A file name with a placeholder for the frame number, in a folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern {
     folder: PathBuf,
@@ -17,12 +17,12 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// Finds the frame number's position in a file's name; none when the name is of one file, as every name of a file that
-    /// is there. Names of folders are not considered.
+    /// Finds the placeholder of the frame number in a file's name; none if the name is that of a single file, such as any existing file.
+    /// Folder names are not considered.
     pub fn parse(path: &Path) -> Option<Self> {
         let text = path.file_name()?.to_str()?;
         let part = |start: usize, end: usize, digits: usize| {
-            // After the folder was looked at: most names have no position for a number.
+            // The file system is checked last: most names have no placeholder.
             (digits <= MOST_DIGITS && !path.is_file()).then(|| Self {
                 folder: path.parent().unwrap_or(Path::new("")).to_path_buf(),
                 before: text[..start].into(),
@@ -55,7 +55,7 @@ impl Pattern {
         self.folder.join(name)
     }
 
-    /// The frames whose files are there, ascending.
+    /// The frames whose files exist, ascending.
     ///
     /// # Errors
     /// A folder that cannot be read.
@@ -68,7 +68,7 @@ impl Pattern {
             let number =
                 name.to_str().and_then(|name| name.strip_prefix(&*self.before)?.strip_suffix(&*self.after));
             let frame = number.and_then(|number| number.parse::<i32>().ok());
-            // "+1", or "001" of four digits, are of no frame.
+            // "+1", or "001" with four digits, are not frame numbers.
             out.extend(frame.filter(|frame| self.path(*frame).file_name() == Some(&*name)));
         }
         out.sort_unstable();

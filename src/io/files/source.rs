@@ -1,4 +1,4 @@
-//! Files to read: regular ones only, and a signal ends the reading.
+//! Opening of input files: only regular ones; a stop flag ends the reading.
 
 use std::fs::File;
 use std::io::Read;
@@ -8,24 +8,24 @@ use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
 
-/// Bytes between two looks at the flag.
+/// Bytes between two checks of the flag.
 const PIECE: usize = 1 << 20;
 
-/// The flag of a program that wants its readers to stop.
+/// The flag with which a program stops its readers.
 static STOP: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// Makes all readers of this process stop, with [`Error::Cancelled`], once a flag is raised. For programs, which end
-/// then; a library leaves it alone. Only the first call counts.
+/// Makes all readers of this process stop, with [`Error::Cancelled`], once a flag is raised. For programs, which then end; a library does
+/// not use it. Only the first call has an effect.
 pub fn stop_when(raised: Arc<AtomicBool>) {
     let _ = STOP.set(raised);
 }
 
-/// Whether readers are to stop.
+/// Whether readers must stop.
 pub fn is_stopped() -> bool {
     STOP.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
 }
 
-/// Ends a reader that is to stop; long readers check now and then.
+/// Fails if readers must stop; long readers call it regularly.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
@@ -33,13 +33,13 @@ pub fn check() -> Result<()> {
     if is_stopped() { Err(Error::Cancelled) } else { Ok(()) }
 }
 
-/// Opens a regular file: a pipe, a terminal or a device may never end, or never begin.
+/// Opens a regular file: reading a pipe, a terminal or a device may never end, or never begin.
 ///
 /// # Errors
-/// A file that is not there, cannot be read, or is something else.
+/// A file that does not exist, cannot be read, or is not a regular file.
 pub fn open(path: &Path) -> Result<File> {
     let failed = |error| Error::io(path, "read", error);
-    // Looked at before it is opened: opening a pipe waits for its writer.
+    // Checked before opening: opening a pipe waits for its writer.
     let refuse = |kind: std::fs::FileType| {
         let what = if kind.is_dir() {
             "is a folder, not a file"

@@ -1,4 +1,4 @@
-//! Text in files of meshes and particles: byte order marks, lines however they end, words, and numbers.
+//! Text in mesh and particle files: byte order marks, lines with any line ends, words, and numbers.
 
 use std::str::FromStr;
 
@@ -7,13 +7,13 @@ use crate::error::one_line;
 /// Byte order marks of UTF-8, and of UTF-16 in both byte orders.
 const UTF_8: &[u8] = b"\xef\xbb\xbf";
 const UTF_16: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
-/// Letters of a word that a message repeats.
+/// Maximum number of characters of a word that a message quotes.
 const LONGEST_WORD: usize = 40;
 
-/// The bytes behind a byte order mark, which some programs write.
+/// The bytes after a byte order mark, which some programs write.
 ///
 /// # Errors
-/// The mark of UTF-16, in which no reader looks for words.
+/// The mark of UTF-16, which no reader supports.
 pub(in crate::io) fn without_mark(bytes: &[u8]) -> Result<&[u8], String> {
     if UTF_16.iter().any(|mark| bytes.starts_with(mark)) {
         return Err("the file is text in UTF-16: save it as plain text (ASCII or UTF-8)".into());
@@ -21,7 +21,7 @@ pub(in crate::io) fn without_mark(bytes: &[u8]) -> Result<&[u8], String> {
     Ok(bytes.strip_prefix(UTF_8).unwrap_or(bytes))
 }
 
-/// The lines of a text. They end with a line feed, a carriage return, or both, also mixed within one file.
+/// The lines of a text. They end with a line feed, a carriage return, or both, even mixed within one file.
 pub(in crate::io) struct Lines<'a> {
     rest: Option<&'a [u8]>,
     number: usize,
@@ -48,7 +48,7 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-/// The words of a text, between blanks and line ends; from a word that begins with `#` on, a line is a comment.
+/// The words of a text, separated by blanks and line ends; a word that begins with `#` starts a comment.
 pub(in crate::io) struct Words<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -82,7 +82,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// The next word, which is not taken.
+    /// The next word, without consuming it.
     pub fn peek(&self) -> Option<&'a [u8]> {
         Self { bytes: self.bytes, at: self.at, line: self.line }.next()
     }
@@ -97,7 +97,7 @@ impl<'a> Words<'a> {
         self.at += length;
     }
 
-    /// Takes the rest of the line of the last word, without the line end.
+    /// Consumes the rest of the line of the last word, without the line end.
     pub fn rest_of_line(&mut self) -> &'a [u8] {
         let rest = &self.bytes[self.at..];
         let length = rest.iter().position(|&byte| byte == b'\n' || byte == b'\r').unwrap_or(rest.len());
@@ -105,25 +105,25 @@ impl<'a> Words<'a> {
         &rest[..length]
     }
 
-    /// Goes back by so many bytes, within the line.
+    /// Steps back by `bytes`, within the line.
     pub fn step_back(&mut self, bytes: usize) {
         self.at -= bytes;
     }
 }
 
-/// A number: as Rust reads it, or with Fortran's `D` before the exponent.
+/// A number in Rust's syntax, or with Fortran's `D` before the exponent.
 pub(in crate::io) fn number<T: FromStr>(word: &[u8]) -> Option<T> {
     let text = std::str::from_utf8(word).ok()?;
     let of_fortran = || text.contains(['d', 'D']).then(|| text.replace(['d', 'D'], "e"))?.parse().ok();
     text.parse().ok().or_else(of_fortran)
 }
 
-/// A coordinate less that of an origin. Without one it is read in 32 bits: by way of 64, some numbers would be rounded twice.
+/// A coordinate relative to an origin. Without one it is parsed as 32 bits: via 64 bits, some numbers would be rounded twice.
 pub(in crate::io) fn coordinate(word: &[u8], origin: f64) -> Option<f32> {
     if origin == 0.0 { number(word) } else { number::<f64>(word).map(|value| (value - origin) as f32) }
 }
 
-/// What is wrong with a word where a number must stand.
+/// The message for a word that is not the expected number.
 pub(in crate::io) fn no_number(word: &[u8]) -> String {
     let shown = shown(word);
     if has_decimal_comma(word) {
@@ -132,14 +132,14 @@ pub(in crate::io) fn no_number(word: &[u8]) -> String {
     format!("\"{shown}\" is not a number")
 }
 
-/// Whether a word is a number with a comma where its point should stand.
+/// Whether a word is a number with a decimal comma.
 pub(in crate::io) fn has_decimal_comma(word: &[u8]) -> bool {
     let commas = word.iter().filter(|&&byte| byte == b',').count();
     let with_point: Vec<u8> = word.iter().map(|&byte| if byte == b',' { b'.' } else { byte }).collect();
     commas == 1 && !word.contains(&b'.') && number::<f64>(&with_point).is_some()
 }
 
-/// A word as a message repeats it.
+/// A word as a message quotes it.
 pub(in crate::io) fn shown(word: &[u8]) -> String {
     let text: String = String::from_utf8_lossy(word).chars().take(LONGEST_WORD).collect();
     one_line(&text)

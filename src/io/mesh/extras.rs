@@ -1,12 +1,11 @@
-//! What a mesh file contains besides its shape.
+//! The contents of a mesh file besides its shape.
 
 use std::path::Path;
 
 use crate::error::Result;
 use crate::io::files::{source, text};
 
-/// Names of what a mesh file contains besides positions and faces, in the plural: "UVs", "normals" ... Empty for a kind of file
-/// that has no such thing.
+/// Names of the contents of a mesh file besides positions and faces, in the plural: "UVs", "normals" ... Empty for file types that have none.
 ///
 /// # Errors
 /// A file that cannot be read.

@@ -18,13 +18,13 @@ use crate::geometry::{DVec3, DetailedMesh, PolygonMesh, TriMesh};
 
 pub use ply_write::Carried;
 
-/// Formats that are read and written, by extension.
+/// Formats that can be read and written, by extension.
 pub const EXTENSIONS: [&str; 3] = ["obj", "ply", "stl"];
 
-/// Reads a mesh in triangles: all its vertices, in the file's order.
+/// Reads a mesh as triangles: all its vertices, in the file's order.
 ///
 /// # Errors
-/// A missing, empty, cut or malformed file; no faces; vertices that are not finite; indices out of range.
+/// A file that is missing, empty, cut short or malformed; no faces; vertices that are not finite; indices out of range.
 pub fn read(path: &Path) -> Result<TriMesh> {
     read_polygons(path).map(PolygonMesh::into_triangles)
 }
@@ -37,7 +37,7 @@ pub fn read_polygons(path: &Path) -> Result<PolygonMesh> {
     read_polygons_from(path, DVec3::zeros())
 }
 
-/// As [`read_polygons`], with positions less `origin`: see [`parse_polygons_from`].
+/// As [`read_polygons`], with positions relative to `origin`: see [`parse_polygons_from`].
 ///
 /// # Errors
 /// As [`read`].
@@ -53,8 +53,8 @@ pub fn parse_polygons(path: &Path, bytes: &[u8]) -> Result<PolygonMesh> {
     parse_polygons_from(path, bytes, DVec3::zeros())
 }
 
-/// As [`parse_polygons`], with positions less `origin` (in the file's unit and axes), which is subtracted in 64 bits while they
-/// are read: coordinates of a map projection, as far as the file holds them, keep all their digits.
+/// As [`parse_polygons`], with positions relative to `origin` (in the file's unit and axes), which is subtracted in 64 bits while they are
+/// read: map-projection coordinates keep all the digits that the file has.
 ///
 /// # Errors
 /// As [`read`].
@@ -64,16 +64,16 @@ pub fn parse_polygons_from(path: &Path, bytes: &[u8], origin: DVec3) -> Result<P
     Ok(mesh)
 }
 
-/// As [`read_polygons`], of a file that may hold an empty mesh, as frames of a liquid that has not come yet, or is gone, do: one that
-/// says so, as a .ply of 0 faces and an .obj of ours do, and any .stl.
+/// As [`read_polygons`], for a file that may hold an empty mesh, such as a frame of a liquid before it appears or after it is gone. The
+/// file must declare this, as a .ply with 0 faces and an .obj of ours do, or be an .stl.
 ///
 /// # Errors
-/// As [`read`], but for a mesh that has neither vertices nor faces.
+/// As [`read`], except for a mesh that has neither vertices nor faces.
 pub fn read_any(path: &Path) -> Result<PolygonMesh> {
     read_any_from(path, DVec3::zeros())
 }
 
-/// As [`read_any`], with positions less `origin`: see [`parse_polygons_from`].
+/// As [`read_any`], with positions relative to `origin`: see [`parse_polygons_from`].
 ///
 /// # Errors
 /// As [`read_any`].
@@ -87,7 +87,7 @@ pub fn read_any_from(path: &Path, origin: DVec3) -> Result<PolygonMesh> {
     Ok(mesh)
 }
 
-/// The mesh as the file has it, which may be empty or invalid.
+/// The mesh as it is in the file; it may be empty or invalid.
 fn parse(path: &Path, bytes: &[u8], origin: DVec3) -> Result<PolygonMesh> {
     if bytes.is_empty() {
         return Err(Error::file(path, "the file is empty"));
@@ -109,7 +109,7 @@ fn parse(path: &Path, bytes: &[u8], origin: DVec3) -> Result<PolygonMesh> {
     Ok(mesh)
 }
 
-/// Reads a mesh in triangles with all that it carries.
+/// Reads a mesh as triangles, with all its attributes.
 ///
 /// # Errors
 /// As [`read`].
@@ -120,12 +120,12 @@ pub fn read_detailed(path: &Path) -> Result<DetailedMesh> {
 /// Writes a mesh, whole or not at all.
 ///
 /// # Errors
-/// Another extension than .obj, .ply or .stl; what the operating system reports.
+/// An extension other than .obj, .ply or .stl; what the operating system reports.
 pub fn write(path: &Path, mesh: &TriMesh) -> Result<()> {
     write_carried(path, mesh, &Carried::default())
 }
 
-/// As [`write()`], with what the mesh carries as far as the format holds it: .ply all, .obj texture coordinates (see
+/// As [`write()`], with the data that the mesh carries, as far as the format can hold them: .ply everything, .obj texture coordinates (see
 /// [`holds_uvs`]) and colours.
 ///
 /// # Errors
@@ -158,7 +158,7 @@ pub fn obj_bytes(mesh: &TriMesh, carried: &Carried<'_>) -> Vec<u8> {
     bytes
 }
 
-/// The extension of a file's name in lower case; empty without one.
+/// The extension of a file's name in lower case; empty if there is none.
 pub fn extension(path: &Path) -> String {
     path.extension().and_then(|text| text.to_str()).unwrap_or("").to_lowercase()
 }

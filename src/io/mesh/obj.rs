@@ -1,5 +1,5 @@
-//! Wavefront OBJ: positions, colours of vertices (three numbers behind the position), texture coordinates and faces, in the file's
-//! order; everything else is passed over. A line that ends in a backslash goes on in the next.
+//! Wavefront OBJ: positions, vertex colours (three numbers after the position), texture coordinates and faces, in the file's order;
+//! everything else is ignored. A line that ends in a backslash continues on the next.
 
 use std::io::Write;
 
@@ -9,15 +9,14 @@ use crate::geometry::mesh::uvs;
 use crate::geometry::{PolygonMesh, TriMesh, Uvs, Vec3};
 use crate::io::files::{source, text};
 
-/// What is written of a mesh without vertices.
+/// The contents of a file for a mesh without vertices.
 const EMPTY: &[u8] = b"# an empty mesh\n";
-/// Lines between two looks at whether to stop.
+/// Lines between two checks of the stop flag.
 const PIECE: usize = 1 << 14;
-/// Names of the arrays that a vertex' three numbers behind its position are.
+/// Names of the arrays for the three numbers after a vertex' position.
 const COLOURS: [&str; 3] = ["red", "green", "blue"];
 
-/// Reads positions, less an origin that is subtracted in 64 bits, faces and texture coordinates. Lines of other kinds may be of
-/// any encoding.
+/// Reads positions, minus an origin that is subtracted in 64 bits, faces and texture coordinates. Other lines may have any encoding.
 pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh, String> {
     let mut reader = Reader { origin, ..Reader::default() };
     let mut lines = text::lines(text::without_mark(bytes)?);
@@ -32,7 +31,7 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh
                 joined.clear();
                 joined.extend_from_slice(begin);
                 for (_, line) in lines.by_ref() {
-                    // As white space: what stands behind the line end begins a word.
+                    // As white space: the text after the line end begins a new word.
                     joined.push(b' ');
                     let more = goes_on(line);
                     joined.extend_from_slice(more.unwrap_or(line));
@@ -48,13 +47,13 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh
     Ok(reader.finish())
 }
 
-/// A line without the backslash at its end by which it goes on in the next.
+/// A line without the final backslash that continues it on the next line.
 fn goes_on(line: &[u8]) -> Option<&[u8]> {
     line.trim_ascii_end().strip_suffix(b"\\")
 }
 
-/// As [`goes_on`], of a line that is read: a comment, or the name of a material or group, may end in a backslash that means
-/// nothing, and must not swallow the vertex behind it.
+/// As [`goes_on`], for the lines that are read: a comment, or the name of a material or group, may end in a meaningless backslash, which
+/// must not swallow the vertex after it.
 fn continued(line: &[u8]) -> Option<&[u8]> {
     let begin = goes_on(line)?;
     let word = begin.trim_ascii_start().split(u8::is_ascii_whitespace).next();
@@ -62,7 +61,7 @@ fn continued(line: &[u8]) -> Option<&[u8]> {
     (is_read && !begin.contains(&b'#')).then_some(begin)
 }
 
-/// Whether the file was written of a mesh without vertices: a file of any other text has none either.
+/// Whether this is a file that frazil wrote for a mesh without vertices; any other text has no vertices either.
 pub(in crate::io) fn is_empty_of_ours(bytes: &[u8]) -> bool {
     bytes == EMPTY
 }
@@ -110,7 +109,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Texture coordinates: v may be left out. Those that are not finite count as missing when a face names them.
+    /// Texture coordinates: v is optional. Values that are not finite count as missing when a face refers to them.
     fn position<'a>(&mut self, mut words: impl Iterator<Item = &'a [u8]>) -> Result<(), String> {
         let mut next = |default: f32| words.next().map_or(Some(default), number).unwrap_or(f32::NAN);
         self.positions.push([next(f32::NAN), next(0.0)]);
@@ -136,7 +135,7 @@ impl Reader {
             self.at.push(position);
         }
         self.mesh.push(corners);
-        // A face of fewer than three corners is none.
+        // A face of fewer than three corners is ignored.
         let is_face = self.mesh.corners.len() > begin;
         if !is_face {
             self.at.truncate(begin);
@@ -163,7 +162,7 @@ fn number(word: &[u8]) -> Option<f32> {
     text::number(word)
 }
 
-/// An index from 0, of one that counts from 1, or back from the last.
+/// A zero-based index from one that counts from 1, or backward from the last.
 fn index(word: &[u8], count: usize) -> Option<u32> {
     let told: i64 = std::str::from_utf8(word).ok()?.parse().ok()?;
     let index = if told < 0 { count as i64 + told } else { told - 1 };
@@ -184,11 +183,11 @@ pub(in crate::io) fn write(
     let colour = |name: &str| arrays.iter().find(|array| array.on == On::Vertices && array.name == name);
     let colours = COLOURS.map(colour);
     let share = |array: &MeshArray, vertex: usize| {
-        // Whole numbers are of bytes.
+        // Integers are bytes.
         array.values[vertex] as f32 / if array.number == Number::U8 { 255.0 } else { 1.0 }
     };
     if mesh.positions.is_empty() {
-        // A file without bytes looks like one that was cut.
+        // An empty file would look as if it had been cut short.
         return out.write_all(EMPTY);
     }
     for (vertex, p) in mesh.positions.iter().enumerate() {

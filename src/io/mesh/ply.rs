@@ -1,6 +1,6 @@
-//! Stanford PLY: ascii and binary of both byte orders; faces as lists or as triangle strips; texture coordinates of vertices
-//! (s and t, u and v, texture_u and texture_v) or of the corners of faces (a list texcoord); any other numbers of vertices, faces and
-//! corners (lists as long as faces) but for normals, which a mesh that moves does not keep.
+//! Stanford PLY: ascii and binary in both byte orders; faces as lists or as triangle strips; texture coordinates of vertices (s and t, u
+//! and v, texture_u and texture_v) or of the corners of faces (a list texcoord); all other numbers of vertices, faces and corners (lists as
+//! long as faces) except normals, which are not valid for a mesh that moves.
 
 use std::collections::HashMap;
 
@@ -15,13 +15,13 @@ pub(in crate::io) use super::ply_header::{Element, NAMES};
 /// Names of a vertex' texture coordinates.
 pub(in crate::io) const POSITIONS: [[&str; 2]; 3] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"]];
 
-/// What is no array of its own: positions, and normals.
+/// Properties that do not become arrays: positions and normals.
 const NO_ARRAYS: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 
-/// Rows between two looks at whether to stop.
+/// Rows between two checks of the stop flag.
 const PIECE: usize = 1 << 14;
 
-/// A file whose header is read.
+/// A file whose header has been read.
 pub(in crate::io) struct Body<'a> {
     pub elements: Vec<Element>,
     /// The texts of comments.
@@ -30,7 +30,7 @@ pub(in crate::io) struct Body<'a> {
 }
 
 impl Body<'_> {
-    /// Reads the next row of an element; each property that is not a list is handed over by its index.
+    /// Reads the next row of an element and passes on each property that is not a list, by its index.
     pub fn row(
         &mut self,
         element: &Element,
@@ -57,7 +57,7 @@ pub(in crate::io) fn open(bytes: &[u8]) -> Result<Body<'_>, String> {
     Ok(Body { elements, comments, reader: Reader { format, bytes: body, at: 0 } })
 }
 
-/// Reads the vertices, less an origin that is subtracted in 64 bits, and faces of a PLY file.
+/// Reads the vertices, minus an origin that is subtracted in 64 bits, and the faces of a PLY file.
 pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh, String> {
     let Body { elements, mut reader, .. } = open(bytes)?;
     let mut parsed = Parsed::new(&elements, origin);
@@ -77,20 +77,20 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<PolygonMesh
 struct Parsed {
     origin: [f64; 3],
     mesh: PolygonMesh,
-    /// Names of the vertices' texture coordinates, where they have any.
+    /// Names of the vertices' texture coordinates, if any.
     names: Option<[&'static str; 2]>,
     of_vertices: Vec<[f32; 2]>,
-    /// Of the corners: the different ones, and each corner's index or none.
+    /// Of the corners: the distinct ones, and each corner's index or none.
     of_corners: Vec<[f32; 2]>,
     known: HashMap<[u32; 2], u32>,
     at: Vec<u32>,
-    /// Other arrays, each with the index of its property; no values where they cannot be kept.
+    /// Other arrays, each with the index of its property; without values if they cannot be kept.
     arrays: Vec<(usize, MeshArray)>,
 }
 
-/// Arrays that the properties of the vertices and faces are.
+/// The arrays that the properties of vertices and faces become.
 fn arrays_of(elements: &[Element], names: Option<[&str; 2]>) -> Vec<(usize, MeshArray)> {
-    // Triangles of strips are faces without rows of their own.
+    // Triangles of strips are faces that have no rows of their own.
     let has_strips = elements.iter().any(|element| element.name == "tristrips" && element.count > 0);
     let mut out = Vec::new();
     for element in elements.iter().filter(|element| ["vertex", "face"].contains(&&*element.name)) {
@@ -112,7 +112,7 @@ fn arrays_of(elements: &[Element], names: Option<[&str; 2]>) -> Vec<(usize, Mesh
     out
 }
 
-/// Lists of faces that are no arrays.
+/// Lists of faces that do not become arrays.
 const LISTS: [&str; 3] = ["vertex_indices", "vertex_index", "texcoord"];
 
 impl Parsed {
@@ -152,7 +152,7 @@ impl Parsed {
             self.at.push(index);
         }
         self.mesh.push(corners);
-        // A face of fewer than three corners is none.
+        // A face of fewer than three corners is ignored.
         self.at.truncate(self.mesh.corners.len());
     }
 
@@ -206,7 +206,7 @@ enum Fault {
 }
 
 impl Fault {
-    /// In words.
+    /// As a message.
     fn at(self, element: &Element, row: usize) -> String {
         let position = format_args!("{} {} of {}", element.name, row + 1, element.count);
         match self {
@@ -261,7 +261,7 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, parsed: &mut Parsed) -> 
     let (mut position, mut place) = ([0.0f64; 3], [0.0f64; 2]);
     let (mut corners, mut places) = (Vec::new(), Vec::new());
     let is_vertex = element.name == "vertex";
-    // Of a face whose corners are known only at its end.
+    // The values of a face, whose corners are known only at its end.
     let (mut of_face, mut of_corners) = (Vec::new(), Vec::new());
     for (index, property) in element.properties.iter().enumerate() {
         let name = property.name.as_str();
@@ -318,7 +318,7 @@ fn read_row(reader: &mut Reader<'_>, element: &Element, parsed: &mut Parsed) -> 
     Ok(())
 }
 
-/// Indices that are not integers from 0 become one that validation refuses.
+/// Values that are not integers from 0 become an index that validation refuses.
 fn vertex(value: f64) -> u32 {
     if (0.0..f64::from(u32::MAX)).contains(&value) && value.fract() == 0.0 { value as u32 } else { u32::MAX }
 }

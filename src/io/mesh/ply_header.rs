@@ -3,7 +3,7 @@
 use crate::geometry::mesh::attributes::Number;
 use crate::io::files::text;
 
-/// How the numbers behind a header are written.
+/// Encoding of the numbers after a header.
 #[derive(Clone, Copy, PartialEq)]
 pub(in crate::io) enum Format {
     Ascii,
@@ -31,13 +31,13 @@ pub(in crate::io) struct Element {
     pub properties: Vec<Property>,
 }
 
-/// A header that is read.
+/// A parsed header.
 pub(in crate::io) struct Header<'a> {
     pub format: Format,
     pub elements: Vec<Element>,
     /// The texts of comments.
     pub comments: Vec<String>,
-    /// The bytes behind it.
+    /// The bytes after it.
     pub body: &'a [u8],
 }
 
@@ -51,8 +51,8 @@ pub(in crate::io) fn read(bytes: &[u8]) -> Result<Header<'_>, String> {
     Ok(Header { format, elements, comments, body })
 }
 
-/// The lines of a header before `end_header`, and the bytes behind it. The first line shows how all end: where that is a carriage
-/// return alone, a line feed behind the last of them belongs to the numbers.
+/// The lines of a header before `end_header`, and the bytes after it. The first line shows how all lines end: if that is a carriage return
+/// alone, a line feed after the last of them belongs to the numbers.
 fn head(bytes: &[u8]) -> Result<(Vec<String>, &[u8]), String> {
     let is_end = |byte: &u8| matches!(byte, b'\n' | b'\r');
     let first = bytes.iter().position(is_end).filter(|&end| bytes[..end].trim_ascii() == b"ply");
@@ -67,7 +67,7 @@ fn head(bytes: &[u8]) -> Result<(Vec<String>, &[u8]), String> {
         if line.trim_ascii_start().split(u8::is_ascii_whitespace).next() == Some(b"end_header") {
             return Ok((lines, rest));
         }
-        // What comments say may be of any encoding.
+        // Comments may have any encoding.
         lines.push(String::from_utf8_lossy(line).trim().to_string());
     }
 }
@@ -110,7 +110,7 @@ fn parse_header(lines: &[String]) -> Result<(Format, Vec<Element>), String> {
     Ok((format.ok_or("the .ply header names no format")?, elements))
 }
 
-/// A vertex without one of x, y, z would lie at 0.
+/// A vertex without one of x, y, z would get 0 for it.
 fn check_coordinates(elements: &[Element]) -> Result<(), String> {
     let vertex =
         elements.iter().find(|element| element.name == "vertex").ok_or("the .ply file has no vertices")?;
@@ -125,7 +125,7 @@ fn number_of(name: &str) -> Option<Number> {
     NAMES.iter().find(|(names, _)| names.contains(&name)).map(|(_, number)| *number)
 }
 
-/// Types by the names that a header gives them; the first is what we write.
+/// Types by their names in headers; the first name is the one that we write.
 pub(in crate::io) const NAMES: [([&str; 2], Number); 8] = [
     (["char", "int8"], Number::I8),
     (["uchar", "uint8"], Number::U8),

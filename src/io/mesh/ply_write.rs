@@ -6,14 +6,14 @@ use super::ply::{NAMES, POSITIONS};
 use crate::geometry::mesh::attributes::{MeshArray, Number, On};
 use crate::geometry::{TriMesh, Uvs, Vec3};
 
-/// What a mesh carries into a file besides its positions.
+/// The data that a mesh carries into a file besides its positions.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Carried<'a> {
     /// Velocities (m/s), one a vertex, as vx, vy, vz; or none.
     pub velocities: &'a [Vec3],
-    /// Texture coordinates: s and t of the vertices, or where there are seams a list texcoord of the faces.
+    /// Texture coordinates: s and t of the vertices or, if there are seams, a list texcoord of the faces.
     pub uvs: Option<&'a Uvs>,
-    /// Other arrays, of corners three for each triangle; names that others have are left out.
+    /// Other arrays (those of corners have three values for each triangle); arrays whose names are taken are omitted.
     pub arrays: &'a [&'a MeshArray],
 }
 
@@ -78,7 +78,7 @@ pub(in crate::io) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carrie
     Ok(())
 }
 
-/// The arrays of a kind, without those whose names are taken.
+/// The arrays of a kind, except those whose names are taken.
 fn arrays<'a>(carried: &Carried<'a>, on: On, taken: &[&str]) -> Vec<&'a MeshArray> {
     let mut out: Vec<&MeshArray> = Vec::new();
     for array in carried.arrays.iter().filter(|array| array.on == on) {

@@ -1,4 +1,4 @@
-//! STL, binary and text: triangles whose corners are joined where they have the same position.
+//! STL, binary and text: triangles whose corners are joined if they have the same position.
 
 use std::collections::HashMap;
 use std::io::Write;
@@ -7,14 +7,14 @@ use super::stl_text;
 use crate::geometry::{PolygonMesh, TriMesh, Vec3};
 use crate::io::files::{source, text};
 
-/// Triangles between two looks at whether to stop.
+/// Triangles between two checks of the stop flag.
 const PIECE: usize = 1 << 14;
-/// Bytes of a binary file before its triangles, of each of them, and of the normal that each begins with.
+/// Bytes of a binary file before its triangles, of each triangle, and of the normal at its start.
 pub(in crate::io) const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 const NORMAL: usize = 12;
 
-/// Reads the triangles of an STL file, less an origin that is subtracted in 64 bits; with what about the file should be said.
+/// Reads the triangles of an STL file, minus an origin that is subtracted in 64 bits; also returns a warning about the file, if any.
 pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMesh, Option<String>), String> {
     let count = bytes.get(80..HEADER).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
     let length = HEADER + count * TRIANGLE;
@@ -59,7 +59,7 @@ fn less(value: f32, origin: f64) -> f32 {
     if origin == 0.0 { value } else { (f64::from(value) - origin) as f32 }
 }
 
-/// A mesh whose corners are joined where they have the same position.
+/// A mesh whose corners are joined if they have the same position.
 #[derive(Default)]
 pub(in crate::io) struct Joined {
     pub mesh: PolygonMesh,
@@ -69,7 +69,7 @@ pub(in crate::io) struct Joined {
 impl Joined {
     /// The vertex at a position.
     pub fn corner(&mut self, position: [f32; 3]) -> u32 {
-        // Adding zero makes -0 and 0 the same.
+        // Adding zero turns -0 into 0.
         let position = position.map(|value| value + 0.0);
         let positions = &mut self.mesh.positions;
         *self.known.entry(position.map(f32::to_bits)).or_insert_with(|| {
@@ -116,7 +116,7 @@ mod tests {
         assert_eq!(mesh.positions.len(), 4);
         assert!(mesh.is_manifold() && (mesh.volume() - 1.0 / 6.0).abs() < 1e-7);
         (0..bytes.len()).for_each(|length| assert!(read(&bytes[..length]).is_err(), "{length}"));
-        // Some programs begin binary files with the word that text files begin with.
+        // Some programs begin binary files with the word with which text files begin.
         bytes[..6].copy_from_slice(b"solid ");
         assert_eq!(read(&bytes).unwrap(), mesh);
         assert!(read(&bytes[..200]).unwrap_err().contains("cut short"));

@@ -1,8 +1,8 @@
 //! Text STL: any number of solids, one after another.
 //!
-//! Words are told apart by blanks and line ends of any kind and in any case; names of solids may be of any encoding; from `#` on
-//! a line is a comment. Normals are passed over, whatever they are. A facet may have more than three corners. The last solid may
-//! lack its `endsolid`, of which the caller warns: the file may be cut.
+//! Words are separated by blanks and line ends of any kind and may have any case; names of solids may have any encoding; `#` starts a
+//! comment. Normals are ignored, whatever they are. A facet may have more than three corners. The last solid may lack its `endsolid`; the
+//! caller then warns that the file may be cut short.
 
 use super::stl::Joined;
 use crate::geometry::PolygonMesh;
@@ -10,14 +10,14 @@ use crate::io::files::source;
 use crate::io::files::text;
 use crate::io::files::text::Words;
 
-/// Facets between two looks at whether to stop.
+/// Facets between two checks of the stop flag.
 const PIECE: usize = 1 << 14;
 /// Words between `facet` and `outer`: `normal` and three numbers.
 const NORMAL: usize = 4;
 
-/// Whether a file, without its byte order mark, begins as text STL does.
+/// Whether a file, without its byte order mark, begins like a text STL.
 pub(in crate::io) fn is_one(bytes: &[u8]) -> bool {
-    // A binary file may begin with any word, but its count of triangles is followed by a zero byte, which no text has.
+    // A binary file may begin with any word, but its triangle count is followed by a zero byte, which no text contains.
     let head = &bytes[..bytes.len().min(super::stl::HEADER)];
     let first = Words::new(bytes).next();
     !head.contains(&0) && first.is_some_and(|word| is(word, "solid") || is(word, "facet"))
@@ -27,7 +27,7 @@ fn is(word: &[u8], keyword: &str) -> bool {
     word.eq_ignore_ascii_case(keyword.as_bytes())
 }
 
-/// Reads the facets of all solids, less an origin; with what about the file should be said.
+/// Reads the facets of all solids, minus an origin; also returns a warning about the file, if any.
 pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMesh, Option<String>), String> {
     let mut reader = Reader { words: Words::new(bytes), origin, joined: Joined::default(), facets: 0 };
     let mut is_open = false;
@@ -60,7 +60,7 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Passes over the name behind `solid` or `endsolid`: the rest of the line, but for a facet that begins in it.
+    /// Skips the name after `solid` or `endsolid`: the rest of the line, up to a facet that begins in it.
     fn name(&mut self) {
         let name = self.words.rest_of_line();
         let lower = name.to_ascii_lowercase();
@@ -70,7 +70,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Whether a word, or it and the next, are `end` and a keyword; the next is taken then.
+    /// Whether a word, alone or with the next, is `end` and a keyword; the next word is then consumed.
     fn ends(&mut self, word: &[u8], keyword: &str) -> bool {
         let is_next = |next: &[u8]| is(next, keyword);
         if is(word, "end") && self.words.peek().is_some_and(is_next) {
@@ -89,7 +89,7 @@ impl<'a> Reader<'a> {
         format!("line {}: \"{}\" where {wanted} must stand", self.words.line, text::shown(word))
     }
 
-    /// Reads a facet behind its first word.
+    /// Reads the rest of a facet after its first word.
     fn facet(&mut self) -> Result<(), String> {
         let mut word = self.next()?;
         for _ in 0..NORMAL {
@@ -147,5 +147,5 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// How a facet begins, in lower case.
+/// The start of a facet, in lower case.
 const FACET: &[u8] = b"facet normal";

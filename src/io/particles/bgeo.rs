@@ -1,8 +1,8 @@
-//! Classic Houdini .bgeo, version 5: what SPlisHSPlasH and Partio write, plain or in gzip. Houdini since version 12 writes another
-//! format under the same name, which is refused.
+//! Classic Houdini .bgeo, version 5: what SPlisHSPlasH and Partio write, plain or gzipped. Houdini since version 12 writes another format
+//! under the same name, which is refused.
 //!
-//! All numbers are big-endian. A head of counts, the attributes of points by name, size and type, then for each point x, y, z, w
-//! and its attributes, 4 bytes a number. w, which weighs control points of curves, is left out, as is what follows the points.
+//! All numbers are big-endian: a header of counts, the attributes of points by name, size and type, then for each point x, y, z, w and its
+//! attributes, 4 bytes a number. w, the weight of control points of curves, is ignored, as is everything after the points.
 
 use std::io::{ErrorKind, Read, Write};
 
@@ -15,15 +15,15 @@ use crate::geometry::points::{Points, Values};
 use crate::io::files::numbers::{Kind, Numbers, Order, most_inflated};
 use crate::io::files::source;
 
-/// What Houdini's own files are, and the way out.
+/// What Houdini's own files are, and what to do instead.
 pub(in crate::io) const HOUDINIS: &str = "is Houdini's own format since version 12 (JSON), not classic .bgeo: save it from Houdini as \
                                    .bhclassic (which is classic .bgeo), as .ply, or as .vdb with VDB Points";
 
-/// Attributes and numbers of one that a file may have; more is damage.
+/// Maximum number of attributes, and of numbers in one; more means damage.
 const MOST: u32 = 1 << 12;
-/// Texts that an attribute's list may have; more is damage.
+/// Maximum number of texts in an attribute's list; more means damage.
 const MOST_TEXTS: u32 = 1 << 20;
-/// Bytes of points that are read at once.
+/// Bytes of points that are read at a time.
 const PIECE: usize = 1 << 20;
 /// Bytes of a number.
 const WORD: usize = 4;
@@ -32,9 +32,9 @@ const WORD: usize = 4;
 struct Field {
     name: String,
     kind: Kind,
-    /// Numbers of a point.
+    /// Numbers per point.
     size: usize,
-    /// What is read of it; nothing of texts.
+    /// The numbers read; none for texts.
     numbers: Option<Numbers>,
 }
 
@@ -47,7 +47,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
     let mut fields =
         (0..head.attributes).map(|_| Field::read(&mut *reader)).collect::<Result<Vec<_>, _>>()?;
     let row = WORD * (4 + fields.iter().map(|field| field.size).sum::<usize>());
-    // Nothing is allocated for a damaged count.
+    // A damaged count must not cause an allocation.
     let room = if is_packed { most_inflated(bytes.len()) } else { bytes.len() as u64 };
     if (head.points as u64).saturating_mul(row as u64) > room {
         let (points, bytes) = (head.points, bytes.len());
@@ -93,7 +93,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
     Ok(found)
 }
 
-/// The checksum behind the last byte tells a whole file from a cut or damaged one.
+/// The checksum after the last byte shows whether a file is complete and undamaged.
 fn read_to_the_end(reader: &mut dyn Read) -> Result<(), String> {
     let mut rest = vec![0; PIECE];
     loop {
@@ -155,7 +155,7 @@ impl Field {
             return Err(format!("the file is damaged: attribute \"{name}\" has {size} components"));
         }
         let kind = match number {
-            // Floats, and vectors, which turn with what they belong to.
+            // Floats, and vectors, which rotate with their owner.
             0 | 5 => Some(Kind::F32),
             1 => Some(Kind::I32),
             // Indices into a list of texts.
@@ -196,7 +196,7 @@ fn text(reader: &mut dyn Read) -> Result<String, String> {
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// Whether the format holds these points.
+/// Checks that the format can hold these points.
 ///
 /// # Errors
 /// 64-bit integers that are too large; too many points or attributes.
@@ -220,7 +220,7 @@ pub(in crate::io) fn check(points: &Points) -> Result<(), String> {
 
 /// Writes points that [`check`] accepts, in gzip.
 pub(in crate::io) fn write(out: &mut dyn Write, points: &Points) -> std::io::Result<()> {
-    // No time and no name in its head: the same points give the same bytes.
+    // No time and no name in the gzip header: the same points give the same bytes.
     let mut out = GzEncoder::new(out, Compression::fast());
     let mut head = b"BgeoV".to_vec();
     let [count, attributes] = [points.count(), points.attributes.len()].map(|count| count as u32);
@@ -258,7 +258,7 @@ pub(in crate::io) fn write(out: &mut dyn Write, points: &Points) -> std::io::Res
         }
         out.write_all(&row)?;
     }
-    // An empty block of further data.
+    // An empty block of additional data.
     out.write_all(&[0x00, 0xff])?;
     out.finish().map(drop)
 }

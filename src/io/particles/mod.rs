@@ -9,10 +9,10 @@
 //! | .xyz | text with x, y and z in the first three columns, or little-endian 32-bit floats |
 //! | .ply | vertices: see [`ply`] |
 //!
-//! Attributes keep the names of the file. Floats become 32-bit ones, positions keep 64 bits. Integers of up to 32 bits with a sign become
-//! 32-bit ones, longer ones 64-bit ones. As in .ply, `id` becomes 64-bit integers, `active` and `trapped` `bool`, and a value that all
-//! points share is one. Attributes of other than one or three components, texts, and those named `P` or nothing, are named in a
-//! warning and left out.
+//! Attributes keep the names of the file. Floats become 32-bit, positions stay 64-bit. Signed integers of up to 32 bits become 32-bit,
+//! longer ones 64-bit. As in .ply, `id` becomes 64-bit integers, `active` and `trapped` become `bool`, and a value that all points share is
+//! stored once. Attributes with a number of components other than one or three, texts, and attributes named `P` or without a name are named
+//! in a warning and left out.
 
 mod bgeo;
 pub mod ply;
@@ -31,19 +31,19 @@ use crate::geometry::DVec3;
 use crate::geometry::mesh::spacing;
 use crate::geometry::points::{Attribute, Column, Points, Values};
 
-/// Extensions of the files that are read.
+/// Extensions of the files that can be read.
 pub const READ: [&str; 7] = ["bgeo", "bgeo.gz", "bhclassic", "ply", "vtk", "vtu", "xyz"];
-/// Extensions of the files that are written.
+/// Extensions of the files that can be written.
 pub const WRITTEN: [&str; 5] = ["bgeo", "bgeo.gz", "bhclassic", "ply", "xyz"];
 
-/// Points of a file, and whether it says their voxel size.
+/// Points of a file, and their voxel size if the file states it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cloud {
     /// Positions (m).
     pub positions: Vec<DVec3>,
     /// Attributes.
     pub attributes: Vec<Attribute>,
-    /// Edge of a voxel (m), if the file says it.
+    /// Edge of a voxel (m), if the file states it.
     pub voxel_size: Option<f64>,
 }
 
@@ -53,10 +53,10 @@ impl Cloud {
         self.attributes.iter().find(|attribute| attribute.name == name).map(|attribute| &attribute.values)
     }
 
-    /// Leaves out the particles that are not to be kept.
+    /// Removes the particles that are not to be kept.
     ///
     /// # Panics
-    /// Unless there is one flag for each.
+    /// Unless there is one flag for each particle.
     pub fn retain(&mut self, kept: &[bool]) {
         assert_eq!(kept.len(), self.positions.len(), "one flag for each particle");
         let order: Vec<u32> = (0..).zip(kept).filter(|(_, kept)| **kept).map(|(n, _)| n).collect();
@@ -64,10 +64,10 @@ impl Cloud {
         self.attributes.iter_mut().for_each(|attribute| attribute.values.reorder(&order));
     }
 
-    /// The points, in voxels of the file's own size, unless another is given (m).
+    /// The points, in voxels of the given size (m), by default the file's own.
     ///
     /// # Errors
-    /// No size, or positions that it does not fit: see [`Points::at`]; attributes that [`Points::validate`] refuses.
+    /// No size, or positions out of its range: see [`Points::at`]; attributes that [`Points::validate`] refuses.
     pub fn into_points(self, voxel_size: Option<f64>) -> Result<Points> {
         let unknown = || Error::argument("the file does not say how large the voxels of its points are");
         let size = voxel_size.or(self.voxel_size).ok_or_else(unknown)?;
@@ -87,7 +87,7 @@ impl From<Points> for Cloud {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Format {
     Bgeo,
-    /// Houdini's own, packed.
+    /// Houdini's own format, compressed.
     BgeoSc,
     Ply,
     Vtk,
@@ -110,17 +110,17 @@ fn format(path: &Path) -> Option<Format> {
     endings.into_iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, format)| format)
 }
 
-/// Whether a file's name is one of particles: those of [`READ`], and .bgeo.sc, which [`read`] refuses with advice.
+/// Whether a file's name is that of a particle file: those of [`READ`], and .bgeo.sc, which [`read`] refuses with advice.
 pub fn is_named(path: &Path) -> bool {
     format(path).is_some()
 }
 
-/// What to do about a file of this name that no reader takes; none for other names.
+/// Advice about a file of this name that no reader accepts; none for other names.
 pub fn advice(path: &Path) -> Option<&'static str> {
     (format(path) == Some(Format::BgeoSc)).then_some(bgeo::HOUDINIS)
 }
 
-/// Whether [`write()`] takes a file of this name.
+/// Whether [`write()`] accepts a file of this name.
 pub fn is_written(path: &Path) -> bool {
     matches!(format(path), Some(Format::Bgeo | Format::Ply | Format::Xyz))
 }
@@ -128,8 +128,8 @@ pub fn is_written(path: &Path) -> bool {
 /// Reads the particles of a file, in the file's order and its units.
 ///
 /// # Errors
-/// A missing, empty, cut or malformed file; a position that is not finite (the particle is named, counted from 1); an integer that its
-/// type does not hold; Houdini's own .bgeo.
+/// A file that is missing, empty, cut short or malformed; a position that is not finite (the particle is named, counted from 1); an integer
+/// that is out of its type's range; Houdini's own .bgeo.
 pub fn read(path: &Path) -> Result<Cloud> {
     parse(path, &source::read(path)?)
 }
@@ -164,12 +164,11 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Cloud> {
     Ok(cloud)
 }
 
-/// Writes points, whole or not at all: .bgeo and .bhclassic as classic version 5 in gzip, with 32-bit positions and integers; .xyz as
-/// little-endian 32-bit floats, without attributes, which a warning names; .ply as [`ply`] does, with the voxel size if
-/// `keeps_voxels`.
+/// Writes points, whole or not at all: .bgeo and .bhclassic as classic version 5, gzipped, with 32-bit positions and integers; .xyz as
+/// little-endian 32-bit floats, without attributes, which a warning names; .ply as [`ply`] does, with the voxel size if `keeps_voxels`.
 ///
 /// # Errors
-/// Another extension; integers that the format does not hold; what the operating system reports.
+/// Another extension; integers that the format cannot hold; what the operating system reports.
 pub fn write(path: &Path, points: &Points, keeps_voxels: bool) -> Result<()> {
     match format(path) {
         Some(Format::Ply) if keeps_voxels => ply::write(path, points),
@@ -196,7 +195,7 @@ fn listed(extensions: &[&str]) -> String {
     extensions.iter().map(|extension| format!(".{extension}")).collect::<Vec<_>>().join(", ")
 }
 
-/// Rounding of a position (m) that is worth a warning.
+/// Rounding of a position (m) that causes a warning.
 const MOST_MOVED: f64 = 1e-3;
 
 fn warn_of_rounding(path: &Path, points: &Points) {
@@ -207,17 +206,17 @@ fn warn_of_rounding(path: &Path, points: &Points) {
     }
 }
 
-/// The particles of a file as a reader finds them.
+/// The particles of a file, as a reader returns them.
 #[derive(Debug)]
 pub(super) struct Found {
     positions: Vec<DVec3>,
     attributes: Vec<Attribute>,
-    /// Attributes that no [`Values`] hold.
+    /// Attributes that no [`Values`] can hold.
     left_out: Vec<String>,
 }
 
 impl Found {
-    /// Positions in groups of three numbers; a rest is left out.
+    /// Positions, three numbers each; an incomplete last one is ignored.
     pub fn new(numbers: Numbers) -> Self {
         let numbers = numbers.into_reals();
         let positions = numbers
@@ -227,15 +226,15 @@ impl Found {
         Self { positions, attributes: Vec::new(), left_out: Vec::new() }
     }
 
-    /// How many particles there are.
+    /// Number of particles.
     pub fn count(&self) -> usize {
         self.positions.len()
     }
 
-    /// Adds an attribute of one value, or so many components, for each particle.
+    /// Adds an attribute with one value, or a fixed number of components, for each particle.
     ///
     /// # Errors
-    /// Another count of values; `id` that is no whole number.
+    /// Another number of values; an `id` that is not an integer.
     pub fn add(
         &mut self,
         name: &str,
@@ -279,7 +278,7 @@ impl Found {
         Ok(())
     }
 
-    /// Notes an attribute that the particles are without.
+    /// Records an attribute that was left out.
     pub fn leave_out(&mut self, name: &str) {
         self.left_out.push(format!("\"{name}\""));
     }
@@ -301,7 +300,7 @@ pub(super) fn whole(name: &str, column: &[f64]) -> std::result::Result<Vec<i64>,
     column.iter().enumerate().map(exact).collect()
 }
 
-/// One value where all have the same key.
+/// A single value if all have the same key.
 pub(super) fn shared<T: Copy, K: PartialEq>(values: Vec<T>, key: impl Fn(&T) -> K) -> Column<T> {
     match values.first() {
         Some(first) if values.len() > 1 && values.iter().all(|value| key(value) == key(first)) => {

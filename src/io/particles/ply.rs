@@ -1,8 +1,8 @@
 //! Points as Stanford PLY: vertices without faces.
 //!
-//! An attribute of vectors takes three properties, its name with x, y and z behind it (`v`: vx, vy, vz; `rest`: restx ...).
-//! `bool` becomes `uchar`. PLY has no 64-bit integers: they become `int` where all of them fit, else `double`. A comment
-//! keeps the voxel size. Positions are `float`, or `double` where 32 bits would move points by over a thousandth of a voxel.
+//! A vector attribute takes three properties, its name with x, y and z appended (`v`: vx, vy, vz; `rest`: restx ...). `bool` becomes
+//! `uchar`. PLY has no 64-bit integers: they become `int` if all of them fit, else `double`. A comment holds the voxel size. Positions are
+//! `float`, or `double` if 32 bits would move points by over a thousandth of a voxel.
 
 use std::io::Write;
 use std::path::Path;
@@ -16,13 +16,13 @@ use crate::io::files::{atomic, source};
 use crate::io::mesh::ply;
 use crate::io::mesh::ply::Element;
 
-/// The comment before the voxel size (m).
+/// Prefix of the comment with the voxel size (m).
 const VOXEL: &str = "frazil voxel_size";
-/// How far rounding may move a point (voxels) before its position is written in 64 bits.
+/// Maximum movement of a point by rounding (voxels) for which its position is still written in 32 bits.
 const MOST_MOVED: f64 = 1e-3;
 
-/// Whether a .ply file has vertices and no faces. One that has neither holds a mesh where it says that there are no faces, and points
-/// where it says nothing of faces.
+/// Whether a .ply file has vertices and no faces. A file that has neither holds a mesh if it declares zero faces, and points if it does not
+/// declare faces.
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -35,9 +35,9 @@ pub fn holds_points(path: &Path) -> Result<bool> {
     }))
 }
 
-/// Reads the vertices of a .ply file as points. `id` becomes 64-bit integers, `active` and `trapped` `bool`; other integers of up to
-/// 32 bits become 32-bit ones, floats 32-bit ones, and three properties that end in x, y and z vectors. Values that are the
-/// same at all points become one. Lists are left out.
+/// Reads the vertices of a .ply file as points. `id` becomes 64-bit integers, `active` and `trapped` become `bool`; other integers of up to
+/// 32 bits become 32-bit ones, floats become 32-bit ones, and three properties that end in x, y and z become vectors. A value that is the
+/// same at all points is stored once. Lists are ignored.
 ///
 /// # Errors
 /// A missing, cut or malformed file; numbers that are not finite, or too large for their type.
@@ -54,7 +54,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> std::result::Result<Cloud, String> {
     if at > 0 {
         return Err("the .ply file has something before its vertices".into());
     }
-    // A count that is damaged must not allocate more than the file could fill.
+    // A damaged count must not allocate more than the file could fill.
     let names: Vec<String> = vertices.properties.iter().map(|property| property.name.clone()).collect();
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
     for row in 0..vertices.count {
@@ -86,7 +86,7 @@ fn attributes(
         if property.list.is_some() || ["x", "y", "z"].contains(&name.as_str()) {
             continue;
         }
-        // The first of the three stands for all.
+        // The first of the three represents the vector.
         if ['y', 'z'].into_iter().any(|end| of_vector(end).is_some()) {
             continue;
         }
@@ -128,7 +128,7 @@ pub fn write(path: &Path, points: &Points) -> Result<()> {
     atomic::write(path, |out| write_to(out, points, &plain, true))
 }
 
-/// As [`write()`], without the voxel size, for points that have voxels only because [`Points`] do.
+/// As [`write()`], without the voxel size: for points that have voxels only because [`Points`] require them.
 ///
 /// # Errors
 /// As [`write()`].
@@ -152,7 +152,7 @@ fn all_plain(points: &Points) -> std::result::Result<Vec<Plain<'_>>, String> {
     points.attributes.iter().map(plain).collect()
 }
 
-/// An attribute as PLY holds it.
+/// An attribute in the form in which PLY holds it.
 struct Plain<'a> {
     /// Type and names of its properties.
     kind: &'static str,
@@ -181,7 +181,7 @@ fn plain(attribute: &Attribute) -> std::result::Result<Plain<'_>, String> {
         Values::Vector(_) => ["x", "y", "z"].map(|axis| format!("{name}{axis}")).to_vec(),
         _ => vec![name.clone()],
     };
-    // A header's words are separated by spaces.
+    // The words of a header are separated by spaces.
     match names.iter().find(|name| name.contains(char::is_whitespace)) {
         Some(name) => Err(format!("the name \"{name}\" has a space, which .ply cannot hold")),
         None => Ok(Plain { kind, names, values }),

@@ -1,7 +1,7 @@
-//! Legacy .vtk, versions 1.0 to 5.1, as text and in (big-endian) binary: the points of POLYDATA and UNSTRUCTURED_GRID with their
-//! data. Cells are skipped.
+//! Legacy .vtk, versions 1.0 to 5.1, as text or (big-endian) binary: the points of POLYDATA and UNSTRUCTURED_GRID with their data. Cells
+//! are skipped.
 //!
-//! The file is a sequence of lines, each with a keyword; arrays of numbers follow some of them.
+//! The file is a sequence of keyword lines; some are followed by arrays of numbers.
 
 use std::borrow::Cow;
 
@@ -9,21 +9,21 @@ use super::Found;
 use crate::io::files::numbers::{Kind, Numbers, Order};
 use crate::io::files::{source, text};
 
-/// Bytes that a line of keywords may have: one that is longer is no such line.
+/// Maximum length (bytes) of a keyword line: a longer line is not one.
 const LONGEST: usize = 1 << 12;
-/// Words between two looks at whether to stop.
+/// Words between two checks of the stop flag.
 const PIECE: usize = 1 << 16;
 
 /// The type of an array.
 #[derive(Clone, Copy, PartialEq)]
 enum Type {
     Number(Kind),
-    /// Eight to a byte in binary.
+    /// Packed eight to a byte in binary files.
     Bit,
     Text,
 }
 
-/// What arrays belong to.
+/// Owner of an array.
 #[derive(Clone, Copy, PartialEq)]
 enum Owner {
     File,
@@ -69,7 +69,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
                 let arrays = arrays.parse().map_err(|_| wrong())?;
                 reader.field(arrays, found.as_mut().filter(|_| owner == Owner::Points))?;
             }
-            // A table of colours; the line of the same name that names one comes with SCALARS.
+            // A colour table; the line of the same name that refers to one comes after SCALARS.
             ("lookup_table", [_, colours]) => {
                 let bytes = colours.parse::<usize>().ok().and_then(|colours| colours.checked_mul(4));
                 reader.skip(reader.colours(), bytes.ok_or_else(wrong)?)?;
@@ -90,7 +90,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
     found.ok_or_else(|| "the file has no points: it is cut short, or of another kind".into())
 }
 
-/// A file whose lines end with carriage returns alone, if it is text, with line feeds.
+/// Replaces carriage returns by line feeds, if the file is text and its lines end with carriage returns alone.
 fn with_line_feeds(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
     let end = bytes.iter().position(|byte| matches!(byte, b'\n' | b'\r')).unwrap_or(0);
     if bytes.get(end) != Some(&b'\r') || bytes.get(end + 1) == Some(&b'\n') {
@@ -116,7 +116,7 @@ fn check_dataset(kind: &str) -> Result<(), String> {
     }
 }
 
-/// An array that a line announces.
+/// An array announced by a line.
 struct Array {
     name: String,
     kind: Type,
@@ -124,7 +124,7 @@ struct Array {
 }
 
 impl Array {
-    /// Of a line other than those of FIELD; `rest` is what stands behind the keyword.
+    /// From a line other than those of FIELD; `rest` is what follows the keyword.
     fn of_line(keyword: &str, rest: &[&str]) -> Option<Self> {
         let (name, kind, components) = match (keyword, rest) {
             ("scalars", [name, kind]) => (name, type_of(kind)?, 1),
@@ -150,7 +150,7 @@ fn type_of(word: &str) -> Option<Type> {
         "unsigned_char" | "vtktypeuint8" => Kind::U8,
         "short" | "vtktypeint16" => Kind::I16,
         "unsigned_short" | "vtktypeuint16" => Kind::U16,
-        // Files have identities of VTK's own type in 32 bits, whatever memory has.
+        // In files VTK's own identity type has 32 bits, whatever its size in memory.
         "int" | "vtkidtype" | "vtktypeint32" => Kind::I32,
         "unsigned_int" | "vtktypeuint32" => Kind::U32,
         "long" | "long_long" | "vtktypeint64" => Kind::I64,
@@ -161,7 +161,7 @@ fn type_of(word: &str) -> Option<Type> {
     }))
 }
 
-/// Names have % and two digits in the place of spaces and other letters.
+/// Names encode spaces and other characters as % and two digits.
 fn decoded(name: &str) -> String {
     let (bytes, mut out, mut at) = (name.as_bytes(), Vec::new(), 0);
     while at < bytes.len() {
@@ -189,12 +189,12 @@ struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
     is_binary: bool,
-    /// Of the last array, each of which may have a name.
+    /// Components of the last array, each of which may have a name.
     components: usize,
 }
 
 impl<'a> Reader<'a> {
-    /// Reads the three lines that every file begins with: version, title, encoding.
+    /// Reads the first three lines of every file: version, title, encoding.
     fn open(bytes: &'a [u8]) -> Result<Self, String> {
         if !bytes.starts_with(b"# vtk DataFile Version") {
             return Err("is not a legacy .vtk file".into());
@@ -215,7 +215,7 @@ impl<'a> Reader<'a> {
         &self.bytes[self.at..]
     }
 
-    /// The bytes until the next line end, which is skipped.
+    /// The bytes up to the next line end, which is skipped.
     fn raw_line(&mut self) -> &'a [u8] {
         let rest = self.rest();
         let length = rest.iter().position(|&byte| byte == b'\n').unwrap_or(rest.len());
@@ -231,14 +231,14 @@ impl<'a> Reader<'a> {
         self.at += skip;
         let line = self.raw_line();
         let text = String::from_utf8_lossy(&line[..line.len().min(LONGEST)]).trim().to_string();
-        // What is no space in ASCII may be one in Unicode.
+        // Some Unicode spaces are not ASCII spaces.
         if line.len() > LONGEST || text.is_empty() {
             return Err(format!("\"{}\" is not a line of a .vtk file", shown(&text)));
         }
         Ok(Some(text))
     }
 
-    /// As [`Self::line`], if it has the form that is looked for; otherwise nothing is read.
+    /// As [`Self::line`], if it has the expected form; otherwise nothing is consumed.
     fn line_if(&mut self, is_it: impl Fn(&[&str]) -> bool) -> Option<String> {
         let before = self.at;
         let line = self.line().ok().flatten();
@@ -254,12 +254,12 @@ impl<'a> Reader<'a> {
         self.line_if(|words| words.len() == 2 && words[0].eq_ignore_ascii_case("lookup_table"));
     }
 
-    /// Skips a block that ends with an empty line; names of components may be empty too.
+    /// Skips a block that ends with an empty line; component names may be empty too.
     fn skip_metadata(&mut self) {
         loop {
             match self.raw_line().trim_ascii() {
                 [] => return,
-                // A damaged count is no reason to look for lines behind the end.
+                // A damaged count must not make it search beyond the end.
                 b"COMPONENT_NAMES" => {
                     for _ in 0..self.components.min(self.rest().len()) {
                         self.raw_line();
@@ -270,12 +270,12 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The type of colours: bytes in binary, floats in text.
+    /// The type of colours: bytes in binary files, floats in text files.
     fn colours(&self) -> Type {
         Type::Number(if self.is_binary { Kind::U8 } else { Kind::F32 })
     }
 
-    /// Skips cells: since version 5 two arrays, with names and types, and before one.
+    /// Skips cells: two arrays with names and types since version 5, one before.
     fn skip_cells(&mut self, cells: usize, size: usize) -> Result<(), String> {
         let named = |name: &'static str| {
             move |words: &[&str]| words.len() == 2 && words[0] == name && type_of(words[1]).is_some()
@@ -291,7 +291,7 @@ impl<'a> Reader<'a> {
         self.skip(kind(&corners), size)
     }
 
-    /// Reads the arrays of a FIELD, those of points into `found`.
+    /// Reads the arrays of a FIELD; those of points go to `found`.
     fn field(&mut self, arrays: usize, mut found: Option<&mut Found>) -> Result<(), String> {
         for _ in 0..arrays {
             let line = self.line()?.ok_or("the .vtk file ends in a FIELD")?;
@@ -309,7 +309,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Reads an array of so many values into `found`, or skips it.
+    /// Reads an array of `values` values into `found`, or skips it.
     fn array(&mut self, array: &Array, values: usize, found: Option<&mut Found>) -> Result<(), String> {
         let Array { name, kind, components } = array;
         self.components = *components;
@@ -331,7 +331,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads so many numbers.
+    /// Reads `count` numbers.
     fn numbers(&mut self, kind: Type, count: usize) -> Result<Numbers, String> {
         let kind = match kind {
             Type::Number(kind) => kind,
@@ -357,7 +357,7 @@ impl<'a> Reader<'a> {
         Ok(Numbers::Whole((0..count).map(|n| i64::from(bytes[n / 8] >> (7 - n % 8) & 1)).collect()))
     }
 
-    /// Skips so many numbers, or texts.
+    /// Skips `count` numbers or texts.
     fn skip(&mut self, kind: Type, count: usize) -> Result<(), String> {
         match kind {
             Type::Text => (0..count).try_for_each(|_| self.skip_text()),
@@ -367,7 +367,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Skips a text: a line, or in binary its bytes behind their count, of which the two highest bits say how many bytes it takes.
+    /// Skips a text: a line or, in binary files, its bytes after a length whose two highest bits give the number of bytes that it occupies.
     fn skip_text(&mut self) -> Result<(), String> {
         let first = *self.rest().first().ok_or_else(cut)?;
         if !self.is_binary {
@@ -380,7 +380,7 @@ impl<'a> Reader<'a> {
         self.take(usize::try_from(length).ok()).map(drop)
     }
 
-    /// The next bytes, if there are so many.
+    /// The next bytes, if there are enough.
     fn take(&mut self, count: Option<usize>) -> Result<&'a [u8], String> {
         let taken = count.and_then(|count| self.rest().get(..count)).ok_or_else(cut)?;
         self.at += taken.len();

@@ -26,7 +26,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
     for (n, node) in children(grid, "Piece").enumerate() {
         let piece = Piece::read(&file, node)?;
         match &mut all {
-            // The arrays of a piece without points say nothing.
+            // The arrays of a piece without points do not matter.
             Some(_) if piece.count == 0 => {}
             Some(all) if all.count > 0 => {
                 all.append(piece)
@@ -44,7 +44,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
     Ok(found)
 }
 
-/// The XML of a file, and the appended data, which need not be text: those behind the underscore of AppendedData.
+/// Splits a file into its XML and the appended data, which need not be text: the bytes after the underscore of AppendedData.
 fn split(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, &[u8]), String> {
     let find = |what: &[u8], from: usize| {
         bytes[from..].windows(what.len()).position(|window| window == what).map(|at| from + at)
@@ -82,7 +82,7 @@ fn codec_of(root: Node<'_, '_>) -> Result<Codec, String> {
     Ok(Codec { order, head, inflate })
 }
 
-/// The appended data, as base64 or as they are.
+/// The appended data, and whether they are base64 or raw.
 fn appended_of<'a>(root: Node<'_, '_>, data: &'a [u8]) -> Result<Option<(bool, &'a [u8])>, String> {
     let Some(node) = child(root, "AppendedData") else { return Ok(None) };
     match node.attribute("encoding") {
@@ -102,7 +102,7 @@ fn child<'a, 'i>(node: Node<'a, 'i>, name: &'static str) -> Option<Node<'a, 'i>>
     children(node, name).next()
 }
 
-/// A number in an attribute; without the attribute one by default.
+/// A number in an attribute, or `otherwise` if the attribute is missing.
 fn number<T: FromStr>(node: Node<'_, '_>, name: &str, otherwise: Option<T>) -> Result<T, String> {
     match (node.attribute(name), otherwise) {
         (Some(text), _) => text.trim().parse().map_err(|_| format!("the .vtu file has {name}=\"{text}\"")),
@@ -111,7 +111,7 @@ fn number<T: FromStr>(node: Node<'_, '_>, name: &str, otherwise: Option<T>) -> R
     }
 }
 
-/// An array of one number, or so many components, for each point.
+/// An array with one number, or a fixed number of components, for each point.
 struct Array {
     name: String,
     kind: Kind,
@@ -152,7 +152,7 @@ impl Piece {
         Ok(Self { count, positions, arrays, left_out })
     }
 
-    /// Adds another piece; none where its arrays are others.
+    /// Appends another piece; none if its arrays differ.
     fn append(&mut self, other: Self) -> Option<()> {
         let is_alike =
             |(a, b): (&Array, &Array)| a.name == b.name && a.kind == b.kind && a.components == b.components;
@@ -171,7 +171,7 @@ impl Piece {
 }
 
 impl Array {
-    /// Reads an array of so many points; none for one that does not consist of numbers.
+    /// Reads an array for `count` points; none if it does not consist of numbers.
     fn read(file: &File<'_>, node: Node<'_, '_>, count: usize) -> Result<Option<Self>, String> {
         let name = node.attribute("Name").unwrap_or("").to_string();
         let kind = node.attribute("type").and_then(kind_of);

@@ -1,4 +1,4 @@
-//! The arrays of .vtu files: text, base64 and raw bytes, behind their lengths and compressed or not.
+//! The arrays of .vtu files: text, base64 or raw bytes, preceded by their lengths, compressed or not.
 
 use std::io::Read;
 
@@ -9,44 +9,44 @@ use flate2::read::ZlibDecoder;
 use crate::io::files::numbers::{Kind, Numbers, Order, most_inflated};
 use crate::io::files::source;
 
-/// Words between two looks at whether to stop.
+/// Words between two checks of the stop flag.
 const PIECE: usize = 1 << 16;
 
-/// Inflates bytes that become exactly so many.
+/// Decompresses bytes to exactly the given size.
 pub(in crate::io) type Inflate = fn(&[u8], usize) -> Option<Vec<u8>>;
 
-/// How all arrays of a file are packed.
+/// How all arrays of a file are encoded.
 pub(in crate::io) struct Codec {
     pub order: Order,
-    /// Type of lengths.
+    /// Type of the lengths.
     pub head: Kind,
     pub inflate: Option<Inflate>,
 }
 
-/// A file whose XML is read.
+/// A file whose XML has been read.
 pub(in crate::io) struct File<'a> {
     pub codec: Codec,
-    /// Whether the appended data are base64, and these.
+    /// The appended data, and whether they are base64.
     pub appended: Option<(bool, &'a [u8])>,
-    /// Bytes of the whole.
+    /// Length of the whole file (bytes).
     pub length: usize,
 }
 
-/// Inflates zlib data.
+/// Decompresses zlib data.
 pub(in crate::io) fn zlib(bytes: &[u8], size: usize) -> Option<Vec<u8>> {
     let mut out = Vec::new();
-    // One byte more than wanted shows that there are too many.
+    // Reading one byte more than wanted detects excess data.
     ZlibDecoder::new(bytes).take(size as u64 + 1).read_to_end(&mut out).ok()?;
     (out.len() == size).then_some(out)
 }
 
-/// Inflates an LZ4 block.
+/// Decompresses an LZ4 block.
 pub(in crate::io) fn lz4(bytes: &[u8], size: usize) -> Option<Vec<u8>> {
     lz4_flex::block::decompress(bytes, size).ok().filter(|out| out.len() == size)
 }
 
 impl<'a> File<'a> {
-    /// Reads an array of so many numbers that are written as text.
+    /// Reads an array of `count` numbers written as text.
     pub fn words<'w>(
         &self,
         kind: Kind,
@@ -63,20 +63,20 @@ impl<'a> File<'a> {
         if out.count() == count { Ok(out) } else { Err(other_size(out.count(), "numbers", count)) }
     }
 
-    /// The appended data from an offset on.
+    /// The appended data from an offset onward.
     pub fn appended(&self, offset: usize) -> Result<Stream<'a>, String> {
         let (is_base64, data) = self.appended.ok_or("is appended, and the file has no appended data")?;
         let data = data.get(offset..).ok_or("begins behind the end of the file")?;
         Ok(if is_base64 { Stream::base64(data) } else { Stream::raw(data) })
     }
 
-    /// Reads an array of so many numbers, which its length precedes.
+    /// Reads an array of `count` numbers that is preceded by its length.
     pub fn array(&self, kind: Kind, count: usize, mut stream: Stream<'_>) -> Result<Numbers, String> {
         let size = count.checked_mul(kind.size()).filter(|&size| size as u64 <= most_inflated(self.length));
         let size = size.ok_or_else(|| format!("is too large for the file: it says {count} numbers"))?;
         let mut out = kind.none();
         if size == 0 {
-            // Not every writer gives these a length.
+            // Some writers give empty arrays no length.
             return Ok(out);
         }
         let Codec { order, inflate, .. } = self.codec;
@@ -93,10 +93,10 @@ impl<'a> File<'a> {
         Ok(out)
     }
 
-    /// The bytes of compressed blocks.
+    /// The decompressed bytes of all blocks.
     fn inflated(&self, inflate: Inflate, size: usize, stream: &mut Stream<'_>) -> Result<Vec<u8>, String> {
         let [blocks, whole, last] = [self.head(stream)?, self.head(stream)?, self.head(stream)?];
-        // The last block is shorter, unless its size is zero.
+        // The last block is shorter, unless its size is given as zero.
         let of_block = |block: usize| if block + 1 == blocks && last > 0 { last } else { whole };
         let said = blocks
             .checked_sub(1)
@@ -114,7 +114,7 @@ impl<'a> File<'a> {
                 return Err("stopped".into());
             }
             let (packed, size) = (stream.take(packed)?, of_block(block));
-            // Nothing is allocated for a size that the bytes cannot become.
+            // A size that the bytes cannot decompress to must not cause an allocation.
             let inflated = Some(size).filter(|&size| size as u64 <= most_inflated(packed.len()));
             let inflated = inflated.and_then(|size| inflate(&packed, size));
             out.extend(inflated.ok_or_else(|| format!("is damaged in its compressed block {}", block + 1))?);
@@ -141,25 +141,25 @@ fn other_size(said: usize, what: &str, size: usize) -> String {
     format!("has {said} {what}, not {size}")
 }
 
-/// Bytes that are taken one after another.
+/// Bytes that are taken in order.
 pub(in crate::io) struct Stream<'a> {
     rest: &'a [u8],
-    /// Decoded and not yet taken; none of raw bytes.
+    /// Bytes decoded but not yet taken; none for raw bytes.
     ready: Option<Vec<u8>>,
 }
 
 impl<'a> Stream<'a> {
-    /// Of base64: several pieces, each with its own padding, or one.
+    /// From base64: one piece, or several with their own padding.
     pub fn base64(text: &'a [u8]) -> Self {
         Self { rest: text, ready: Some(Vec::new()) }
     }
 
-    /// Of bytes as they are.
+    /// From raw bytes.
     pub fn raw(bytes: &'a [u8]) -> Self {
         Self { rest: bytes, ready: None }
     }
 
-    /// Bytes that can be taken at most.
+    /// Upper bound on the bytes that can be taken.
     fn room(&self) -> usize {
         self.rest.len() + self.ready.as_ref().map_or(0, Vec::len)
     }
@@ -172,10 +172,10 @@ impl<'a> Stream<'a> {
             return Ok(taken.to_vec());
         };
         while ready.len() < count {
-            // Three bytes are four letters.
+            // Three bytes are four characters.
             let letters = (count - ready.len()).div_ceil(3).checked_mul(4);
             let text = letters.and_then(|letters| self.rest.get(..letters)).ok_or_else(cut)?;
-            // Lengths may be a piece of their own: it ends with its padding.
+            // Lengths may be encoded as a piece of their own, which ends with its padding.
             let padding = text.iter().position(|&letter| letter == b'=');
             let end = padding.map_or(text.len(), |at| (at / 4 + 1) * 4);
             let bytes = STANDARD.decode(&text[..end]).ok().filter(|bytes| !bytes.is_empty());

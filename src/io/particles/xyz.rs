@@ -1,10 +1,9 @@
-//! .xyz: positions and nothing else, as text or in binary.
+//! .xyz: positions only, as text or binary.
 //!
-//! A file in which every byte is a tab, a line end or printable ASCII, but for those of comments, is text; any other is binary.
-//! Text has a particle a line: three numbers and any further columns, which are left out; lines that are empty or begin with `#`
-//! are skipped. Columns stand between blanks, semicolons or commas. A comma within a word is a decimal comma where blanks or
-//! semicolons stand between three such words; where neither reading is certain the file is refused. Binary, as splashsurf has it, is
-//! three little-endian 32-bit floats a particle.
+//! A file is text if every byte outside comments is a tab, a line end or printable ASCII; any other file is binary. Text has one particle
+//! per line: three numbers, then optional columns that are ignored; empty lines and lines that begin with `#` are skipped. Columns are
+//! separated by blanks, semicolons or commas. A comma within a word is a decimal comma if blanks or semicolons separate three such words;
+//! if neither reading is certain, the file is refused. Binary, as splashsurf writes it, has three little-endian 32-bit floats per particle.
 
 use std::io::Write;
 
@@ -13,9 +12,9 @@ use crate::geometry::points::Points;
 use crate::io::files::numbers::{Kind, Numbers, Order};
 use crate::io::files::{source, text};
 
-/// Bytes of a particle in binary.
+/// Bytes per particle in binary files.
 const ROW: usize = 12;
-/// Lines between two looks at whether to stop.
+/// Lines between two checks of the stop flag.
 const PIECE: usize = 1 << 14;
 
 /// Reads the particles of a file.
@@ -36,7 +35,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
     Ok(Found::new(numbers))
 }
 
-/// Whether every other byte is 0, as in UTF-16, behind what may be its mark or the first bytes of a float.
+/// Whether every other byte is 0, as in UTF-16, after what may be its mark or the first bytes of a float.
 fn is_wide(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(64)];
     [2, 3].into_iter().any(|from| head.len() > from && head[from..].iter().step_by(2).all(|&byte| byte == 0))
@@ -53,7 +52,7 @@ fn is_text(bytes: &[u8]) -> bool {
 
 fn parse_text(bytes: &[u8]) -> Result<Found, String> {
     let mut numbers = Vec::new();
-    // Most files have no comma, and then nothing to be weighed.
+    // Most files have no comma, so there is nothing to decide.
     let mut commas = bytes.contains(&b',').then(Commas::default);
     let mut points = Vec::new();
     for (n, line) in text::lines(bytes) {
@@ -80,29 +79,29 @@ fn parse_text(bytes: &[u8]) -> Result<Found, String> {
     Ok(Found::new(Numbers::Real(numbers)))
 }
 
-/// What stands between blanks and semicolons.
+/// The columns of a line, separated by blanks and semicolons.
 fn columns(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     let is_between = |byte: &u8| byte.is_ascii_whitespace() || *byte == b';';
     line.split(is_between).filter(|column| !column.is_empty())
 }
 
-/// What the commas of a file have been found to be: the first line of each kind.
+/// What the commas of a file have turned out to be: the first line of each kind.
 #[derive(Default)]
 struct Commas {
-    /// Decimal commas.
+    /// With decimal commas.
     decimal: Option<usize>,
-    /// Decimal points, or commas that separate numbers without a blank.
+    /// With decimal points, or with commas that separate numbers without a blank.
     others: Option<usize>,
 }
 
 impl Commas {
-    /// Writes the words of a line to `out`, each with a blank behind it, and with decimal points.
+    /// Writes the words of a line to `out`, each followed by a blank, and with decimal points.
     fn read(&mut self, n: usize, line: &[u8], out: &mut Vec<u8>) -> Result<(), String> {
         let mut words: Vec<&[u8]> = Vec::new();
         for word in columns(line) {
             let word = word.strip_suffix(b",").unwrap_or(word);
             match word.strip_prefix(b",") {
-                // ",5" is a half to some.
+                // Some programs write a half as ",5".
                 Some(number) if !number.is_empty() && !number.contains(&b'.') => return Err(unclear(word)),
                 Some(number) => words.push(number),
                 None => words.push(word),
@@ -124,7 +123,7 @@ impl Commas {
                 out.push(b' ');
             });
         } else if !first.is_empty() {
-            // Commas of further columns are none of ours.
+            // Commas in further columns do not matter.
             if first.iter().any(has_point) {
                 self.others.get_or_insert(n);
             }
@@ -132,7 +131,7 @@ impl Commas {
         } else {
             let between: Vec<&[u8]> =
                 words.iter().flat_map(|word| word.split(|&byte| byte == b',')).collect();
-            // Digits that begin with 0 are those behind a decimal comma.
+            // Digits that begin with 0 come after a decimal comma.
             let is_share =
                 |word: &&&[u8]| word.len() > 1 && word.iter().all(u8::is_ascii_digit) && word[0] == b'0';
             if let Some(word) = between.iter().find(is_share) {
@@ -150,7 +149,7 @@ impl Commas {
     }
 }
 
-/// What is wrong with a comma that may be a decimal one, or stand between numbers or thousands.
+/// The message for a comma that may be a decimal comma, or separate numbers or thousands.
 fn unclear(word: &[u8]) -> String {
     format!(
         "\"{}\" may have a decimal comma, or commas between numbers or thousands: write decimal points, and blanks between numbers",
@@ -161,7 +160,7 @@ fn unclear(word: &[u8]) -> String {
 /// Writes the positions of points in binary.
 pub(in crate::io) fn write(out: &mut dyn Write, points: &Points) -> std::io::Result<()> {
     if points.count() == 0 {
-        // A file without a byte is one that was cut.
+        // An empty file would look as if it had been cut short.
         return out.write_all(b"# 0 particles\n");
     }
     for point in 0..points.count() {

@@ -23,7 +23,7 @@ pub fn write(path: &Path, content: &impl Serialize) -> Result<()> {
 /// The text of a file that holds a value.
 ///
 /// # Errors
-/// A value that JSON cannot hold.
+/// A value that JSON cannot represent.
 pub fn sealed(content: &impl Serialize) -> Result<String> {
     let content = serde_json::to_value(content).map_err(|error| Error::Internal(error.to_string()))?;
     let check = hash::of_bytes(content.to_string().as_bytes());
@@ -34,12 +34,12 @@ fn text_of(file: &Value) -> String {
     format!("{file:#}\n")
 }
 
-/// Placeholder of a stamp while it is computed.
+/// Placeholder for a stamp while it is computed.
 pub const UNSTAMPED: &str = "00000000000000000000000000000000";
 /// The text before a stamp.
 const BEFORE_STAMP: &str = "\"check\": \"";
 
-/// Puts the hash of a text into it, in place of [`UNSTAMPED`] as the value of its key \"check\".
+/// Replaces [`UNSTAMPED`], the value of the key \"check\", by the hash of the text.
 pub fn stamp(text: &str) -> String {
     let hash = hash::of_bytes(text.as_bytes());
     text.replacen(&format!("{BEFORE_STAMP}{UNSTAMPED}"), &format!("{BEFORE_STAMP}{hash}"), 1)
@@ -54,7 +54,7 @@ pub fn is_stamped(bytes: &[u8]) -> bool {
     hash::of_bytes(unstamped.as_bytes()) == hash
 }
 
-/// Reads a value; none when there is no such file.
+/// Reads a value; none if there is no such file.
 ///
 /// # Errors
 /// A file that was cut short or changed, or that a newer version wrote.
@@ -84,7 +84,7 @@ pub fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
     if file["check"].as_str() != Some(&hash::of_bytes(content.to_string().as_bytes())) {
         return Err(damaged());
     }
-    // What this version wrote reads back to the letter.
+    // What this version wrote must read back byte for byte.
     if file["format"].as_u64() == Some(FORMAT) && text_of(&file).as_bytes() != bytes {
         return Err(damaged());
     }

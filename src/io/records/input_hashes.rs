@@ -1,4 +1,4 @@
-//! Hashes of a run's input files when they were read: each must stay the same until the run ends.
+//! Hashes of a run's input files when they were read: the files must not change until the run ends.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::sync::Mutex;
 use crate::error::{Error, Result};
 use crate::io::files::hash;
 
-/// Hashes of files by path, each of the bytes that were used first.
+/// Hashes of files by path, each of the bytes that were first used.
 #[derive(Default)]
 pub struct Seen(Mutex<HashMap<PathBuf, String>>);
 
@@ -22,7 +22,7 @@ impl Seen {
         Ok(bytes)
     }
 
-    /// Records the hash of a file that was read in another way.
+    /// Records the hash of a file that was read by other means.
     ///
     /// # Errors
     /// Another hash than when this file was read before.
@@ -40,7 +40,7 @@ impl Seen {
         }
     }
 
-    /// The hash of a file: of the bytes that were used, or of those that will have to be.
+    /// The hash of a file: of the bytes that were used, or of its current bytes, which then must be used.
     ///
     /// # Errors
     /// What the operating system reports.

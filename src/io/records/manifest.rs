@@ -1,4 +1,4 @@
-//! Manifests: records of a frame's output, written after it. A frame is done when its manifest exists and matches.
+//! Manifests: records of a frame's output, written after it. A frame is done if its manifest exists and matches.
 
 use std::path::{Path, PathBuf};
 
@@ -11,11 +11,11 @@ use crate::io::files::hash;
 /// A file of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Written {
-    /// Where it is, from the output folder, with `/`.
+    /// Its path relative to the output folder, with `/`.
     pub path: String,
     /// Its length.
     pub bytes: u64,
-    /// Its content's hash.
+    /// Hash of its contents.
     pub hash: String,
 }
 
@@ -31,7 +31,7 @@ pub enum Keeps {
     State,
 }
 
-/// Whether a file is one of a shot's, with the content that its frame's record names; reads it.
+/// Whether a file belongs to a shot and has the contents that its frame's record states; reads it.
 pub fn knows(path: &Path) -> bool {
     let of_record = || {
         let path = std::path::absolute(path).ok()?;
@@ -63,18 +63,18 @@ fn stages(folder: &Path, frame: i32) -> Option<Vec<String>> {
 /// The inputs of a frame, and its files.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Manifest {
-    /// Which frame.
+    /// Number of the frame.
     pub frame: i32,
-    /// Hash of all settings and inputs that it depends on, those of the frames before it included.
+    /// Hash of all settings and inputs that it depends on, including those of the frames before it.
     pub inputs: String,
     /// What another run can resume from.
     pub keeps: Keeps,
     /// Its files.
     pub files: Vec<Written>,
-    /// The file of its own that holds everything, where it [`Keeps::State`]; it may have been removed since.
+    /// The separate file that holds everything, for [`Keeps::State`]; it may have been removed since.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state: Option<Written>,
-    /// Hash of what its velocities over the coming frame were made from, where that is a file of the coming frame.
+    /// Hash of the source of its velocities over the coming frame, if that is a file of the coming frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub next: Option<String>,
 }
@@ -112,16 +112,16 @@ impl Written {
 }
 
 impl Manifest {
-    /// Where the manifest of a stage's frame is: `state/base.0012.json`.
+    /// Path of the manifest of a stage's frame: `state/base.0012.json`.
     pub fn path(folder: &Path, stage: &str, frame: i32) -> PathBuf {
         folder.join("state").join(format!("{stage}.{frame:04}.json"))
     }
 
-    /// Reads a frame's manifest; none when there is none.
+    /// Reads a frame's manifest; none if there is none.
     ///
     /// # Errors
-    /// A damaged one, or one of a newer version; one of another frame, or that names files of no frame's: what a record
-    /// names is removed when its frame is made again.
+    /// A manifest that is damaged, of a newer version or of another frame, or that names files which no frame has: the files that a record
+    /// names are removed when its frame is computed again.
     pub fn read(folder: &Path, stage: &str, frame: i32) -> Result<Option<Self>> {
         let path = Self::path(folder, stage, frame);
         let Some(manifest): Option<Self> = checksummed::read(&path)? else { return Ok(None) };
@@ -141,7 +141,7 @@ impl Manifest {
         }
     }
 
-    /// Writes it: the frame is done.
+    /// Writes the manifest, which marks the frame as done.
     ///
     /// # Errors
     /// What the operating system reports.
@@ -160,12 +160,12 @@ impl Manifest {
     }
 }
 
-/// Whether a text is one lower-case word, as names of stages and extensions are.
+/// Whether a text is a single lower-case word, as names of stages and extensions are.
 fn is_word(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|letter| letter.is_ascii_lowercase())
 }
 
-/// Whether a path is one that a frame's files have: `base/base.0012.vdb`.
+/// Whether a path has the form of a frame's files: `base/base.0012.vdb`.
 fn is_of_frame(path: &str, frame: i32) -> bool {
     path.split_once('/').is_some_and(|(kind, name)| {
         let extension = name.strip_prefix(&format!("{kind}.{frame:04}."));

@@ -1,17 +1,17 @@
-//! Materials of a USD stage: what renderers show of a shot before anybody has shaded it.
+//! Materials of a USD stage: what renderers show of a shot before it has been shaded.
 
 use std::fmt::Write;
 
-/// What a prim is made of.
+/// Material of a prim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Look {
     /// Snow with a surface: meshes, level sets, grains. A `UsdPreviewSurface`.
     Snow,
-    /// Snow as a density. USD has no shader of volumes that all renderers know: the material holds the numbers that theirs take.
+    /// Snow as a density. USD has no volume shader that all renderers support: the material holds the parameters that theirs need.
     Fog,
-    /// What moves through the snow. A `UsdPreviewSurface`.
+    /// Objects that move through the snow. A `UsdPreviewSurface`.
     Object,
-    /// Liquids with a surface, as opaque as `displayOpacity` has it. Each a `UsdPreviewSurface`.
+    /// Liquids with a surface, with the opacity of `displayOpacity`. Each is a `UsdPreviewSurface`.
     Water,
     /// See [`Look::Water`].
     Blood,
@@ -21,7 +21,7 @@ pub enum Look {
     Honey,
 }
 
-/// Where materials are.
+/// Scope that holds the materials.
 const SCOPE: &str = "materials";
 /// Roughness of a wet surface.
 const WET: f64 = 0.05;
@@ -40,20 +40,20 @@ impl Look {
         }
     }
 
-    /// The schema of a prim that has a material, for what stands in brackets behind the prim's name.
+    /// The schema of a prim that has a material, for the brackets after the prim's name.
     pub(in crate::io) const SCHEMA: &'static str = "prepend apiSchemas = [\"MaterialBindingAPI\"]";
 
-    /// Gives a prim its material.
+    /// Binds a material to a prim.
     pub(in crate::io) fn bind(self, out: &mut String, indent: &str) {
         let _ = writeln!(out, "{indent}rel material:binding = </shot/{SCOPE}/{}>", self.name());
     }
 
-    /// Whether it is as opaque as its mesh says.
+    /// Whether its opacity is that of its mesh.
     fn is_liquid(self) -> bool {
         matches!(self, Self::Water | Self::Blood | Self::Paint | Self::Honey)
     }
 
-    /// Where the shader has its opacity from, and the shader that reads it.
+    /// The source of the shader's opacity, and the shader that reads it.
     fn opacity(self) -> (String, String) {
         let name = self.name();
         let input = format!(

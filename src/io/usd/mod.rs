@@ -1,4 +1,4 @@
-//! USD as text (.usda): the output of a shot, for any program that reads USD; no library is needed.
+//! USD as text (.usda): the output of a shot for any program that reads USD, written without a library.
 
 pub mod materials;
 pub mod points;
@@ -18,27 +18,27 @@ pub struct MeshFrame<'a> {
     pub name: &'a str,
     /// Positions (m).
     pub points: &'a [Vec3],
-    /// Velocities (m/s) over the coming frame, one a point; of a mesh that is another one at each frame none.
+    /// Velocities (m/s) over the coming frame, one per point; none for a mesh that is another one at each frame.
     pub velocities: &'a [Vec3],
     /// Triangles.
     pub triangles: &'a [[u32; 3]],
     /// Their texture coordinates.
     pub uvs: Option<&'a Uvs>,
-    /// Other arrays, of corners three for each triangle: primvars, see [`primvars`].
+    /// Other arrays (those of corners have three values for each triangle), written as primvars: see [`primvars`].
     pub arrays: &'a [&'a MeshArray],
 }
 
-/// The part of a moving mesh that stays the same from frame to frame.
+/// The part of a moving mesh that does not change from frame to frame.
 pub struct MeshPrim<'a> {
     /// Name of its prim: see [`prim_name`].
     pub name: &'a str,
-    /// What it is made of.
+    /// Its material.
     pub look: Look,
-    /// Whether its frames have velocities; one that is another mesh at each frame has none.
+    /// Whether its frames have velocities; a mesh that is another one at each frame has none.
     pub moves: bool,
-    /// The texture coordinates of its frames, where they have any.
+    /// The texture coordinates of its frames, if any.
     pub uvs: Option<&'a Uvs>,
-    /// What else its frames have.
+    /// The primvars of its frames.
     pub primvars: &'a [Primvar],
 }
 
@@ -48,7 +48,7 @@ pub struct VolumeFiles<'a> {
     pub name: &'a str,
     /// Its fields, each a grid of the files.
     pub fields: &'a [Field],
-    /// Whether it is there to be looked at and not to be rendered.
+    /// Whether it is for viewing only and not to be rendered.
     pub is_guide: bool,
     /// Frames with their files, relative to the .usda file.
     pub files: &'a [(i32, String)],
@@ -57,20 +57,20 @@ pub struct VolumeFiles<'a> {
 /// A field of a volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Field {
-    /// What shaders call it.
+    /// Its name in shaders.
     pub name: &'static str,
     /// Name of its grid.
     pub grid: &'static str,
-    /// What the grid holds.
+    /// Its contents.
     pub holds: Holds,
 }
 
-/// What a grid holds.
+/// The contents of a grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Holds {
     /// Distances from a surface.
     Distance,
-    /// A density, that much of which (1/m) is meant by 1.
+    /// A density; a value of 1 stands for this density (1/m).
     Density(f32),
     /// Other numbers.
     Number,
@@ -92,7 +92,7 @@ pub struct StageTime {
     pub first: i32,
     /// Last frame.
     pub last: i32,
-    /// Frames a second.
+    /// Frames per second.
     pub fps: f64,
 }
 
@@ -120,16 +120,16 @@ pub(super) fn quoted(text: &str) -> String {
 }
 
 fn asset(path: &str) -> String {
-    // Three at signs allow one inside.
+    // Triple @ delimiters allow an @ inside.
     if path.contains('@') { format!("@@@{path}@@@") } else { format!("@{path}@") }
 }
 
-/// Unit and upward axis of a stage.
+/// Unit and up axis of a stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Units {
-    /// Metres in a unit.
+    /// Metres per unit.
     pub metres: f64,
-    /// Whether Z is up, else Y.
+    /// Whether Z is up; otherwise Y.
     pub z_up: bool,
 }
 
@@ -143,7 +143,7 @@ impl Units {
     }
 }
 
-/// A stage with the shot's volumes, and what has a .usda file a frame under value clips.
+/// A stage with the shot's volumes, and with value clips for the parts that have one .usda file per frame.
 pub fn stage(comment: &str, time: StageTime, volumes: &[VolumeFiles], clips: &[Clips]) -> String {
     let mut out = String::new();
     let StageTime { first, last, fps } = time;
@@ -164,7 +164,7 @@ pub fn stage(comment: &str, time: StageTime, volumes: &[VolumeFiles], clips: &[C
 }
 
 impl VolumeFiles<'_> {
-    /// What it is made of; nothing that could be seen where none of its fields is a distance or a density.
+    /// Its material; none if none of its fields is a distance or a density, because there is nothing to see.
     fn look(&self) -> Option<Look> {
         self.fields.iter().find_map(|field| match field.holds {
             Holds::Distance => Some(Look::Snow),
@@ -210,26 +210,26 @@ fn write_volume(out: &mut String, volume: &VolumeFiles) {
     out.push_str("    }\n");
 }
 
-/// Files of one frame each.
+/// A set of files, one per frame.
 pub struct Clips<'a> {
     /// Folder and kind: `./objects/objects.0001.usda` for `objects`.
     pub kind: &'static str,
     /// The existing frames, ascending.
     pub frames: Vec<i32>,
-    /// What they hold.
+    /// Their contents.
     pub prims: ClipPrims<'a>,
 }
 
-/// What the files of a clip hold, as far as all frames have it in common.
+/// The contents of a clip's files that all frames have in common.
 pub enum ClipPrims<'a> {
     /// Moving meshes, under a prim of the kind's name.
     Meshes(Vec<MeshPrim<'a>>),
-    /// One prim of points with the kind's name, as [`points::frame`] writes it; these have its attributes.
+    /// A prim of points with the kind's name, as [`points::frame`] writes it; these points have its attributes.
     Points(&'a Points),
 }
 
 impl Clips<'_> {
-    /// What its prims are made of.
+    /// The materials of its prims.
     fn looks(&self) -> Vec<Look> {
         match &self.prims {
             ClipPrims::Meshes(meshes) => meshes.iter().map(|mesh| mesh.look).collect(),
@@ -264,7 +264,7 @@ fn write_clips(out: &mut String, clips: &Clips) {
     match &clips.prims {
         ClipPrims::Meshes(meshes) => define_meshes(out, meshes),
         ClipPrims::Points(points) => {
-            // Previews show grains when they are asked for renders.
+            // Viewports show grains only when asked for the render purpose.
             out.push_str("        uniform token purpose = \"render\"\n");
             Look::Snow.bind(out, "        ");
             out.push_str(&points::declared(points, "        "));
@@ -299,11 +299,11 @@ const ATTRIBUTES: [(&str, &str); 5] = [
 
 const VELOCITIES: &str = "velocities";
 
-/// Texture coordinates: the positions, and where there are seams an index for each corner.
+/// Texture coordinates: the values and, if there are seams, an index for each corner.
 const POSITIONS: &str = "texCoord2f[] primvars:st";
 const POSITION_INDICES: &str = "int[] primvars:st:indices";
 
-/// Says what the values of texture coordinates, elsewhere, belong to: the vertices, or the corners of faces.
+/// Declares the interpolation of texture coordinates whose values are elsewhere: per vertex, or per corner of faces.
 fn declare_uvs(out: &mut String, indent: &str, uvs: Option<&Uvs>) {
     let Some(uvs) = uvs else { return };
     let interpolation = if uvs.corners.is_some() { "faceVarying" } else { "vertex" };
@@ -314,7 +314,7 @@ fn declare_uvs(out: &mut String, indent: &str, uvs: Option<&Uvs>) {
     }
 }
 
-/// The manifest of the clips that USD requires.
+/// The clip manifest, which USD requires.
 pub fn clip_manifest(kind: &str, prims: &ClipPrims) -> String {
     let mut out = format!("#usda 1.0\n(\n    defaultPrim = \"{kind}\"\n)\n\nover \"{kind}\"\n{{\n");
     let meshes = match prims {
@@ -339,7 +339,7 @@ pub fn clip_manifest(kind: &str, prims: &ClipPrims) -> String {
     out
 }
 
-/// The meshes of one frame; as a file by itself it opens as those meshes.
+/// The meshes of one frame; opened on its own, the file shows these meshes.
 pub fn clip(kind: &str, frame: i32, fps: f64, units: Units, meshes: &[MeshFrame]) -> String {
     let mut out = format!(
         "#usda 1.0\n(\n    defaultPrim = \"{kind}\"\n    startTimeCode = {frame}\n    endTimeCode = {frame}\n    \
@@ -353,7 +353,7 @@ pub fn clip(kind: &str, frame: i32, fps: f64, units: Units, meshes: &[MeshFrame]
             mesh.name
         );
         let zero = (Vec3::zeros(), Vec3::zeros());
-        // Points that no face names do not show.
+        // Points that belong to no face are not visible.
         let corners = mesh.triangles.as_flattened().iter().map(|&vertex| mesh.points[vertex as usize]);
         let bounds = corners.map(|p| (p, p)).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
         let (low, high) = bounds.unwrap_or(zero);
@@ -395,7 +395,7 @@ fn row(out: &mut String, p: &Vec3) {
     vector(out, (*p).into());
 }
 
-/// Three numbers as USD reads them.
+/// Three numbers in USD's syntax.
 pub(super) fn vector(out: &mut String, parts: [f32; 3]) {
     for (part, before) in parts.into_iter().zip(["(", ", ", ", "]) {
         out.push_str(before);

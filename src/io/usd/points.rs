@@ -1,4 +1,4 @@
-//! Points as USD text: one `Points` prim, one file a frame.
+//! Points as USD text: one `Points` prim, one file per frame.
 
 use std::fmt::Write;
 
@@ -9,9 +9,9 @@ use crate::geometry::mesh::attributes::Number;
 use crate::geometry::points::{Attribute, Column, Points, Values};
 use crate::geometry::{DVec3, Vec3};
 
-/// The points of one frame. `v`, or `velocity`, `velocities` or `vel`, becomes `velocities` (m/s), `id` the prim's `ids`, `pscale` `widths` (twice as much: USD has
-/// diameters, m); every other attribute is a primvar of its name, with the interpolation `constant` where all points share
-/// one value. Metres, Y up.
+/// The points of one frame. `v`, or `velocity`, `velocities` or `vel`, becomes `velocities` (m/s), `id` becomes the prim's `ids`, and
+/// `pscale` becomes `widths` (twice the value: USD uses diameters, m); every other attribute is a primvar of its name, with the
+/// interpolation `constant` if all points share one value. Metres, Y up.
 pub fn frame(name: &str, frame: i32, fps: f64, points: &Points) -> String {
     let name = prim_name(name);
     let mut out = format!(
@@ -37,7 +37,7 @@ pub fn frame(name: &str, frame: i32, fps: f64, points: &Points) -> String {
     for (attribute, (declared, interpolation)) in points.attributes.iter().zip(declarations(points)) {
         let each = 0..points.count();
         let values = match (&attribute.name[..], &attribute.values) {
-            // USD has one of each for all points.
+            // USD requires one value per point for velocities and ids.
             (name, Values::Vector(column)) if Some(name) == velocities => {
                 list(each.map(|point| column.get(point)), vector)
             }
@@ -54,7 +54,7 @@ pub fn frame(name: &str, frame: i32, fps: f64, points: &Points) -> String {
     out
 }
 
-/// What [`frame`] writes of points with these attributes, without values: for what is over them in a stage.
+/// The declarations that [`frame`] writes for points with these attributes, without values: for the prim above them in a stage.
 pub(in crate::io) fn declared(points: &Points, indent: &str) -> String {
     let mut out = format!("{indent}{EXTENT}\n{indent}{POSITIONS}\n");
     for (declared, interpolation) in declarations(points) {
@@ -68,13 +68,13 @@ pub(in crate::io) fn declared(points: &Points, indent: &str) -> String {
 const EXTENT: &str = "float3[] extent";
 const POSITIONS: &str = "point3f[] points";
 
-/// Type and name of each attribute, and its interpolation where that is not known from the name; no name is there twice.
+/// Type and name of each attribute, and its interpolation if the name does not imply it; all names are unique.
 fn declarations(points: &Points) -> Vec<(String, Option<&'static str>)> {
     let (mut taken, velocities) = (Vec::new(), velocities(points));
     points.attributes.iter().map(|attribute| declaration(attribute, velocities, &mut taken)).collect()
 }
 
-/// Names of velocities, in lower case: of several attributes the first of these.
+/// Names of velocities, in lower case; of several such attributes the first in this list is used.
 pub const VELOCITIES: [&str; 4] = ["v", "velocity", "velocities", "vel"];
 
 /// The name of the attribute that holds the velocities.
@@ -159,7 +159,7 @@ mod tests {
             assert!(text.contains("vector3f[] velocities.timeSamples = { 3: [(1, 2, 3)] }"), "{text}");
             assert!(!text.contains("primvars") && over.contains("vector3f[] velocities\n"), "{text}");
         }
-        // One of several.
+        // Only one of several is used.
         let (text, over) = names(&["vel", "v"]);
         for text in [text, over] {
             assert!(text.matches("vector3f[] velocities").count() == 1, "{text}");

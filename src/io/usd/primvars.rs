@@ -1,7 +1,7 @@
-//! Arrays of a mesh as USD text: a primvar for each, or for three that are the parts of a vector or of a colour.
+//! Arrays of a mesh as USD text: one primvar for each, or for three that are the components of a vector or of a colour.
 //!
-//! `red`, `green` and `blue`, or `Cdx`, `Cdy` and `Cdz` (Houdini's `Cd`), become `displayColor`, as USD calls the colours of a
-//! mesh, `alpha` becomes `displayOpacity`: the numbers of the file, of bytes a 255th. `NAMEx`, `NAMEy` and `NAMEz` become the vector
+//! `red`, `green` and `blue`, or `Cdx`, `Cdy` and `Cdz` (Houdini's `Cd`), become `displayColor`, USD's name for the colours of a mesh, and
+//! `alpha` becomes `displayOpacity`: with the values of the file, bytes divided by 255. `NAMEx`, `NAMEy` and `NAMEz` become the vector
 //! `NAME`.
 
 use std::fmt::Write;
@@ -9,7 +9,7 @@ use std::fmt::Write;
 use super::{list, prim_name};
 use crate::geometry::mesh::attributes::{MeshArray, Number, On};
 
-/// A primvar without its values: what it is called, and what has a value each.
+/// A primvar without its values: its name and its interpolation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Primvar {
     /// Type and name: `float[] primvars:mask`.
@@ -22,7 +22,7 @@ pub fn primvars(arrays: &[&MeshArray]) -> Vec<Primvar> {
     grouped(arrays).into_iter().map(|group| group.primvar).collect()
 }
 
-/// Says what the values of primvars, elsewhere, belong to.
+/// Declares the interpolation of primvars whose values are elsewhere.
 pub(in crate::io) fn declare(out: &mut String, indent: &str, primvars: &[Primvar]) {
     for Primvar { declared, interpolation } in primvars {
         let _ =
@@ -30,7 +30,7 @@ pub(in crate::io) fn declare(out: &mut String, indent: &str, primvars: &[Primvar
     }
 }
 
-/// Writes the primvars of one frame: of corners there are three values for each triangle.
+/// Writes the primvars of one frame; arrays of corners have three values for each triangle.
 pub(in crate::io) fn write(out: &mut String, indent: &str, frame: i32, arrays: &[&MeshArray]) {
     for Group { primvar, parts, is_share } in grouped(arrays) {
         declare(out, indent, std::slice::from_ref(&primvar));
@@ -54,15 +54,15 @@ pub(in crate::io) fn write(out: &mut String, indent: &str, frame: i32, arrays: &
     }
 }
 
-/// A primvar with the arrays that it is made of: one, or three.
+/// A primvar with the arrays that it is made of: one or three.
 struct Group<'a> {
     primvar: Primvar,
     parts: Vec<&'a MeshArray>,
-    /// Whether its values are shares of 1, which files may hold as bytes.
+    /// Whether its values are shares of 1, which files may store as bytes.
     is_share: bool,
 }
 
-/// What becomes of some arrays.
+/// The primvar planned for some arrays.
 struct Draft {
     name: String,
     /// Type of a value.
@@ -72,7 +72,7 @@ struct Draft {
     is_share: bool,
 }
 
-/// What three arrays are together.
+/// The vector that three arrays form.
 struct Vector {
     parts: [String; 3],
     name: String,
@@ -81,14 +81,14 @@ struct Vector {
 
 const COLOUR: &str = "displayColor";
 const OPACITY: &str = "displayOpacity";
-/// What these names mean to a renderer is no array of single numbers.
+/// Names with a meaning for renderers, which an array of single numbers must not take.
 const TAKEN: [&str; 5] = [COLOUR, "points", "normals", "velocities", "accelerations"];
 
-/// Each array once, in the order of the first part of each group.
+/// Each array once, ordered by the first component of each group.
 fn grouped<'a>(arrays: &[&'a MeshArray]) -> Vec<Group<'a>> {
     let mut out = Vec::new();
     let mut written = vec![false; arrays.len()];
-    // Texture coordinates have this name.
+    // Texture coordinates already use this name.
     let mut taken = vec!["st".to_string()];
     for (at, array) in arrays.iter().enumerate() {
         if written[at] {
@@ -104,7 +104,7 @@ fn grouped<'a>(arrays: &[&'a MeshArray]) -> Vec<Group<'a>> {
     out
 }
 
-/// An array that is no part of anything.
+/// An array that is not part of a vector or colour.
 fn alone(array: &MeshArray, at: usize) -> Draft {
     let members = vec![at];
     if array.name == "alpha" && holds_shares(array.number) {
@@ -117,7 +117,7 @@ fn alone(array: &MeshArray, at: usize) -> Draft {
     Draft { name, class: scalar(array.number), members, is_share: false }
 }
 
-/// The vector or colour that an array is a part of, where all its parts are there and of one kind.
+/// The vector or colour that an array is a component of, if all its components exist and are of one kind.
 fn vector_at(arrays: &[&MeshArray], written: &[bool], at: usize) -> Option<Draft> {
     let array = arrays[at];
     let Vector { parts, name, is_colour } = vector_of(&array.name)?;
@@ -137,7 +137,7 @@ fn vector_at(arrays: &[&MeshArray], written: &[bool], at: usize) -> Option<Draft
     Some(Draft { name, class, members: members?, is_share: is_colour })
 }
 
-/// The vector or colour that an array of this name may be a part of.
+/// The vector or colour that an array of this name may be a component of.
 fn vector_of(name: &str) -> Option<Vector> {
     const COLOURS: [&str; 3] = ["red", "green", "blue"];
     if COLOURS.contains(&name) {
@@ -151,8 +151,8 @@ fn vector_of(name: &str) -> Option<Vector> {
     Some(Vector { parts, name, is_colour })
 }
 
-/// A name that no other primvar of the mesh has.
-/// The name, or with a number if it is taken already; it is taken then.
+/// A name that no other primvar of the mesh has: the given name, with a number if it is already taken. The result counts as taken from then
+/// on.
 pub(in crate::io) fn unique(name: String, taken: &mut Vec<String>) -> String {
     let mut own = name.clone();
     let mut number = 2;
@@ -172,7 +172,7 @@ fn interpolation(on: On) -> &'static str {
     }
 }
 
-/// Whether colours have numbers of this type.
+/// Whether numbers of this type can be colours.
 fn holds_shares(number: Number) -> bool {
     number.is_float() || number == Number::U8
 }
@@ -182,12 +182,12 @@ fn scalar(number: Number) -> &'static str {
         Number::F32 => "float",
         Number::F64 => "double",
         Number::U32 => "uint",
-        // Few programs read smaller ones.
+        // Few programs read smaller types.
         Number::I8 | Number::U8 | Number::I16 | Number::U16 | Number::I32 => "int",
     }
 }
 
-/// The type of a vector; USD has none of integers without a sign.
+/// The type of a vector; USD has no vectors of unsigned integers.
 fn triple(number: Number) -> Option<&'static str> {
     match number {
         Number::F32 => Some("float3"),
@@ -197,13 +197,13 @@ fn triple(number: Number) -> Option<&'static str> {
     }
 }
 
-/// Floats from here on are written with an exponent.
+/// Floats from this value on are written with an exponent.
 const LONG: f64 = 1e16;
 
-/// Writes a number as USD reads it.
+/// Writes a number in USD's syntax.
 pub(in crate::io) fn number(out: &mut String, number: Number, value: f64) {
     let _ = match number {
-        // USD knows it in small letters only, and takes long numbers without an exponent for integers.
+        // USD accepts it only in lower case, and takes long numbers without an exponent for integers.
         _ if value.is_nan() => write!(out, "nan"),
         Number::F32 if value.abs() >= LONG => write!(out, "{:e}", value as f32),
         Number::F64 if value.abs() >= LONG => write!(out, "{value:e}"),

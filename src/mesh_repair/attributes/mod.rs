@@ -1,8 +1,8 @@
-//! What a mesh carries, on what became of it.
+//! Carries attributes and texture coordinates over to a changed mesh.
 //!
-//! Vertices and triangles that are still there keep their numbers bit for bit. What was made takes those of a position on the old mesh: a
-//! vertex of the nearest one, the corners of a triangle all of positions on one old triangle, its chart, so that none lies across a seam.
-//! Where it is known where the liquid was at the first frame, that frame's mesh is asked first (`attributes/traced.rs`).
+//! Vertices and triangles that are still there keep their values bit for bit. New ones take those of a position on the old mesh: a new
+//! vertex of the nearest position, the corners of a new triangle of positions on a single old triangle, its chart, so that it never crosses
+//! a seam. Where the liquid's position at the first frame is known, the mesh of that frame is used first (`attributes/traced.rs`).
 
 mod texture;
 pub(in crate::mesh_repair) mod traced;
@@ -20,18 +20,18 @@ use weights::{Weights, alone, between, blended, heaviest, weights};
 /// Vertices or triangles of a task.
 pub(super) const GRAIN: usize = 1024;
 
-/// What a mesh carries, on what became of it: `mesh`, for whose vertices `vertices` names those that they were, and for whose
-/// triangles `sources` says where they come from.
+/// Carries the arrays and texture coordinates of `detail` over to the changed mesh `mesh`; `vertices` gives the old vertex of each vertex,
+/// and `sources` the origin of each triangle.
 ///
-/// Vertices that were there keep their numbers, and so do triangles that are [`Source::Whole`], with their corners. The corners of a
-/// [`Source::Part`] take what there is at their positions in the triangle that it is a part of, those of a [`Source::New`] at the nearest
-/// positions on the old triangle that is nearest to its middle; made vertices at the nearest position on the old mesh. There floats are
-/// interpolated, and colours in 8-bit integers (`red`, `green`, `blue`, `alpha`); other integers are those of the nearest corner.
-/// Where vertices with different texture coordinates were joined, the corners have coordinates then. Of other arrays of vertices that
-/// were joined the first one's number stays.
+/// Old vertices keep their values, and so do triangles that are [`Source::Whole`], with their corners. The corners of a [`Source::Part`]
+/// take the values at their positions in the triangle that it is a part of, those of a [`Source::New`] at the nearest positions on the old
+/// triangle that is nearest to its middle; new vertices take those at the nearest position on the old mesh. Floats are interpolated there,
+/// and so are colours in 8-bit integers (`red`, `green`, `blue`, `alpha`); other integers are those of the nearest corner. If vertices with
+/// different texture coordinates were joined, coordinates are then stored at the corners. In other vertex arrays, joined vertices keep the
+/// value of the first.
 ///
-/// With `traced` what was made takes the numbers of the first frame instead, where it is known what the liquid there had then, and there
-/// is an array [`Traced::MASK`].
+/// With `traced`, new geometry takes the values of the first frame instead, where it is known what the liquid there had then, and an array
+/// [`Traced::MASK`] is added.
 pub fn carried(
     detail: &DetailedMesh,
     mesh: TriMesh,
@@ -49,7 +49,8 @@ pub fn carried(
     out
 }
 
-/// What it takes from the mesh before alone. Of a mesh that is tracked no vertices were joined, but vertices that stay went into others.
+/// The values that come from the previous mesh alone. In a tracked mesh no vertices were joined, but remaining vertices may have absorbed
+/// others.
 fn of_old(
     detail: &DetailedMesh,
     mesh: TriMesh,
@@ -69,7 +70,7 @@ fn of_old(
     DetailedMesh { mesh, uvs, arrays }
 }
 
-/// The same of a mesh that carries the mask of what was made alone: that needs no positions.
+/// The same for a mesh that carries only the mask of rebuilt faces: no positions are needed.
 fn of_mask(mask: &MeshArray, mesh: TriMesh, sources: &[Source]) -> DetailedMesh {
     let value = |source: &Source| match *source {
         Source::Whole(triangle) | Source::Part(triangle) => mask.values[triangle as usize],
@@ -80,7 +81,7 @@ fn of_mask(mask: &MeshArray, mesh: TriMesh, sources: &[Source]) -> DetailedMesh 
     DetailedMesh { mesh, uvs: None, arrays }
 }
 
-/// What a mesh carries on one that came of nothing: zeros.
+/// Attributes of a mesh that has no old mesh to take them from: zeros.
 fn of_nothing(detail: &DetailedMesh, mesh: TriMesh) -> DetailedMesh {
     let [vertices, faces] = [mesh.positions.len(), mesh.triangles.len()];
     let array =
@@ -90,7 +91,7 @@ fn of_nothing(detail: &DetailedMesh, mesh: TriMesh) -> DetailedMesh {
     DetailedMesh { mesh, uvs, arrays }
 }
 
-/// Where a vertex has its numbers from.
+/// Where a vertex takes its values from.
 enum Origin {
     /// A vertex of the old mesh.
     Vertex(u32),
@@ -98,18 +99,18 @@ enum Origin {
     Place(usize, Weights),
 }
 
-/// Where all numbers come from.
+/// Where all values come from.
 struct Origins<'a> {
     /// The triangles of the old mesh.
     old: &'a [[u32; 3]],
-    /// Of each vertex.
+    /// For each vertex.
     vertices: Vec<Origin>,
-    /// Of each triangle: its chart, a triangle of the old mesh, and the positions of its corners there.
+    /// For each triangle: its chart, a triangle of the old mesh, and the positions of its corners there.
     triangles: Vec<(usize, [Weights; 3])>,
 }
 
 impl<'a> Origins<'a> {
-    /// Of a mesh that was another, which has triangles.
+    /// For a mesh that was made from another one, which has triangles.
     fn of(old: &'a TriMesh, new: &TriMesh, vertices: &[Option<u32>], sources: &[Source]) -> Self {
         let tree = NearestTree::new(old);
         let nearest = |place: DVec3| tree.nearest(place).map_or(0, |nearest| nearest.triangle);
@@ -164,7 +165,7 @@ impl<'a> Origins<'a> {
         MeshArray { name: array.name.clone(), on: array.on, number: array.number, values }
     }
 
-    /// Texture coordinates, for these triangles of the new mesh with their sources.
+    /// Texture coordinates for these triangles of the new mesh, with their sources.
     fn uvs(&self, uvs: &Uvs, triangles: &[[u32; 3]], sources: &[Source], is_tracked: bool) -> Uvs {
         if uvs.corners.is_none() && (is_tracked || !self.joins_seams(uvs, triangles)) {
             let position = |origin: &Origin| match origin {
@@ -196,7 +197,7 @@ impl<'a> Origins<'a> {
         Uvs { positions, corners: Some(corners), missing: uvs.missing }
     }
 
-    /// The vertex of the old mesh that one of the new mesh is.
+    /// The vertex of the old mesh that a vertex of the new mesh was.
     fn own(&self, vertex: u32) -> Option<u32> {
         match self.vertices[vertex as usize] {
             Origin::Vertex(own) => Some(own),
@@ -204,12 +205,12 @@ impl<'a> Origins<'a> {
         }
     }
 
-    /// Corners of parts that are vertices of the old mesh, but not their charts', ascending (of each triangle three), with the indices of
-    /// these vertices' coordinates: a collapse of two vertices leaves such corners. That index counts which the vertex has in a triangle
-    /// that it shares with the corner that went, where that has the index that it has on the chart: on the same side of a seam. Corners
-    /// without such a triangle are left out.
+    /// Corners of parts that are vertices of the old mesh but not of their chart, ascending (three corners per triangle), with the indices
+    /// of these vertices' coordinates: a collapse of two vertices leaves such corners. The index is taken from a triangle that the vertex
+    /// shares with the removed corner, where that corner has the same index as on the chart: on the same side of a seam. Corners without
+    /// such a triangle are left out.
     fn beside(&self, uvs: &Uvs, triangles: &[[u32; 3]], sources: &[Source]) -> Vec<(usize, u32)> {
-        // Each with its vertex, and the vertex and index of the corner that went.
+        // Each with its vertex, and the vertex and index of the removed corner.
         let mut corners: Vec<(usize, u32, [u32; 2])> = Vec::new();
         let parts = sources.iter().enumerate().filter(|(_, source)| matches!(source, Source::Part(_)));
         for (number, _) in parts {
@@ -250,7 +251,7 @@ impl<'a> Origins<'a> {
         corners.into_iter().filter_map(found).collect()
     }
 
-    /// Whether a vertex is several of the old mesh that had different texture coordinates.
+    /// Whether a vertex joins several old vertices that had different texture coordinates.
     fn joins_seams(&self, uvs: &Uvs, triangles: &[[u32; 3]]) -> bool {
         let position = |vertex: u32| uvs.positions[vertex as usize];
         let is_other = |chart: usize, weights: &Weights, vertex: u32| {
@@ -275,8 +276,8 @@ mod tests {
         MeshArray { name: name.into(), on, number, values: values.to_vec() }
     }
 
-    /// A square of two triangles, and a square of the same with its first triangle turned round and its second cut in two, one half
-    /// of which was made anew.
+    /// A square of two triangles, and the same square with its first triangle turned round and its second cut in two, one half of which is
+    /// new.
     fn squares() -> (TriMesh, TriMesh) {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 1.0]];
         let positions: Vec<Vec3> = corners.iter().map(|[x, y]| Vec3::new(*x, *y, 0.0)).collect();
@@ -359,7 +360,7 @@ mod tests {
         let mut indices = old.triangles.as_flattened().to_vec();
         for has_seam in [false, true] {
             if has_seam {
-                // The third triangle's coordinates lie elsewhere: there the first vertex has none.
+                // The third triangle's coordinates lie elsewhere: the first vertex has none there.
                 indices[6] = 6;
             }
             let uvs = found(&places, Some(indices.clone()));
@@ -393,7 +394,7 @@ mod tests {
                 };
                 assert_eq!(of(uvs), of(all));
             }
-            // The vertex that was made is made again, a little farther on.
+            // The new vertex is rebuilt again, a little farther on.
             new.positions[4].x += 0.125;
         }
     }
@@ -444,7 +445,7 @@ mod tests {
         let [vertices, triangles] = [mesh.positions.len(), mesh.triangles.len()];
         let lengths = [of_vertices, of_corners, of_faces].map(|array| array.values.len());
         assert_eq!(lengths, [vertices, 3 * triangles, triangles]);
-        // What is rebuilt lies within a cell of the solid, but the nearest of the old mesh may be another face of it.
+        // Rebuilt geometry lies within a cell of the solid, but the nearest triangle of the old mesh may belong to another face of it.
         let is_near = |value: f64, vertex: u32, most: f64| {
             (value - f64::from(mesh.positions[vertex as usize].x)).abs() <= most
         };

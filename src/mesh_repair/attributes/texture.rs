@@ -1,12 +1,12 @@
-//! Texture coordinates of what was made, from those of the first frame.
+//! Texture coordinates of new geometry, from those of the first frame.
 //!
-//! A vertex of charted triangles has a coordinate of its own, that of the position of the first mesh nearest to where the liquid there was,
-//! and the triangles around it share it: on one side of a seam. Where that position lies across a seam from a triangle's chart, its corner
-//! takes the nearest one on the chart.
+//! Each vertex of charted triangles has its own coordinate, that of the position on the first mesh nearest to where the liquid there was,
+//! shared by the triangles around it on one side of a seam. Where that position lies across a seam from a triangle's chart, the triangle's
+//! corner takes the nearest coordinate on the chart.
 //!
-//! Beside triangles that were kept, the mesh and the particles may have drifted apart by a little. There a vertex keeps the coordinate
-//! that it has in these, and what it differs by is spread over what was made: the texture goes on, without a seam and without a row
-//! of triangles in which it is stretched. It ends at torn triangles.
+//! Beside kept triangles, the mesh and the particles may have drifted apart slightly. A vertex there keeps the coordinate that it has in
+//! those triangles, and the difference is spread over the new geometry: the texture continues without a seam and without a row of stretched
+//! triangles. Spreading stops at torn triangles.
 
 use super::traced::{Chart, Charts, longest};
 use super::weights::{Weights, between};
@@ -15,22 +15,22 @@ use crate::geometry::{TriMesh, Uvs};
 /// A coordinate, or a difference of two.
 type Pair = [f64; 2];
 
-/// Of two positions of the first mesh the coordinates are on one side of a seam where they lie no farther apart than so many times what
-/// they change at most, on the triangles of the two, over the way between them.
+/// The coordinates of two positions on the first mesh are on the same side of a seam if they differ by at most this many times the largest
+/// gradient of the coordinates, on the two positions' triangles, times the distance between the positions.
 const SEAMLESS: f64 = 4.0;
-/// What rounding to 32 bits may make of coordinates that are the same.
+/// Rounding to 32 bits may change equal coordinates by this much.
 const ROUNDING: f64 = 1e-6;
-/// A coordinate that a vertex has in kept triangles is about the same as another within so many edges of the made triangle.
+/// Two coordinates of a vertex are about the same if they differ by at most this many edges of the new triangle.
 const SAME: f64 = 2.0;
-/// What is left of a difference from one vertex to the next: far from what is kept the texture is its own.
+/// Share of a difference that is passed on from one vertex to the next: far from kept triangles the texture is that of the first frame.
 const FADES: f64 = 0.8;
-/// How often differences are spread.
+/// Number of passes that spread differences.
 const SWEEPS: usize = 48;
 const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
-/// Puts the coordinates of the first frame into those that a mesh has from the mesh before; `is_kept` is for each of the charts'
-/// vertices whether it was there before, or another triangle has it too. In coordinates of vertices, charted triangles with a vertex
-/// that keeps a coordinate from far away are torn.
+/// Writes the coordinates of the first frame into those that a mesh has from the previous mesh; `is_kept` is, for each of the charts'
+/// vertices, whether it was there before, or is also used by another triangle. If coordinates are stored at vertices, charted triangles with
+/// a vertex that keeps a coordinate from far away are torn.
 pub(in crate::mesh_repair) fn textured(
     charts: &mut Charts<'_>,
     first: &Uvs,
@@ -39,13 +39,13 @@ pub(in crate::mesh_repair) fn textured(
     is_kept: &[bool],
 ) {
     if charts.list.is_empty() {
-        // What was made has coordinates of the mesh before, and each change adds some.
+        // New geometry has coordinates of the previous mesh, and each change adds some.
         tidy(out, first.positions.len());
         return;
     }
     let texture = Texture::of(charts, first, mesh);
     let near = Around::of(charts, out, mesh, is_kept);
-    // The coordinates that vertices keep, and by how much they differ.
+    // The coordinates that vertices keep, and the differences from them.
     let kept: Vec<Option<u32>> = (0..charts.names.len())
         .map(|slot| near.nearest(slot, out, texture.own[slot], texture.reach[slot]))
         .collect();
@@ -94,7 +94,7 @@ pub(in crate::mesh_repair) fn textured(
     tidy(out, first.positions.len());
 }
 
-/// Takes coordinates away that no corner has, but the first ones.
+/// Removes coordinates that no corner uses, except those of the first mesh.
 fn tidy(uvs: &mut Uvs, first: usize) {
     let Some(corners) = &mut uvs.corners else { return };
     let mut is_used: Vec<bool> = (0..uvs.positions.len()).map(|at| at < first).collect();
@@ -110,29 +110,29 @@ fn tidy(uvs: &mut Uvs, first: usize) {
     uvs.positions.retain(|_| marks.next().copied().unwrap_or_default());
 }
 
-/// Where a corner of a charted triangle has its coordinate from.
+/// Where a corner of a charted triangle takes its coordinate from.
 #[derive(Clone, Copy)]
 enum Corner {
-    /// It is its vertex' own.
+    /// That of its vertex.
     Own,
-    /// That at a position on the chart.
+    /// The coordinate at a position on the chart.
     Chart(Pair),
 }
 
 /// Corners of a charted triangle.
 struct Corners {
     of: [Corner; 3],
-    /// Up to what difference a coordinate is about the same.
+    /// Largest difference at which coordinates are about the same.
     reach: f64,
 }
 
-/// Coordinates of the first frame, of the charts' vertices and triangles.
+/// Coordinates of the first frame, for the charts' vertices and triangles.
 struct Texture {
-    /// Of each vertex.
+    /// For each vertex.
     own: Vec<Pair>,
-    /// Up to what difference a coordinate is about the same, for each vertex.
+    /// Largest difference at which coordinates are about the same, for each vertex.
     reach: Vec<f64>,
-    /// Of each triangle.
+    /// For each triangle.
     corners: Vec<Corners>,
 }
 
@@ -144,7 +144,7 @@ impl Texture {
             between(corners, weights).map(f64::from)
         };
         let own: Vec<Pair> = charts.spots.iter().map(|spot| at(spot.triangle, &spot.weights)).collect();
-        // How much coordinates change at most over a metre of a triangle of the first mesh.
+        // Largest change of coordinates over a metre of a triangle of the first mesh.
         let rate = |triangle: usize| {
             let positions = charts.first.mesh.corners(triangle);
             let corners = first.indices(triangles, triangle).map(|index| first.positions[index as usize]);
@@ -182,8 +182,8 @@ impl Texture {
         Self { own, reach, corners }
     }
 
-    /// Differences of all vertices, from those that have one: each has most of the mean of its neighbours', through triangles that are not torn
-    /// and have no seam between the two.
+    /// Differences of all vertices, from those that have one: each vertex takes most of the mean of its neighbours' differences, through
+    /// triangles that are not torn and have no seam between the two.
     fn spread(&self, charts: &Charts<'_>, fixed: Vec<Option<Pair>>) -> Vec<Pair> {
         let mut links: Vec<(usize, usize)> = Vec::new();
         for (chart, corners) in charts.list.iter().zip(&self.corners).filter(|(chart, _)| !chart.is_torn) {
@@ -240,7 +240,7 @@ impl Around {
         Self(list)
     }
 
-    /// The index of the coordinate of a slot that is nearest to a position, of several the first; none farther away than `reach`.
+    /// The index of the coordinate of a slot that is nearest to a position, the first of several; none if all are farther away than `reach`.
     fn nearest(&self, slot: usize, uvs: &Uvs, position: Pair, reach: f64) -> Option<u32> {
         let begin = self.0.partition_point(|(other, _)| *other < slot);
         let own = self.0[begin..].iter().take_while(|(other, _)| *other == slot);
@@ -254,7 +254,7 @@ impl Around {
     }
 }
 
-/// How far two coordinates are apart.
+/// Distance between two coordinates.
 fn apart(a: Pair, b: Pair) -> f64 {
     let [u, v] = [b[0] - a[0], b[1] - a[1]];
     (u * u + v * v).sqrt()

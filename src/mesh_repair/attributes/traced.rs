@@ -1,9 +1,9 @@
-//! What was made takes what the liquid there had at the first frame, where it is known where that was: so textures go through merges
-//! and splits.
+//! New geometry takes the values that the liquid there had at the first frame, where its position at that frame is known: textures survive
+//! merges and splits.
 //!
-//! A made triangle, a *charted* one, has a chart on the first mesh: the triangle there that is nearest to where its middle was.
-//! Liquids that were apart meet in triangles whose corners come from far apart: these are *torn*. They have a position of one of the two,
-//! and are marked.
+//! A *charted* triangle is a new triangle that has a chart on the first mesh: the triangle there that is nearest to where its middle was.
+//! Where separate bodies of liquid meet, the corners of a new triangle come from positions far apart: such triangles are *torn*. They take
+//! the position of one of the two bodies, and are marked.
 
 use rayon::prelude::*;
 
@@ -15,38 +15,37 @@ use crate::geometry::mesh::attributes::{DetailedMesh, MeshArray, Number, On};
 use crate::geometry::{DVec3, TriMesh};
 use crate::mesh_repair::Source;
 
-/// A triangle is torn where its corners were farther apart at the first frame than so many times its longest edge and a spacing: liquid
-/// that was drawn together by less shows a texture that is drawn together.
+/// A triangle is torn if its corners were farther apart at the first frame than this many times its longest edge plus a spacing: liquid that
+/// was drawn together by less shows a texture that is drawn together.
 const TORN: f64 = 3.0;
 
-/// Where what was made comes from: what [`carry_attributes`](crate::mesh_repair::carry_attributes) needs for it to take the numbers of the
-/// first frame.
+/// Origins of new geometry, with which [`carry_attributes`](crate::mesh_repair::carry_attributes) assigns the values of the first frame.
 ///
-/// A made triangle takes them where the positions of its three corners are known: its corners those at the positions of the first mesh
-/// nearest to these, all on one side of a seam, the triangle those of the one that is nearest to its middle. Made vertices of such
-/// triangles alone take those at the nearest position. A vertex that other triangles have too keeps the texture coordinates of these where
-/// they are about the same, and what was made blends into them; where they are not, there is a seam, or, in coordinates of vertices,
-/// the triangle is marked.
+/// A new triangle takes these values if the positions of all three corners are known: the corners take the values at the positions of the
+/// first mesh nearest to theirs, all on one side of a seam, and the triangle those of the triangle nearest to its middle. New vertices that
+/// only such triangles use take the values at the nearest position. A vertex that other triangles use too keeps its texture coordinates in
+/// them where they are about the same, and the new texture blends into them; where they are not, there is a seam, or, if coordinates are
+/// stored at vertices, the triangle is marked.
 #[derive(Clone, Copy)]
 pub struct Traced<'a> {
     /// The mesh at the first frame, with what it carried then.
     pub first: &'a DetailedMesh,
-    /// Its triangles, for who goes through many changes; none: they are sorted anew.
+    /// A search tree of its triangles, for callers that make many changes; none: it is rebuilt each time.
     pub tree: Option<&'a NearestTree>,
-    /// For each vertex of the new mesh, where the liquid there was at the first frame (m); none where that is not known, and for
-    /// vertices that no made triangle has. Empty: of none.
+    /// For each vertex of the new mesh, where the liquid there was at the first frame (m); none where that is unknown, and for vertices that
+    /// no new triangle uses. Empty: unknown for all.
     pub positions: &'a [Option<DVec3>],
     /// Initial distance between particles (m).
     pub spacing: f64,
 }
 
 impl Traced<'_> {
-    /// Name of the array of faces that says what they are: 0 a triangle of the first mesh, as it was; 1 a part of one, or a made one;
-    /// 2 a made one, or a part of it, whose corners come from far apart. It goes on from change to change; where there is none yet, all
-    /// triangles are those of the first mesh.
+    /// Name of the face array that marks rebuilt faces: 0 a triangle of the first mesh, unchanged; 1 a part of one, or a new triangle; 2 a
+    /// new triangle, or a part of one, whose corners come from positions far apart. It is carried from change to change; if the mesh has
+    /// none yet, all triangles are those of the first mesh.
     pub const MASK: &'static str = "rebuilt";
 
-    /// Puts the numbers of the first frame into what has those of the mesh before.
+    /// Writes the values of the first frame over those taken from the previous mesh.
     pub(in crate::mesh_repair) fn put(
         &self,
         out: &mut DetailedMesh,
@@ -65,12 +64,12 @@ impl Traced<'_> {
     }
 }
 
-/// Whether an array is the one that says of each face what it is.
+/// Whether an array is the mask, `Traced::MASK`.
 pub(in crate::mesh_repair) fn is_mask(array: &MeshArray) -> bool {
     array.name == Traced::MASK && array.on == On::Faces
 }
 
-/// Says of each face what it is.
+/// Writes the mask.
 fn mark(out: &mut DetailedMesh, sources: &[Source], charts: &[Chart]) {
     let at = out.arrays.iter().position(is_mask).unwrap_or(out.arrays.len());
     if at == out.arrays.len() {
@@ -82,7 +81,7 @@ fn mark(out: &mut DetailedMesh, sources: &[Source], charts: &[Chart]) {
     for (value, source) in values.iter_mut().zip(sources) {
         match source {
             Source::Whole(_) => {}
-            // Of a torn one it is torn.
+            // A part of a torn triangle is torn.
             Source::Part(_) => *value = value.max(1.0),
             Source::New => *value = 1.0,
         }
@@ -90,16 +89,16 @@ fn mark(out: &mut DetailedMesh, sources: &[Source], charts: &[Chart]) {
     charts.iter().filter(|chart| chart.is_torn).for_each(|chart| values[chart.number] = 2.0);
 }
 
-/// A made triangle that takes the numbers of the first frame.
+/// A new triangle that takes the values of the first frame.
 pub(in crate::mesh_repair) struct Chart {
     /// Its number in the new mesh.
     pub number: usize,
-    /// Which of the charts' vertices its corners are.
+    /// Index of each corner among the charts' vertices.
     pub slots: [usize; 3],
-    /// A triangle of the first mesh, and its positions that are nearest to where the corners were.
+    /// A triangle of the first mesh, and the positions on it that are nearest to where the corners were.
     pub triangle: usize,
     pub corners: [Weights; 3],
-    /// Whether its corners come from far apart.
+    /// Whether its corners come from positions far apart.
     pub is_torn: bool,
 }
 
@@ -109,14 +108,14 @@ pub(in crate::mesh_repair) struct Spot {
     pub weights: Weights,
 }
 
-/// All made triangles that take the numbers of the first frame.
+/// All new triangles that take the values of the first frame.
 pub(in crate::mesh_repair) struct Charts<'a> {
     pub first: &'a DetailedMesh,
     /// Ascending.
     pub list: Vec<Chart>,
-    /// The vertices of the new mesh that they have, ascending.
+    /// Their vertices in the new mesh, ascending.
     pub names: Vec<u32>,
-    /// For each of these the position of the first mesh nearest to where the liquid there was.
+    /// For each of these, the position of the first mesh nearest to where the liquid there was.
     pub spots: Vec<Spot>,
 }
 
@@ -168,7 +167,7 @@ impl<'a> Charts<'a> {
         out
     }
 
-    /// Which of the charts' vertices one is that they have.
+    /// Index of a vertex among the charts' vertices.
     fn slot(&self, name: u32) -> usize {
         self.names.partition_point(|other| *other < name)
     }
@@ -184,7 +183,7 @@ impl<'a> Charts<'a> {
         a * weights[0] + b * weights[1] + c * weights[2]
     }
 
-    /// For each of the charts' vertices whether it was there before, or another triangle has it too.
+    /// For each of the charts' vertices, whether it was there before, or is also used by another triangle.
     fn kept(&self, vertices: &[Option<u32>], triangles: &[[u32; 3]]) -> Vec<bool> {
         let mut is_kept: Vec<bool> = vertices.iter().map(Option::is_some).collect();
         for names in self.others(triangles).map(|number| &triangles[number]) {
@@ -193,13 +192,13 @@ impl<'a> Charts<'a> {
         self.names.iter().map(|name| is_kept[*name as usize]).collect()
     }
 
-    /// The triangles that have no chart, ascending.
+    /// Triangles without a chart, ascending.
     pub fn others(&self, triangles: &[[u32; 3]]) -> impl Iterator<Item = usize> {
         let mut charted = self.list.iter().map(|chart| chart.number).peekable();
         (0..triangles.len()).filter(move |number| charted.next_if_eq(number).is_none())
     }
 
-    /// Puts the first mesh's numbers into an array, the one with this number, if the first mesh has it too.
+    /// Writes the first mesh's values into the array with this index, if the first mesh has it too.
     fn fill(&self, n: usize, array: &mut MeshArray, is_kept: &[bool]) {
         let is_same =
             |own: &&MeshArray| own.name == array.name && own.on == array.on && own.number == array.number;
@@ -236,7 +235,7 @@ pub(in crate::mesh_repair) fn longest([a, b, c]: &[DVec3; 3]) -> f64 {
     (b - a).norm().max((c - b).norm()).max((a - c).norm())
 }
 
-/// That of some places which is nearest to one, of several the first.
+/// The one of three positions that is nearest to another, the first of several.
 fn nearest_to(middle: DVec3, [a, b, c]: &[DVec3; 3]) -> DVec3 {
     let far = |position: &DVec3| (position - middle).norm_squared();
     let nearer = if far(b) < far(a) { b } else { a };
@@ -249,16 +248,16 @@ mod tests {
     use crate::geometry::{Uvs, Vec3};
     use crate::mesh_repair::carry_attributes as carried;
 
-    /// Cells along an edge of the sheet, and the vertices of it that were made again.
+    /// Cells along an edge of the sheet, whose vertices in the middle are rebuilt.
     const SIDE: usize = 16;
     const MADE: std::ops::RangeInclusive<usize> = 3..=5;
-    /// Texture coordinates to a metre.
+    /// Texture coordinates per metre.
     const SCALE: f32 = 0.125;
-    /// By how much the liquid moved along x, and how far apart coordinates across a seam are.
+    /// Displacement of the liquid along x, and the distance of coordinates across a seam.
     const WAY: f32 = 32.0;
     const SEAM: f32 = 5.0;
 
-    /// A sheet of cells of a metre in two triangles each.
+    /// A sheet of square cells of 1 m, two triangles each.
     fn sheet(along: f32) -> TriMesh {
         let on = || 0..=SIDE;
         let position = |x: usize, y: usize| Vec3::new(x as f32 + along, y as f32, 0.0);
@@ -272,7 +271,7 @@ mod tests {
         TriMesh { positions, triangles: (0..SIDE * SIDE).flat_map(cell).collect() }
     }
 
-    /// How the sheet's texture coordinates are kept.
+    /// How the sheet's texture coordinates are stored.
     #[derive(Clone, Copy, PartialEq)]
     enum Kind {
         OfVertices,
@@ -312,8 +311,8 @@ mod tests {
         MADE.contains(&(vertex / (SIDE + 1))) && MADE.contains(&(vertex % (SIDE + 1)))
     }
 
-    /// The sheet after the liquid moved, and after some of it was made again. By the particles the liquid was `astray` (m) farther along
-    /// x at the first frame than by the mesh before, and within `lost` (m) of x = 4 also 8 m aside.
+    /// The sheet after the liquid moved and a part of it was rebuilt. According to the particles, the liquid was `astray` (m) farther along
+    /// x at the first frame than according to the previous mesh, and within `lost` (m) of x = 4 also 8 m to the side.
     fn after(kind: Kind, astray: f64, lost: f32) -> (DetailedMesh, Vec<Source>) {
         let first = first(kind);
         let old = DetailedMesh { mesh: sheet(WAY), ..first.clone() };
@@ -352,7 +351,7 @@ mod tests {
 
     #[test]
     fn a_texture_goes_on_without_a_seam_where_the_mesh_before_drifted() {
-        // The vertex in the middle of what was made.
+        // The vertex in the middle of the rebuilt part.
         let middle = 4 * (SIDE + 1) + 4;
         for kind in [Kind::OfVertices, Kind::OfCorners] {
             for astray in [0.0, 0.3] {
@@ -363,11 +362,11 @@ mod tests {
                     let names = out.mesh.triangles[triangle];
                     for (name, ([u, v], position)) in names.into_iter().zip(corners(&out, triangle)) {
                         let off = (u - SCALE * (position.x - WAY)).abs().max((v - SCALE * position.y).abs());
-                        // Away from what is kept the particles' own texture counts more and more.
+                        // Away from kept triangles the particles' own texture counts more and more.
                         let most = if *source == Source::New { SCALE * astray as f32 } else { 0.0 };
                         assert!(off < most + 1e-5, "{triangle}, {source:?}: {u} {v} at {position}");
                         if name as usize == middle {
-                            // Two edges from the rim 0.475 of the difference there is left.
+                            // Two edges from the rim, 0.475 of the difference there is left.
                             let wanted = 0.525 * most;
                             assert!((off - wanted).abs() < 0.05 * most + 1e-5, "{off}, not {wanted}");
                             corners_there += 1;
@@ -456,14 +455,14 @@ mod tests {
         let mut sources: Vec<Source> = (0..old.mesh.triangles.len() as u32).map(Source::Whole).collect();
         (sources[0], sources[1], sources[torn]) = (Source::Part(0), Source::New, Source::Part(torn as u32));
         let origins: Vec<Option<u32>> = (0..old.mesh.positions.len() as u32).map(Some).collect();
-        // Nothing is known of where the liquid was.
+        // The liquid's earlier positions are unknown.
         let traced = Traced { first: &first, tree: None, positions: &[], spacing: 1.0 };
         let out = carried(&old, old.mesh.clone(), &origins, &sources, Some(&traced));
         let mut wanted = mask(&old).to_vec();
         (wanted[0], wanted[1]) = (1.0, 1.0);
         assert_eq!((wanted[torn], mask(&out) == wanted), (2.0, true));
         assert_eq!(out.arrays.len(), old.arrays.len());
-        // The same where the mesh carries nothing else, and goes with its triangles.
+        // The same where the mesh carries no other array, and is passed with its triangles.
         let arrays = old.arrays.iter().filter(|array| is_mask(array)).cloned().collect();
         let alone = DetailedMesh { mesh: old.mesh.clone(), uvs: None, arrays };
         (sources[2], wanted[2]) = (Source::Whole(torn as u32), 2.0);

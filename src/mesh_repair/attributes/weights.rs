@@ -1,14 +1,14 @@
-//! Numbers at a position on a triangle, from those of its corners.
+//! Values at a position on a triangle, interpolated from those of its corners.
 
 use crate::geometry::DVec3;
 use crate::geometry::mesh::attributes::{MeshArray, Number};
 
-/// Arrays whose 8-bit integers are shares of a colour: they are interpolated, as floats are.
+/// Arrays whose 8-bit integers are colour components: they are interpolated, as floats are.
 const COLOURS: [&str; 4] = ["red", "green", "blue", "alpha"];
-/// A triangle whose first corner has a lesser sine has no face to speak of: its positions are those of its edges.
+/// Below this sine at its first corner, a triangle is treated as degenerate: positions on it are those of its edges.
 const NEEDLE: f64 = 1e-8;
 
-/// How much the corners of a triangle count at a position on it: 0 or more, 1 in all.
+/// Barycentric weights: how much each corner of a triangle counts at a position on it; 0 or more, 1 in total.
 pub type Weights = [f64; 3];
 
 /// The weights of a corner.
@@ -18,7 +18,7 @@ pub(in crate::mesh_repair) fn alone(corner: usize) -> Weights {
     weights
 }
 
-/// The corner that counts most, of several the first.
+/// The corner with the largest weight, the first of several.
 pub(in crate::mesh_repair) fn heaviest(&[a, b, c]: &Weights) -> usize {
     if a >= b && a >= c {
         0
@@ -29,7 +29,7 @@ pub(in crate::mesh_repair) fn heaviest(&[a, b, c]: &Weights) -> usize {
     }
 }
 
-/// The position of a triangle that is nearest to another position (m); where that is a corner's, exactly this corner.
+/// The position on a triangle that is nearest to another position (m); if it is a corner's, exactly this corner.
 pub fn weights(corners: &[DVec3; 3], position: DVec3) -> Weights {
     if let Some(corner) = corners.iter().position(|corner| *corner == position) {
         return alone(corner);
@@ -63,7 +63,7 @@ pub fn weights(corners: &[DVec3; 3], position: DVec3) -> Weights {
     best.1
 }
 
-/// An array's number at a position, from those of the corners.
+/// An array's value at a position, from those of the corners.
 pub(in crate::mesh_repair) fn blended(array: &MeshArray, numbers: [f64; 3], weights: &Weights) -> f64 {
     let most = heaviest(weights);
     if weights[most] == 1.0 {
@@ -82,7 +82,7 @@ pub(in crate::mesh_repair) fn between(positions: [[f32; 2]; 3], weights: &Weight
     [0, 1].map(|axis| mean(positions.map(|position| f64::from(position[axis])), weights) as f32)
 }
 
-/// The mean of three numbers: any of them where all are the same, and without those that do not count at all.
+/// The weighted mean of three numbers: exact if all are equal; numbers of weight 0 are ignored.
 fn mean(numbers: [f64; 3], weights: &Weights) -> f64 {
     let most = heaviest(weights);
     let others = (0..3).filter(|corner| *corner != most && weights[*corner] > 0.0);

@@ -1,4 +1,4 @@
-//! The mesh that comes out of cut and fill, by index.
+//! The mesh that cut and fill produce, by index.
 
 use std::collections::HashMap;
 
@@ -10,20 +10,20 @@ use crate::mesh_repair::fill::Fill;
 
 /// A mesh that is being rebuilt; positions in cells.
 pub struct Draft {
-    /// Positions of the vertices (cells): those of the mesh first, then those that were made.
+    /// Positions of the vertices (cells): those of the mesh first, then new ones.
     pub positions: Vec<DVec3>,
-    /// Which vertices were made here; the others are the mesh's own, and stay.
+    /// Which vertices were made here; the others are the mesh's own and never change.
     pub is_made: Vec<bool>,
     /// Counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// Of each triangle.
+    /// For each triangle.
     pub sources: Vec<Source>,
 }
 
-/// Joins the parts of a mesh, whose own vertices have these positions (cells).
+/// Joins the parts of a mesh whose own vertices have these positions (cells).
 ///
 /// # Errors
-/// [`Trouble`] without cells, where a point has no position.
+/// [`Trouble`] without cells if a point has no position.
 pub fn sewn(shape: &Shape, own: &[DVec3], cut: &Cut, fill: &Fill) -> Result<Draft, Trouble> {
     let mut draft = Draft {
         positions: own.to_vec(),
@@ -72,7 +72,7 @@ fn position(shape: &Shape, fill: &Fill, point: Point) -> Option<DVec3> {
                     other => shape.position(*other),
                 })
                 .collect::<Option<_>>()?;
-            // By lengths: many points that lie close together draw it to them no more than few.
+            // Weighted by length: a cluster of many points pulls no more than a few points would.
             let next = positions.iter().cycle().skip(1);
             let (sum, all) = positions.iter().zip(next).fold((DVec3::zeros(), 0.0), |(sum, all), (a, b)| {
                 let length = (b - a).norm();

@@ -1,26 +1,26 @@
 //! Where a mesh passes through the grid's planes and edges, decided exactly.
 //!
-//! Vertices lie on a fine lattice, and the grid's planes are shifted by an infinitesimal (-z, then +x, then +y, each far smaller
-//! than the last, as in [`crate::distance::winding`]): no vertex lies on a plane, no edge of the mesh meets an edge of the grid, and
-//! what one triangle says of their common edge its neighbour says too.
+//! Vertices lie on a fine lattice, and the grid's planes are shifted by an infinitesimal (-z, then +x, then +y, each far smaller than the
+//! last, as in [`crate::distance::winding`]): no vertex lies on a plane, no edge of the mesh meets an edge of the grid, and two triangles
+//! always agree on their common edge.
 
 use crate::distance::lattice::{Fixed, UNITS};
 use crate::distance::winding::{Axis, passes_left};
 use crate::geometry::Coord;
 use crate::geometry::DVec3;
 
-/// An edge of the grid: its axis and its lesser node.
+/// An edge of the grid: its axis and its lower node.
 pub type GridEdge = (usize, Coord);
 
-/// A face of the grid: the axis across it, and the cell behind it, on the side to which the axis runs.
+/// A face of the grid: the axis across it, and the cell behind it, in the direction of the axis.
 pub type GridFace = (usize, Coord);
 
-/// A point of the mesh, by what defines it.
+/// A point of the mesh, by its definition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Point {
     /// A vertex of the mesh.
     Vertex(u32),
-    /// Where the edge between two vertices, the lesser first, passes through a plane of an axis.
+    /// Where the edge between two vertices, the lower index first, passes through a plane of an axis.
     OnEdge([u32; 2], usize, i32),
     /// Where a triangle passes through an edge of the grid.
     OnTriangle(u32, GridEdge),
@@ -46,7 +46,7 @@ pub fn beside((axis, cell): GridFace) -> [Coord; 2] {
     [before, cell]
 }
 
-/// The four cells around an edge of the grid, going round it.
+/// The four cells around an edge of the grid, in order.
 pub fn around((axis, node): GridEdge) -> [Coord; 4] {
     let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
     [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[back, down]| {
@@ -65,7 +65,7 @@ pub fn end((axis, mut node): GridEdge) -> Coord {
 
 /// The cell that holds a vertex.
 pub fn cell_of([x, y, z]: Fixed) -> Coord {
-    // Planes across x and y are shifted onward, those across z back.
+    // Planes across x and y are shifted forward, those across z back.
     [(x - 1).div_euclid(UNITS), (y - 1).div_euclid(UNITS), z.div_euclid(UNITS)]
 }
 
@@ -74,29 +74,29 @@ pub fn to_cells(fixed: Fixed) -> DVec3 {
     DVec3::from(fixed.map(|x| f64::from(x) / f64::from(UNITS)))
 }
 
-/// Whether the line from `p` to `q`, which passes through plane `n` of axis `a`, is there beyond plane `m` of axis `b`.
+/// Whether the line from `p` to `q`, at its intersection with plane `n` of axis `a`, lies beyond plane `m` of axis `b`.
 fn is_beyond(p: Fixed, q: Fixed, (a, n): (usize, i32), (b, m): (usize, i32)) -> bool {
     let axis = Axis::ALL[3 - a - b];
     let mut node = [0; 3];
     (node[a], node[b]) = (n, m);
     let is_left = passes_left(axis, p, q, axis.line(node));
     let [along_p, along_q, _] = [0, 1, 2].map(|i| axis.turned(q)[i] - axis.turned(p)[i]);
-    // Which world axis the first turned one is, and whether it runs against it.
+    // Which world axis the first rotated axis is, and whether it points the opposite way.
     let (first, is_against) = match axis {
         Axis::Z => (0, false),
         _ => (2, true),
     };
     if a == first {
-        // Left of a way to the right is above it: the line is below the point.
+        // Left of a line to the right is above it: the line is below the point.
         is_left != (along_p > 0)
     } else {
-        // Left of a way upward is to the left of it: the line is right of the point.
+        // Left of a line upward is to the left of it: the line is right of the point.
         (is_left == (along_q > 0)) != is_against
     }
 }
 
-/// The faces of the grid that the way from vertex `a` to vertex `b` passes through, in order. None where the predicates
-/// contradict each other, which exact ones do not.
+/// The faces of the grid that the segment from vertex `a` to vertex `b` passes through, in order. None where the predicates contradict each
+/// other, which exact ones never do.
 pub fn passages(a: Fixed, b: Fixed) -> Option<Vec<Passage>> {
     let (mut cell, last) = (cell_of(a), cell_of(b));
     let steps: i32 = (0..3).map(|axis| (last[axis] - cell[axis]).abs()).sum();
@@ -131,11 +131,11 @@ pub fn on_edge([p, q]: [Fixed; 2], axis: usize, plane: i32) -> DVec3 {
     position
 }
 
-/// The way along which a triangle meets a face of the grid: two points, and the face.
+/// The segment along which a triangle meets a face of the grid: two points, and the face.
 #[derive(Debug, Clone, Copy)]
 pub struct Segment {
     pub face: GridFace,
-    /// With the cell behind the face to the left, as one sees the triangle counter-clockwise.
+    /// The cell behind the face is on the left, seen from the side from which the triangle is counter-clockwise.
     pub ends: [Point; 2],
 }
 
@@ -144,14 +144,14 @@ pub struct Segment {
 pub struct Traced {
     /// Cells of the three corners.
     pub cells: [Coord; 3],
-    /// Of each edge, from a corner to the next.
+    /// For each edge, from a corner to the next.
     pub edges: [Vec<Passage>; 3],
     /// Where it meets faces of the grid.
     pub segments: Vec<Segment>,
 }
 
-/// Traces a triangle with a number, vertices and their positions, which passes through these edges of the grid, ascending. None where that does
-/// not fit together: the triangle has no area on the lattice in some view, or the edges are not all of them.
+/// Traces triangle `number`, with these vertices and their positions, which passes through these edges of the grid, ascending. None if the
+/// data are inconsistent: the triangle has no area on the lattice in some view, or edges are missing.
 pub fn trace(number: u32, names: [u32; 3], v: [Fixed; 3], pierced: &[GridEdge]) -> Option<Traced> {
     let mut traced = Traced { cells: v.map(cell_of), ..Traced::default() };
     for edge in 0..3 {
@@ -182,7 +182,7 @@ pub fn trace(number: u32, names: [u32; 3], v: [Fixed; 3], pierced: &[GridEdge]) 
                 out = Some(point);
             }
         }
-        // Behind the plane the triangle lies left of the way from where its edge comes back to where it goes on.
+        // Behind the plane the triangle lies left of the segment from where its edge comes back to where it leaves.
         let ((mut from, mut at), (to, last)) = (out?, back?);
         while at != last {
             let others = [(axis + 1) % 3, (axis + 2) % 3];
@@ -204,8 +204,8 @@ pub fn trace(number: u32, names: [u32; 3], v: [Fixed; 3], pierced: &[GridEdge]) 
     Some(traced)
 }
 
-/// The passages of an edge of a triangle, from its corner to the next: found from the lesser vertex, so that both its triangles
-/// find the same.
+/// The passages of an edge of a triangle, from its corner to the next; computed from the lower vertex, so that both its triangles find the
+/// same ones.
 fn way(names: [u32; 3], v: [Fixed; 3], edge: usize) -> Option<Vec<Passage>> {
     let next = (edge + 1) % 3;
     if names[edge] < names[next] {
@@ -261,7 +261,7 @@ mod tests {
             }
             let traced = traced.unwrap_or_else(|| panic!("{v:?} {pierced:?}"));
             pieces += traced.segments.len();
-            // Each edge of the grid that it passes through is the end of four segments.
+            // Each edge of the grid that it passes through is an end of four segments.
             for edge in &pierced {
                 let is_end = |point: &&Point| **point == Point::OnTriangle(7, *edge);
                 let count = traced.segments.iter().flat_map(|segment| &segment.ends).filter(is_end).count();

@@ -1,8 +1,8 @@
 //! The mesh outside of a set of cells, cut along the outer faces of the set.
 //!
-//! A triangle that passes through an outer face is replaced by its part outside: polygons whose corners are its own corners, the
-//! points where its edges pass through outer faces, and those where it passes through outer edges of the grid. The same points, in
-//! the other direction, are where the rebuilt surface begins ([`super::fill`]).
+//! A triangle that passes through an outer face is replaced by its part outside: polygons whose corners are its own corners, the points
+//! where its edges pass through outer faces, and those where it passes through outer edges of the grid. The rebuilt surface begins at the
+//! same points, in the opposite direction ([`super::fill`]).
 
 pub(in crate::mesh_repair) mod draft;
 pub(in crate::mesh_repair) mod exact;
@@ -19,9 +19,9 @@ use crate::distance::lattice::Fixed;
 use crate::geometry::Coord;
 use crate::geometry::DVec3;
 
-/// Triangles a task looks at.
+/// Triangles per task.
 const GRAIN: usize = 1024;
-/// Cells of a box that are looked at one by one, before a triangle is traced.
+/// Largest number of cells in a box that are checked one by one before a triangle is traced.
 const FEW: i64 = 64;
 
 /// A closed mesh on the lattice.
@@ -33,18 +33,18 @@ pub struct Shape {
     pub pierces: Pierces,
 }
 
-/// What is left of the mesh outside of a set of cells.
+/// The part of the mesh outside a set of cells.
 #[derive(Default)]
 pub struct Cut {
-    /// Numbers of the triangles that are outside as a whole.
+    /// Indices of the triangles that are entirely outside.
     pub whole: Vec<u32>,
-    /// Parts of others, each with the triangle's number.
+    /// Parts of other triangles, each with the triangle's index.
     pub parts: Vec<(u32, [Point; 3])>,
-    /// Where the cut runs over outer faces, in the direction of the surface inside; ascending by face.
+    /// The cut along outer faces, in the direction of the surface inside; ascending by face.
     pub rim: Vec<(GridFace, [Point; 2])>,
 }
 
-/// Cells with which the set has to grow before the mesh can be cut.
+/// Cells by which the set has to grow before the mesh can be cut.
 #[derive(Debug)]
 pub struct Trouble(pub Vec<Coord>);
 
@@ -76,7 +76,7 @@ impl Shape {
         trace(triangle, names, self.corners(triangle), self.pierces.of_triangle(triangle))
     }
 
-    /// The cells that a triangle passes through, ascending; those of its box where it cannot be traced.
+    /// The cells that a triangle passes through, ascending; those of its box if it cannot be traced.
     pub fn cells_of(&self, triangle: u32) -> Vec<Coord> {
         let mut cells = match self.traced(triangle) {
             Some(traced) => cells(&traced),
@@ -90,7 +90,7 @@ impl Shape {
     /// Cuts the mesh along the outer faces of a set of cells.
     ///
     /// # Errors
-    /// [`Trouble`], where a triangle cannot be cut.
+    /// [`Trouble`] if a triangle cannot be cut.
     pub fn cut(&self, set: &CellSet) -> Result<Cut, Trouble> {
         let numbers: Vec<u32> = (0..self.triangles.len() as u32).collect();
         let parts: Vec<Result<Cut, Trouble>> = numbers
@@ -150,8 +150,8 @@ impl Shape {
         Some(())
     }
 
-    /// The sides of the part of a triangle outside of a set, with it to the left; adds those along outer faces to the rim, the
-    /// other way round.
+    /// The sides of the part of a triangle outside a set, which lies to their left; adds the sides along outer faces to the rim, in the
+    /// opposite direction.
     fn halves(
         &self,
         triangle: u32,
@@ -200,14 +200,14 @@ impl Shape {
     }
 }
 
-/// A side of the part of a triangle outside of a set of cells: from one point to another, with a cell outside to the left.
+/// A side of the part of a triangle outside a set of cells: from one point to another, with an outside cell to the left.
 #[derive(Debug, Clone, Copy)]
 pub struct Half {
     pub ends: [Point; 2],
     pub cell: Coord,
 }
 
-/// The cells that a triangle passes through; some more than once.
+/// The cells that a triangle passes through; some appear more than once.
 fn cells(traced: &Traced) -> Vec<Coord> {
     let through = traced.edges.iter().flatten().flat_map(|passage| beside(passage.face));
     let across = traced.segments.iter().flat_map(|segment| beside(segment.face));

@@ -8,9 +8,9 @@ use crate::distance::lattice::Fixed;
 use crate::distance::winding::{Axis, each_crossing};
 use crate::geometry::Coord;
 
-/// Triangles a task looks at.
+/// Triangles per task.
 const GRAIN: usize = 2048;
-/// Bits of a coordinate in a key.
+/// Bits per coordinate in a key.
 const BITS: u32 = 20;
 /// Farthest node that a key can hold.
 const FAR: i32 = 1 << (BITS - 2);
@@ -18,7 +18,7 @@ const FAR: i32 = 1 << (BITS - 2);
 /// A passage of a triangle through an edge of the grid.
 #[derive(Debug, Clone, Copy)]
 pub struct Pierce {
-    /// Where, from the edge's lesser node (0..=1).
+    /// Position along the edge, from its lower node (0..=1).
     pub share: f64,
     /// The change of the winding number in the direction of the axis.
     pub change: i32,
@@ -28,13 +28,13 @@ pub struct Pierce {
 
 /// All passages of a closed mesh through edges of the grid.
 pub struct Pierces {
-    /// Keys of edges, ascending; within an edge in the order of positions.
+    /// Keys of edges, ascending; within an edge in order of position.
     keys: Vec<u64>,
     items: Vec<Pierce>,
-    /// `start[t]..start[t + 1]` are those of triangle t in `edges`, ascending.
+    /// `start[t]..start[t + 1]` is the range of triangle t in `edges`, ascending.
     start: Vec<u32>,
     edges: Vec<GridEdge>,
-    /// The winding number behind each pierce along z, on its line; they are the last ones.
+    /// The winding number behind each pierce along z, on its line; these pierces are the last ones.
     behind: Vec<i32>,
 }
 
@@ -104,7 +104,7 @@ impl Pierces {
 
     /// Winding number at a node.
     pub fn winding(&self, node: Coord) -> i32 {
-        // Of the pierces before it on the line along z the last.
+        // The last of the pierces before it on the line along z.
         let key = key((2, node));
         let first = self.keys.len() - self.behind.len();
         let before = self.keys[first..].partition_point(|other| *other < key);
@@ -120,12 +120,12 @@ impl Pierces {
     }
 }
 
-/// Calls `see` with each edge of the grid that a face passes through, where on it, and the change of the winding number.
+/// Calls `see` with each edge of the grid that a face passes through, the position on it, and the change of the winding number.
 fn of_face(face: &Face, mut see: impl FnMut(GridEdge, f64, i32)) {
     let cells = face.v.map(cell_of);
     let same = [0, 1, 2].map(|axis| cells[0][axis] == cells[1][axis] && cells[1][axis] == cells[2][axis]);
     for axis in Axis::ALL {
-        // It passes a line only if it passes two planes.
+        // It meets a line only if it meets two planes.
         let [b, c] = [(axis.index() + 1) % 3, (axis.index() + 2) % 3];
         if same[b] || same[c] {
             continue;

@@ -6,12 +6,12 @@ use crate::geometry::triangulate::ear_clipping;
 use crate::geometry::triangulate::ear_clipping::turn;
 use crate::geometry::triangulate::monotone;
 
-/// Most corners of a polygon that is cut ear by ear.
+/// Maximum number of corners of a polygon that is triangulated by ear clipping.
 const FEW_CORNERS: usize = 200;
 
 type Corner = (Point, [f64; 2]);
 
-/// Triangles of the part of a triangle that these sides bound, to their left. None where the sides do not join.
+/// Triangulates the part of a triangle that lies to the left of these sides. None if the sides do not join.
 pub fn polygons(shape: &Shape, triangle: u32, halves: Vec<Half>) -> Option<Vec<[Point; 3]>> {
     let [a, b, c] = shape.triangles[triangle as usize].map(|name| shape.position(Point::Vertex(name)));
     let [a, b, c] = [a?, b?, c?];
@@ -29,11 +29,11 @@ pub fn polygons(shape: &Shape, triangle: u32, halves: Vec<Half>) -> Option<Vec<[
             shape.position(point).map(|position| (point, [position[x] - a[x], position[y] - a[y]]))
         };
         let ring: Vec<Corner> = ring.into_iter().map(seen).collect::<Option<_>>()?;
-        // A ring of points within the triangle alone is a hole, or an island.
+        // A ring of points inside the triangle alone is a hole or an island.
         let is_within = ring.iter().all(|(point, _)| matches!(point, Point::OnTriangle(..)));
         if is_within && area(&ring) < 0.0 { holes.push(ring) } else { outer.push(ring) }
     }
-    // From the leftmost on, so that a bridge never passes through a hole that is still to come.
+    // Starting from the leftmost hole, so that a bridge never passes through a hole that is still to be joined.
     let left = |ring: &Vec<Corner>| ring.iter().map(|(_, at)| at[0]).fold(f64::INFINITY, f64::min);
     holes.sort_by(|a, b| left(a).total_cmp(&left(b)));
     for hole in holes {
@@ -51,7 +51,7 @@ pub fn polygons(shape: &Shape, triangle: u32, halves: Vec<Half>) -> Option<Vec<[
     Some(out)
 }
 
-/// Sides joined to rings. Where two sides go on from a point, that in the same cell does.
+/// Joins sides to rings. Where two sides continue from a point, the one in the same cell is taken.
 fn rings(mut halves: Vec<Half>) -> Option<Vec<Vec<Point>>> {
     halves.sort_unstable_by_key(|half| (half.ends, half.cell));
     let mut is_done = vec![false; halves.len()];
@@ -85,12 +85,12 @@ fn area(ring: &[Corner]) -> f64 {
     (1..ring.len().saturating_sub(1)).map(|at| turn(ring[0].1, ring[at].1, ring[at + 1].1)).sum()
 }
 
-/// Joins a hole to the ring around it by a bridge that is passed both ways: from the hole's leftmost point to a corner of the ring
-/// that is seen from there.
+/// Joins a hole to the ring around it by a bridge that is traversed in both directions: from the hole's leftmost point to a corner of the
+/// ring that is visible from there.
 fn join(outer: &mut [Vec<Corner>], hole: Vec<Corner>) -> Option<()> {
     let start = (0..hole.len()).min_by(|a, b| hole[*a].1[0].total_cmp(&hole[*b].1[0]))?;
     let from = hole[start].1;
-    // The side that lies nearest to the left.
+    // The nearest side to the left.
     let mut nearest: Option<(f64, usize, usize)> = None;
     for (number, ring) in outer.iter().enumerate() {
         for side in 0..ring.len() {
@@ -109,7 +109,7 @@ fn join(outer: &mut [Vec<Corner>], hole: Vec<Corner>) -> Option<()> {
     let ring = &mut outer[number];
     let count = ring.len();
     let ends = [side, (side + 1) % count];
-    // The end of that side farther to the left, unless corners lie between: then of these the one nearest in direction.
+    // The end of that side farther to the left, unless corners lie between: then the one of them nearest in direction.
     let end = *ends.iter().min_by(|a, b| ring[**a].1[0].total_cmp(&ring[**b].1[0]))?;
     let triangle = if ring[end].1[1] > from[1] {
         [from, ring[end].1, [at, from[1]]]

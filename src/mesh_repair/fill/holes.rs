@@ -1,7 +1,7 @@
 //! Holes of triangles, closed.
 //!
-//! The boundary of any oriented triangles is a cycle: the edges that lack a counterpart leave each vertex as often as they arrive there.
-//! So they fall into rings, and each ring is closed by itself.
+//! The boundary of any oriented triangles is a cycle: as many of the edges that lack a counterpart leave each vertex as arrive there. So
+//! these edges form rings, and each ring is closed by itself.
 
 use std::collections::BTreeSet;
 use std::iter::repeat_n;
@@ -10,15 +10,15 @@ use crate::geometry::check::edges::{Use, is_same_edge, runs, sides};
 use crate::geometry::{DVec3, PolygonMesh, Vec3};
 use crate::mesh_repair::prepare::{Closed, rotated};
 
-/// Most corners of a ring that is cut into triangles between them: cutting larger ones takes too long.
+/// Maximum number of corners of a ring that is triangulated between its corners: larger ones take too long.
 const MOST_CORNERS: usize = 500;
-/// How far the corners of such a ring may lie from the plane that it mostly lies in, over its largest distance from its middle.
+/// Largest distance of the corners of such a ring from its mean plane, over their largest distance from its middle.
 const FLAT: f64 = 0.5;
-/// Edges that are compared where several lead on from a vertex.
+/// Number of edges compared where several lead on from a vertex.
 const WAYS: usize = 8;
 
-/// Closes the holes of triangles with these edges, so that along every edge as many run one way as the other. A ring of three that one
-/// triangle runs round the other way is no hole: that triangle is left out.
+/// Closes the holes of triangles with these edges, so that along every edge as many triangles run in one direction as in the other. A ring
+/// of three around which a triangle already runs in the other direction is no hole: that triangle is left out.
 pub(in crate::mesh_repair) fn close(closed: &mut Closed, uses: &[Use]) {
     let rings = rings(closed.positions.len(), lacking(&closed.triangles, uses));
     let mut is_out = vec![false; closed.triangles.len()];
@@ -43,7 +43,7 @@ pub(in crate::mesh_repair) fn close(closed: &mut Closed, uses: &[Use]) {
     closed.leave_out(&is_out);
 }
 
-/// The directed edges that have to be added so that as many run one way as the other along each.
+/// The directed edges to add so that each edge is used equally often in both directions.
 fn lacking(triangles: &[[u32; 3]], uses: &[Use]) -> Vec<[u32; 2]> {
     let mut out = Vec::new();
     for run in uses.chunk_by(is_same_edge) {
@@ -56,20 +56,21 @@ fn lacking(triangles: &[[u32; 3]], uses: &[Use]) -> Vec<[u32; 2]> {
     out
 }
 
-/// Directed edges among so many vertices, as many of which leave each vertex as arrive there, as rings that pass no vertex twice.
+/// Splits directed edges between `vertices` vertices, with as many leaving each vertex as arriving there, into rings that pass no vertex
+/// twice.
 fn rings(vertices: usize, mut edges: Vec<[u32; 2]>) -> Vec<Vec<u32>> {
     let mut out = Vec::new();
     if edges.is_empty() {
         return out;
     }
     edges.sort_unstable();
-    // Where the edges that leave each vertex begin, and the next of them to take.
+    // For each vertex, where its outgoing edges begin, and the next of them to take.
     let mut begins = vec![0usize; vertices + 1];
     edges.iter().for_each(|edge| begins[edge[0] as usize + 1] += 1);
     (0..vertices).for_each(|vertex| begins[vertex + 1] += begins[vertex]);
     let mut next = begins.clone();
     let mut path: Vec<u32> = Vec::new();
-    // Of each vertex how far along the path it is, from 1 on; 0: it is not on it.
+    // For each vertex, its position along the path, from 1 on; 0: it is not on the path.
     let mut position = vec![0usize; vertices];
     for first in 0..vertices {
         while next[first] < begins[first + 1] {
@@ -85,7 +86,7 @@ fn rings(vertices: usize, mut edges: Vec<[u32; 2]>) -> Vec<Vec<u32>> {
                 }
                 path.push(at as u32);
                 position[at] = path.len();
-                // An edge that closes a ring goes first, that of the smallest ring before others.
+                // An edge that closes a ring goes first, the smallest ring before others.
                 let ways = (next[at]..begins[at + 1]).take(WAYS);
                 let way = ways.max_by_key(|&way| position[edges[way][1] as usize]).unwrap_or(next[at]);
                 edges.swap(way, next[at]);
@@ -105,7 +106,7 @@ fn along(uses: &[Use], ends: [u32; 2]) -> &[Use] {
     &uses[begin..begin + count]
 }
 
-/// A triangle that is not out with these corners in this order, beginning with any.
+/// A triangle, not yet left out, with these corners in this order, starting at any of them.
 fn find(uses: &[Use], triangles: &[[u32; 3]], corners: [u32; 3], is_out: &[bool]) -> Option<u32> {
     let runs = sides(&corners).map(|ends| along(uses, ends));
     let fewest = runs.into_iter().min_by_key(|run| run.len())?;
@@ -113,14 +114,14 @@ fn find(uses: &[Use], triangles: &[[u32; 3]], corners: [u32; 3], is_out: &[bool]
     fewest.iter().map(|used| used.1).find(is_it)
 }
 
-/// A ring cut into triangles between its corners. None where it has too many of them or is not flat enough, or where one of the
-/// triangles would share an inner edge with a triangle that is there, or with one of those that have been `made`.
+/// Triangulates a ring between its corners. None if it has too many corners or is not flat enough, or if one of the triangles would share an
+/// inner edge with an existing triangle, or with one of those that have been `made`.
 fn cut(positions: &[Vec3], ring: &[u32], uses: &[Use], made: &BTreeSet<[u32; 2]>) -> Option<Vec<[u32; 3]>> {
     let places: Vec<DVec3> = ring.iter().map(|&vertex| positions[vertex as usize].cast()).collect();
     if ring.len() > MOST_CORNERS || !is_flat_enough(&places) {
         return None;
     }
-    // Begun at the next corner a convex ring gets other inner edges.
+    // Starting at the next corner gives a convex ring other inner edges.
     (0..2).find_map(|turn| {
         let mut ring = ring.to_vec();
         ring.rotate_left(turn);
@@ -151,7 +152,7 @@ fn is_flat_enough(positions: &[DVec3]) -> bool {
     normal.try_normalize(0.0).is_none_or(is_near)
 }
 
-/// A ring in triangles around a new vertex at the mean position of its corners.
+/// Triangulates a ring around a new vertex at the mean position of its corners.
 fn fan(positions: &mut Vec<Vec3>, ring: &[u32]) -> Vec<[u32; 3]> {
     let sum: DVec3 = ring.iter().map(|&vertex| positions[vertex as usize].cast::<f64>()).sum();
     let middle = positions.len() as u32;
@@ -188,7 +189,7 @@ mod tests {
 
     #[test]
     fn edges_do_not_get_crowded() {
-        // The diagonal of the square is taken.
+        // The diagonal of the square is already in use.
         let positions = vec![Vec3::zeros(), Vec3::x(), Vec3::new(1.0, 1.0, 0.0), Vec3::y()];
         let (out, prepared) = checked(&TriMesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]] });
         assert!(out.is_manifold());
@@ -222,7 +223,7 @@ mod tests {
 
     #[test]
     fn a_triangle_without_area_stays_where_it_is_needed() {
-        // A tetrahedron with a vertex more on one side of an edge.
+        // A tetrahedron with an extra vertex on one side of an edge.
         let half = Vec3::new(0.5, 0.0, 0.0);
         let positions = vec![Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z(), half];
         let split = vec![[0, 2, 1], [1, 2, 3], [2, 0, 3], [0, 4, 3], [4, 1, 3], [0, 1, 4]];
@@ -234,7 +235,7 @@ mod tests {
         let (out, prepared) = checked(&mesh);
         assert_eq!(prepared, Prepared { holes: 1, added_triangles: 1, ..Prepared::default() });
         assert!(out.is_manifold());
-        // On an edge that is closed without it.
+        // On an edge that is already closed.
         mesh.triangles.truncate(3);
         mesh.triangles.extend([[0, 1, 3], [0, 1, 4]]);
         let (out, prepared) = checked(&mesh);
@@ -253,7 +254,7 @@ mod tests {
             (0..count).map(|_| Vec3::from([0; 3].map(|_| random(places) as f32))).collect()
         };
         let (few, far) = (positions(40, 4), positions(40, 1000));
-        // A strip with one side only: each edge between its triangles is passed once.
+        // A Moebius strip: each edge between its triangles is used in one direction only, once.
         let strip: Vec<[u32; 3]> = (0..5).map(|at| [at, (at + 1) % 5, (at + 2) % 5]).collect();
         let (out, prepared) = checked(&TriMesh { positions: far.clone(), triangles: strip });
         assert!(out.triangles.len() > 5 && prepared.dropped_triangles == 0);

@@ -1,8 +1,8 @@
-//! The surface inside of a set of cells: marching cubes, sewn to the cut around it.
+//! The surface inside a set of cells: marching cubes, sewn to the cut around it.
 //!
-//! On a face between two cells of the set the surface runs as in [`crate::geometry::marching_cubes`]; on an outer face it runs where the cut
-//! does, point by point. In each cell these ways join to rings, which triangles fill. Two cells have the same points on the face
-//! between them, and cells and cut those on outer faces: what comes out is closed.
+//! On a face between two cells of the set, the surface runs as in [`crate::geometry::marching_cubes`]; on an outer face it follows the cut
+//! point by point. In each cell these paths join to rings, which are filled with triangles. Two cells have the same points on their common
+//! face, and so have cells and cut on outer faces: the result is closed.
 
 pub(in crate::mesh_repair) mod holes;
 
@@ -12,20 +12,20 @@ use super::region::{CellSet, Inside};
 use crate::geometry::Coord;
 use crate::geometry::marching_cubes::{Edge, FACES, cases, filled, lines};
 
-/// How near to a node a rebuilt surface may pass an edge of the grid (cells): nearer, triangles would be slivers.
+/// Minimum distance of a rebuilt surface from a node along an edge of the grid (cells): below it, triangles would be slivers.
 const NEAR: f64 = 0.02;
 
 /// The rebuilt surface.
 #[derive(Default)]
 pub struct Fill {
     pub triangles: Vec<[Point; 3]>,
-    /// Positions of points that are not on the mesh, on edges of the grid, as shares of them; ascending.
+    /// Positions of points that are not on the mesh, as fractions of the grid edges on which they lie; ascending.
     pub shares: Vec<(GridEdge, f64)>,
     /// The middles of rings, ascending, each with the ring's points.
     pub middles: Vec<(Point, Vec<Point>)>,
 }
 
-/// The ways of the cut on outer faces, from edge to edge of the grid.
+/// The paths of the cut on outer faces, from grid edge to grid edge.
 pub struct Rim {
     /// Ascending by face.
     ways: Vec<(GridFace, Vec<Point>)>,
@@ -35,7 +35,7 @@ impl Rim {
     /// Joins the segments of a cut.
     ///
     /// # Errors
-    /// The cells outside of faces on which they form a closed ring, or do not join.
+    /// The cells outside faces on which the segments form a closed ring, or do not join.
     pub fn of(cut: &Cut, set: &CellSet) -> Result<Self, Trouble> {
         let (mut ways, mut trouble) = (Vec::new(), Vec::new());
         for segments in cut.rim.chunk_by(|a, b| a.0 == b.0) {
@@ -56,7 +56,7 @@ impl Rim {
     }
 }
 
-/// Ways from an edge of the grid to another; none where segments of one face, ascending by their first points, do not join so.
+/// Paths from one grid edge to another; none if the segments of a face, ascending by their first points, do not join to such paths.
 fn joined(segments: &[(GridFace, [Point; 2])]) -> Option<Vec<Vec<Point>>> {
     if segments.windows(2).any(|pair| pair[0].1[0] == pair[1].1[0]) {
         return None;
@@ -86,7 +86,7 @@ fn joined(segments: &[(GridFace, [Point; 2])]) -> Option<Vec<Vec<Point>>> {
 /// Fills a set of cells.
 ///
 /// # Errors
-/// Cells at which the ways do not join to rings.
+/// Cells in which the paths do not join to rings.
 pub fn fill(shape: &Shape, set: &CellSet, inside: &impl Inside, rim: &Rim) -> Result<Fill, Trouble> {
     let mut out = Fill::default();
     let mut trouble = Vec::new();
@@ -121,7 +121,7 @@ impl<I: Inside> Cube<'_, I> {
         [0, 1, 2].map(|axis| self.cell[axis] + (corner >> (2 - axis) & 1) as i32)
     }
 
-    /// Where the surface passes an edge of the cube: on an outer edge that is where the mesh does.
+    /// Where the surface crosses an edge of the cube; on an outer edge, where the mesh does.
     fn point(&self, edge: Edge, out: &mut Fill) -> Option<Point> {
         let edge = self.edge(edge);
         if around(edge).iter().all(|cell| self.set.holds(*cell)) {
@@ -134,7 +134,7 @@ impl<I: Inside> Cube<'_, I> {
         }
     }
 
-    /// Where the surface passes an inner edge: where it is told to, or where the mesh's winding number passes 0.
+    /// Where the surface crosses an inner edge: where `inside` puts it, or where the mesh's winding number passes 0.
     fn share(&self, edge: GridEdge) -> f64 {
         if let Some(share) = self.inside.share(edge) {
             return share;
@@ -200,7 +200,7 @@ impl<I: Inside> Cube<'_, I> {
         out.middles.push((middle, ring));
     }
 
-    /// The edge of the cube on which a point lies; none inside of its faces.
+    /// The edge of the cube on which a point lies; none if it lies inside a face.
     fn edge_of(&self, point: Point) -> Option<Edge> {
         let (Point::OnTriangle(_, (axis, node)) | Point::OnGrid((axis, node))) = point else { return None };
         let corner = (0..8).find(|corner| self.node(*corner) == node)?;
@@ -208,7 +208,7 @@ impl<I: Inside> Cube<'_, I> {
     }
 }
 
-/// Joins ways to rings, each point once; none where they do not join.
+/// Joins paths to rings, each point once; none if they do not join.
 fn rings(mut ways: Vec<Vec<Point>>) -> Option<Vec<Vec<Point>>> {
     let mut rings = Vec::new();
     while let Some(mut ring) = ways.pop() {

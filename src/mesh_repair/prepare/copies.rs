@@ -7,9 +7,9 @@ use crate::geometry::Vec3;
 use crate::geometry::check::duplicates;
 use crate::geometry::check::edges::{edge_uses, imbalance, is_same_edge, parts_of};
 
-/// Which triangles have the vertices of others and go. Of those that are turned the same way the first stays. Where two are turned
-/// opposite ways none does: they are a sheet folded onto itself, which encloses nothing. But where such sheets are closed
-/// themselves, the first ones stay: a body both sides of whose faces were given.
+/// Which triangles have the same vertices as others and are removed. Of those with the same orientation the first stays. If two have
+/// opposite orientations none stays: they are a sheet folded onto itself, which encloses nothing. But where such sheets are closed
+/// themselves, the first ones stay: a solid of whose faces both sides were given.
 pub(in crate::mesh_repair) fn doubled(vertices: usize, triangles: &[[u32; 3]]) -> Vec<bool> {
     let by_vertices = |(triangle, number): (&[u32; 3], u32)| {
         let [a, b, c] = rotated(*triangle);
@@ -41,8 +41,8 @@ pub(in crate::mesh_repair) fn doubled(vertices: usize, triangles: &[[u32; 3]]) -
     is_out
 }
 
-/// Whether triangles run along each edge as often one way as the other, without those that are left out; beyond the end of the marks
-/// none is.
+/// Whether triangles use each edge equally often in both directions, ignoring those marked in `is_out`; triangles beyond its end are not
+/// marked.
 pub(in crate::mesh_repair) fn is_balanced(vertices: usize, triangles: &[[u32; 3]], is_out: &[bool]) -> bool {
     let is_out = |at: usize| is_out.get(at) == Some(&true);
     let kept: Vec<[u32; 3]> =
@@ -50,7 +50,7 @@ pub(in crate::mesh_repair) fn is_balanced(vertices: usize, triangles: &[[u32; 3]
     edge_uses(vertices, &kept).chunk_by(is_same_edge).all(|run| imbalance(&kept, run) == 0)
 }
 
-/// Which triangles are of parts that lie on one before them, triangle by triangle.
+/// Which triangles belong to parts that coincide with an earlier part, triangle by triangle.
 pub(in crate::mesh_repair) fn copies(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u32]) -> Vec<bool> {
     let position = |vertex: u32| {
         let p = &positions[vertex as usize];

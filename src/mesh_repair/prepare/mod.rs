@@ -1,7 +1,7 @@
-//! Any triangles become triangles that are closed as a chain and turned outward.
+//! Turns arbitrary triangles into triangles that are closed as a chain and turned outward.
 //!
-//! Parts that are closed by their indices stay as they are. The others are joined where vertices are one corner, then turned so
-//! that neighbours agree, and their holes are closed (`fill/holes.rs`). Every step takes some n log n operations for n triangles.
+//! Parts that are closed by their indices stay as they are. In all others, coinciding vertices are joined, then triangles are turned so that
+//! neighbours agree, and holes are closed (`fill/holes.rs`). Every step takes some n log n operations for n triangles.
 
 mod copies;
 
@@ -17,45 +17,45 @@ use copies::{copies, doubled, is_balanced};
 /// What was done to a mesh before anything was cut.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Prepared {
-    /// Vertices joined with others at the same position, or within rounding of theirs on open edges ([`Weld`]).
+    /// Vertices joined with others at the same position, or within rounding of it on open edges ([`Weld`]).
     pub joined_vertices: usize,
-    /// Vertices on open edges that are within rounding of others, but which of them are one is not clear.
+    /// Vertices on open edges that are within rounding of others, where it is ambiguous which of them to join.
     pub ambiguous_vertices: usize,
-    /// Triangles without area, doubled or alone, that were left out, and those of parts that lay on a part like them.
+    /// Triangles left out because they have no area, are duplicates or are alone, and those of parts that coincide with another part.
     pub dropped_triangles: usize,
-    /// Triangles turned round so that they agree with their neighbours.
+    /// Triangles turned round to agree with their neighbours.
     pub turned_triangles: usize,
     /// Parts turned outward as a whole.
     pub turned_parts: usize,
-    /// Holes that were closed.
+    /// Holes closed.
     pub holes: usize,
     /// Triangles that close them.
     pub added_triangles: usize,
 }
 
-/// Triangles that are closed as a chain and turned outward: along every edge as many run one way as the other.
+/// Triangles that are closed as a chain and turned outward: along every edge as many run in one direction as in the other.
 #[derive(Debug)]
 pub(super) struct Closed {
-    /// Positions (m): the mesh's own vertices first, in their order and all of them, then those that close holes.
+    /// Positions (m): all of the mesh's own vertices first, in their order, then those that close holes.
     pub positions: Vec<Vec3>,
     /// The mesh's triangles first, in their order, then those that close holes. A triangle that was turned round keeps its
     /// first corner.
     pub triangles: Vec<[u32; 3]>,
-    /// The triangle of the mesh that each one is; none where it closes a hole.
+    /// The triangle of the mesh that each one was; none if it closes a hole.
     pub sources: Vec<Option<u32>>,
     /// What was done.
     pub prepared: Prepared,
 }
 
-/// Triangles a task looks at.
+/// Triangles per task.
 const GRAIN: usize = 2048;
 
-/// Closes a mesh, whose positions are finite and whose indices are in range, and turns it outward, part by part: a part is what
-/// hangs together by edges. The solid is where the winding number is over 0 then. A cavity, which is a part that lies inside
-/// out within another, is turned outward too: it is filled.
+/// Closes a mesh, whose positions are finite and whose indices are in range, and turns it outward, part by part: a part is a set of
+/// triangles connected by edges. The solid is then where the winding number is over 0. A cavity, which is an inside-out part within another,
+/// is turned outward too: it is filled.
 ///
-/// Parts that are closed by their indices, each edge with two triangles that agree, keep their vertices, triangles without area
-/// among them too; of parts that lie on each other triangle by triangle the first stays. No triangle may be left.
+/// Parts that are closed by their indices, with two agreeing triangles at each edge, keep their vertices, and also their triangles without
+/// area; of parts that coincide triangle by triangle the first stays. The result may be empty.
 pub(super) fn prepare(mesh: &TriMesh) -> Closed {
     let vertices = mesh.positions.len();
     let mut closed = Closed {
@@ -71,7 +71,7 @@ pub(super) fn prepare(mesh: &TriMesh) -> Closed {
         closed.join(&is_sound);
         closed.leave_out(&collapsed(&closed.triangles));
         let is_out = doubled(vertices, &closed.triangles);
-        // Bodies that nearly coincide share some triangles: where all is closed as it is, it stays closed.
+        // Solids that nearly coincide share some triangles: if everything is closed as it is, it stays closed.
         if !is_balanced(vertices, &closed.triangles, &[]) || is_balanced(vertices, &closed.triangles, &is_out)
         {
             closed.leave_out(&is_out);
@@ -90,7 +90,7 @@ pub(super) fn prepare(mesh: &TriMesh) -> Closed {
 }
 
 impl Closed {
-    /// Joins vertices that are one corner, among those of triangles that are not sound: each takes the name of the first.
+    /// Joins coinciding vertices among those of triangles that are not sound: each takes the index of the first.
     fn join(&mut self, is_sound: &[bool]) {
         let mut is_named = vec![false; self.positions.len()];
         for (triangle, _) in self.triangles.iter().zip(is_sound).filter(|(_, sound)| !**sound) {
@@ -114,7 +114,7 @@ impl Closed {
         }
     }
 
-    /// Turns triangles round so that two which are alone on an edge agree.
+    /// Turns triangles round so that two that share an edge with no third agree.
     fn make_agree(&mut self, uses: &[Use]) {
         let area = |at: usize| {
             let [a, b, c] = corners(&self.positions, &self.triangles[at]);
@@ -127,7 +127,7 @@ impl Closed {
         }
     }
 
-    /// Leaves out triangles, and counts them; those beyond the end of `is_out` stay.
+    /// Leaves out triangles, and counts them; triangles beyond the end of `is_out` stay.
     pub(super) fn leave_out(&mut self, is_out: &[bool]) {
         let count = is_out.iter().filter(|is_out| **is_out).count();
         if count == 0 {
@@ -157,7 +157,7 @@ impl Closed {
     }
 }
 
-/// Corners of a triangle beginning with the least, so that those which are turned the same way are equal.
+/// Corners of a triangle, starting with the smallest, so that triangles of the same orientation compare equal.
 pub(super) fn rotated<T: Ord + Copy>([a, b, c]: [T; 3]) -> [T; 3] {
     [a, b, c].min([b, c, a]).min([c, a, b])
 }
@@ -166,13 +166,13 @@ fn corners(positions: &[Vec3], triangle: &[u32; 3]) -> [DVec3; 3] {
     triangle.map(|vertex| positions[vertex as usize].cast())
 }
 
-/// Which triangles name a vertex twice.
+/// Which triangles use a vertex twice.
 fn collapsed(triangles: &[[u32; 3]]) -> Vec<bool> {
     triangles.iter().map(|[a, b, c]| a == b || b == c || c == a).collect()
 }
 
-/// Which triangles without area go: those without which fewer edges are open. One that lies between others, on an edge of one and two
-/// of another, stays.
+/// Which triangles without area are removed: those without which fewer edges are open. A needle between others, with one triangle on one
+/// edge and two on another, stays.
 fn loose_needles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<bool> {
     let mut is_out = vec![false; triangles.len()];
     let is_needle = |triangle: &[u32; 3]| is_flat(&triangle.map(|vertex| positions[vertex as usize]));
@@ -192,7 +192,7 @@ fn loose_needles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<bool> {
     let mut todo: Vec<u32> = (0..triangles.len() as u32).rev().filter(|at| is_needle[*at as usize]).collect();
     while let Some(needle) = todo.pop() {
         let counts = own[needle as usize].map(|edge| left[edge]);
-        // Without it an edge with an even number of triangles is open, one with an odd number no longer.
+        // Without it an edge with an even number of triangles is open, one with an odd number no longer is.
         let gained = counts.iter().filter(|count| **count % 2 == 1).count();
         if is_out[needle as usize] || gained < 2 || !counts.contains(&1) {
             continue;
@@ -213,7 +213,7 @@ fn loose_needles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<bool> {
 pub(super) mod tests {
     use super::*;
 
-    /// What becomes of a mesh, checked for what holds of any, with how it was prepared.
+    /// Prepares a mesh and checks what holds for any; returns the result and how it was prepared.
     pub fn checked(mesh: &TriMesh) -> (TriMesh, Prepared) {
         let Closed { positions, triangles, sources, prepared } = prepare(mesh);
         assert!(positions.starts_with(&mesh.positions));
@@ -236,7 +236,7 @@ pub(super) mod tests {
         first
     }
 
-    /// A mesh each of whose triangles has vertices of its own.
+    /// A copy of a mesh in which each triangle has its own vertices.
     pub fn soup(mesh: &TriMesh) -> TriMesh {
         let positions: Vec<Vec3> =
             mesh.triangles.as_flattened().iter().map(|&vertex| mesh.positions[vertex as usize]).collect();

@@ -13,21 +13,20 @@ use crate::mesh_repair::cut::Shape;
 use crate::mesh_repair::cut::exact::{around, beside, cell_of, passages};
 use crate::mesh_repair::prepare::Closed;
 
-/// Pierces so near to each other are at one position (cells).
+/// Pierces closer to each other than this are at one position (cells).
 const TOGETHER: f64 = 1e-6;
-/// Least altitude of a triangle that closes a hole, over its longest edge.
+/// Minimum altitude of a triangle that closes a hole, over its longest edge.
 const THINNEST: f64 = 4e-4;
 
-/// The cells in which a mesh is at fault: where triangles pass through each other, where edges or vertices are not manifold, where
-/// the surface bounds something else than the solid, parts too small for the grid that lie within others, and slivers that close
-/// holes.
+/// The cells in which a mesh is at fault: where triangles intersect, where edges or vertices are non-manifold, where the surface does not
+/// bound the solid, at parts too small for the grid that lie within others, and at slivers that close holes.
 ///
 /// # Errors
 /// Cancel.
 pub fn flagged(ctx: &Context, closed: &Closed, shape: &Shape) -> Result<CellSet> {
     let mut set = CellSet::default();
     let mesh = TriMesh { positions: closed.positions.clone(), triangles: closed.triangles.clone() };
-    // A large triangle meets many small ones.
+    // A large triangle intersects many small ones: its cells are kept.
     let mut known: HashMap<u32, Vec<Coord>> = HashMap::new();
     for [first, second] in meeting_pairs(&mesh) {
         ctx.check()?;
@@ -65,15 +64,15 @@ fn is_thin([a, b, c]: [DVec3; 3]) -> bool {
     (b - a).cross(&(c - a)).norm() < THINNEST * longest
 }
 
-/// Adds the cells in which the surface bounds something else than the solid, because it has passed through itself: by at least a depth
-/// (cells, less than 1) along an edge of the grid.
+/// Adds the cells in which the surface does not bound the solid, because it has passed through itself by at least a depth (cells, less than
+/// 1) along an edge of the grid.
 pub fn overlaps(shape: &Shape, depth: f64, set: &mut CellSet) {
     for edge in shape.pierces.edges() {
         let mut winding = shape.pierces.winding(edge.1);
         let mut from = 0.0;
         let is_wrong = |winding: i32| !(0..=1).contains(&winding);
         let mut is_deep = false;
-        // Pierces at one position are in no order: only what is before and behind them counts.
+        // Pierces at one position have no order: only the winding numbers before and behind them count.
         for together in shape.pierces.on(*edge).chunk_by(|a, b| b.share - a.share < TOGETHER) {
             let at = together[0].share;
             is_deep |= is_wrong(winding) && (from == 0.0 || at - from >= depth);
@@ -86,7 +85,7 @@ pub fn overlaps(shape: &Shape, depth: f64, set: &mut CellSet) {
     }
 }
 
-/// Adds the cells of parts that pass no edge of the grid and are not clearly outside of all others.
+/// Adds the cells of parts that cross no edge of the grid and are not clearly outside all others.
 fn small(shape: &Shape, set: &mut CellSet) {
     for part in bodies(&shape.triangles) {
         if part.iter().any(|triangle| !shape.pierces.of_triangle(*triangle).is_empty()) {
@@ -104,7 +103,7 @@ fn small(shape: &Shape, set: &mut CellSet) {
     }
 }
 
-/// The cells of all parts that touch a set, with the set.
+/// The cells of all parts that touch a set, with the set itself.
 pub fn parts(shape: &Shape, set: &CellSet) -> CellSet {
     let mut out = set.clone();
     for part in bodies(&shape.triangles) {

@@ -1,7 +1,7 @@
 //! Which cells are rebuilt.
 //!
-//! The mesh is cut along the outer faces of a set of cells, so it must be sound there: each outer edge of the grid is passed at
-//! most once, and that where the winding number goes over 0 or back. The set grows until that holds, before anything is cut.
+//! The mesh is cut along the outer faces of a set of cells, so it must be sound there: it crosses each outer edge of the grid at most once,
+//! and only where the winding number changes between 0 or less and over 0. The set grows until that holds, before anything is cut.
 
 pub(in crate::mesh_repair) mod faulty_cells;
 
@@ -26,7 +26,7 @@ impl CellSet {
         self.blocks.get(&origin_of(cell)).is_some_and(|mask| mask[row] & bit != 0)
     }
 
-    /// Adds a cell; whether it is new.
+    /// Adds a cell; returns whether it is new.
     pub fn add(&mut self, cell: Coord) -> bool {
         let (row, bit) = within(cell);
         let word = &mut self.blocks.entry(origin_of(cell)).or_default()[row];
@@ -36,7 +36,7 @@ impl CellSet {
         is_new
     }
 
-    /// How many cells it has.
+    /// Count of cells.
     pub fn count(&self) -> usize {
         self.count
     }
@@ -78,16 +78,16 @@ pub fn edges_of(cell: Coord) -> impl Iterator<Item = GridEdge> {
     })
 }
 
-/// What is inside of the new surface at a node.
+/// Which nodes are inside the new surface.
 pub trait Inside: Sync {
     /// Whether a node is inside.
     fn at(&self, node: Coord) -> bool;
 
-    /// How far along an edge of the grid, whose ends differ, the surface lies (0..=1), unless the mesh passes there.
+    /// Position of the surface along an edge of the grid whose ends differ (0..=1); none: it lies where the mesh crosses the edge.
     fn share(&self, edge: GridEdge) -> Option<f64>;
 }
 
-/// What is inside of the mesh itself: where its winding number is over 0.
+/// The inside of the mesh itself: where its winding number is over 0.
 impl Inside for Pierces {
     fn at(&self, node: Coord) -> bool {
         self.winding(node) > 0
@@ -98,7 +98,7 @@ impl Inside for Pierces {
     }
 }
 
-/// Whether the mesh could not be cut here.
+/// Whether the mesh cannot be cut at this edge.
 pub fn is_unsound(pierces: &Pierces, inside: &impl Inside, edge: GridEdge) -> bool {
     let ends = [edge.1, end(edge)];
     let [a, b] = ends.map(|node| inside.at(node));
@@ -106,7 +106,7 @@ pub fn is_unsound(pierces: &Pierces, inside: &impl Inside, edge: GridEdge) -> bo
     [a, b] != own || pierces.on(edge).len() != usize::from(a != b)
 }
 
-/// Grows a set from cells that were added to it until the mesh is sound on all of its outer edges.
+/// Grows a set from the cells just added to it until the mesh is sound on all of its outer edges.
 pub fn grow(set: &mut CellSet, mut added: Vec<Coord>, pierces: &Pierces, inside: &impl Inside) {
     while let Some(cell) = added.pop() {
         for edge in edges_of(cell) {

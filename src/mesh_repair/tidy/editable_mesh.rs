@@ -1,6 +1,6 @@
-//! A closed mesh that changes by edge collapses and flips, with the triangles around its vertices. It stays a closed 2-manifold by
-//! index: two neighbours become one only where the link condition holds (Dey, Edelsbrunner, Guha and Nekhayev 1999, "Topology
-//! preserving edge contraction"). Vertices and triangles of the mesh that came in are not touched.
+//! A closed mesh that is changed by edge collapses and flips, with the triangles around its vertices. It stays a closed 2-manifold by index:
+//! two neighbours are merged only if the link condition holds (Dey, Edelsbrunner, Guha and Nekhayev 1999, "Topology preserving edge
+//! contraction"). Vertices and triangles of the input mesh are not touched.
 
 use crate::geometry::DVec3;
 use crate::mesh_repair::{Draft, Source};
@@ -8,7 +8,7 @@ use crate::mesh_repair::{Draft, Source};
 /// A change of the mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::mesh_repair) enum Change {
-    /// A made vertex goes into a neighbour, which lies at a position (cells) then.
+    /// A new vertex is merged into a neighbour, which is moved to a position (cells).
     Collapse { from: u32, to: u32, position: DVec3 },
     /// Triangles a, b, c and b, a, d become c, a, d and d, b, c.
     Flip { triangles: [u32; 2], corners: [u32; 4] },
@@ -19,22 +19,22 @@ pub(in crate::mesh_repair) fn flipped([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
     [[c, a, d], [d, b, c]]
 }
 
-/// Of a vertex that no created triangle names.
+/// For a vertex that no created triangle uses.
 const NONE: u32 = u32::MAX;
 
-/// A mesh with the triangles around each vertex that a created triangle names: all of them, whole ones too.
+/// A mesh with the vertex rings of all vertices that a created triangle uses: all triangles around them, whole ones too.
 pub(in crate::mesh_repair) struct Fans<'a> {
     draft: &'a mut Draft,
-    /// Of each vertex the index of its fan; [`NONE`]: it has none.
+    /// For each vertex, the index of its ring; [`NONE`]: it has none.
     slots: Vec<u32>,
-    /// Triangles of each fan, in no order.
+    /// Triangles of each ring, in no order.
     fans: Vec<Vec<u32>>,
-    /// Of each triangle whether a collapse has taken it away.
+    /// For each triangle, whether a collapse has removed it.
     is_dead: Vec<bool>,
 }
 
 impl<'a> Fans<'a> {
-    /// Takes a pass over all triangles, and memory for those near created ones.
+    /// Takes one pass over all triangles, and memory for those near created ones.
     pub(in crate::mesh_repair) fn of(draft: &'a mut Draft) -> Self {
         let mut slots = vec![NONE; draft.positions.len()];
         let mut count = 0;
@@ -62,7 +62,7 @@ impl<'a> Fans<'a> {
         Self { draft, slots, fans, is_dead }
     }
 
-    /// Whether a triangle is there, and was made or changed by the repair; whole ones stay as they are.
+    /// Whether a triangle exists, and was made or changed by the repair; whole ones stay as they are.
     pub(in crate::mesh_repair) fn is_created(&self, triangle: u32) -> bool {
         !self.is_dead[triangle as usize] && !matches!(self.source(triangle), Source::Whole(_))
     }
@@ -85,7 +85,7 @@ impl<'a> Fans<'a> {
         self.draft.is_made[vertex as usize]
     }
 
-    /// The triangles around a vertex; empty where no created triangle named it.
+    /// The triangles around a vertex; empty if no created triangle used it.
     fn around(&self, vertex: u32) -> &[u32] {
         self.fans.get(self.slots[vertex as usize] as usize).map(Vec::as_slice).unwrap_or_default()
     }
@@ -94,7 +94,7 @@ impl<'a> Fans<'a> {
         self.fans.get_mut(self.slots[vertex as usize] as usize)
     }
 
-    /// The vertices that have an edge in common with one, ascending.
+    /// The neighbours of a vertex, ascending.
     fn ring(&self, vertex: u32) -> Vec<u32> {
         let corners = self.around(vertex).iter().flat_map(|&triangle| self.corners(triangle));
         let mut ring: Vec<u32> = corners.filter(|&corner| corner != vertex).collect();
@@ -103,7 +103,7 @@ impl<'a> Fans<'a> {
         ring
     }
 
-    /// Collapses and flips of a triangle's edges after which the mesh is a closed 2-manifold still, wherever its vertices lie.
+    /// Collapses and flips of a triangle's edges that keep the mesh a closed 2-manifold, wherever its vertices lie.
     pub(in crate::mesh_repair) fn changes(&self, triangle: u32) -> Vec<Change> {
         let corners = self.corners(triangle);
         let mut out = Vec::with_capacity(12);
@@ -127,15 +127,15 @@ impl<'a> Fans<'a> {
         out
     }
 
-    /// Whether two neighbours may become one vertex: none is beside both but the two corners opposite their edge, and these,
-    /// which lose a triangle each, keep three. That leaves tetrahedra alone, too.
+    /// Whether two neighbours may be merged: their only common neighbours are the two corners opposite their edge, and these, which lose a
+    /// triangle each, keep three. That also preserves tetrahedra.
     fn may_join(&self, a: u32, b: u32) -> bool {
         let [mut shared, other] = [a, b].map(|vertex| self.ring(vertex));
         shared.retain(|vertex| other.binary_search(vertex).is_ok());
         shared.len() == 2 && shared.iter().all(|&corner| self.around(corner).len() > 3)
     }
 
-    /// The flip of the edge from a triangle's corner a to b; none where the triangle beyond is whole, or the new edge is there already.
+    /// The flip of the edge from a triangle's corner a to b; none if the triangle beyond it is whole, or the new edge exists already.
     fn flip(&self, triangle: u32, [a, b, c]: [u32; 3]) -> Option<Change> {
         let mut fan = self.around(a).iter().copied();
         let beyond = fan.find(|&other| other != triangle && self.corners(other).contains(&b))?;
@@ -157,14 +157,14 @@ impl<'a> Fans<'a> {
         self.around(from).iter().chain(others).copied()
     }
 
-    /// Whether triangles are parts of one.
+    /// Whether triangles are parts of the same triangle.
     fn are_of_one(&self, triangles: &[u32]) -> bool {
         let is_of = |of: u32| triangles.iter().all(|&other| self.source(other) == Source::Part(of));
         matches!(self.source(triangles[0]), Source::Part(of) if is_of(of))
     }
 
-    /// Makes a change, one of [`Fans::changes`] whose moving triangles are all created; returns the triangles that it touched, and
-    /// whole ones around the same vertex.
+    /// Makes a change, one of [`Fans::changes`] whose moving triangles are all created; returns the triangles that it touched, and whole
+    /// ones around the same vertex.
     pub(in crate::mesh_repair) fn make(&mut self, change: Change) -> Vec<u32> {
         match change {
             Change::Collapse { from, to, position } => self.collapse(from, to, position),
@@ -185,7 +185,7 @@ impl<'a> Fans<'a> {
 
     fn collapse(&mut self, from: u32, to: u32, position: DVec3) -> Vec<u32> {
         let moving: Vec<u32> = self.moving(from, to, position).collect();
-        // Where nothing moves, or all within one plane, parts stay parts.
+        // If nothing moves, or all move within one plane, parts stay parts.
         let stays = position == self.position(from) && position == self.position(to);
         if !stays && !self.are_of_one(&moving) {
             moving.iter().for_each(|&triangle| self.draft.sources[triangle as usize] = Source::New);
@@ -218,7 +218,7 @@ impl<'a> Fans<'a> {
         }
     }
 
-    /// Drops the triangles that were taken away, and made vertices that no triangle names. All others keep their order.
+    /// Drops removed triangles, and new vertices that no triangle uses. All others keep their order.
     pub(in crate::mesh_repair) fn finish(self) {
         let (draft, is_dead) = (self.draft, self.is_dead);
         let alive: Vec<usize> = (0..is_dead.len()).filter(|&triangle| !is_dead[triangle]).collect();
@@ -255,7 +255,7 @@ pub(in crate::mesh_repair) mod tests {
     const AROUND: u32 = 80;
     const ACROSS: u32 = 24;
 
-    /// A torus of whole triangles with edges of 0.3 to 0.9 sizes (cells). Triangles 2n and 2n + 1 have their first edge in common.
+    /// A torus of whole triangles with edges of 0.3 to 0.9 sizes (cells). Triangles 2n and 2n + 1 share their first edge.
     pub fn torus(size: f64) -> Draft {
         let position = |n: u32| {
             let turn = |n: u32, of: u32| TAU * f64::from(n) / f64::from(of);
@@ -283,7 +283,7 @@ pub(in crate::mesh_repair) mod tests {
         draft.positions.len() as u32 - 1
     }
 
-    /// Puts parts of a triangle in its position.
+    /// Replaces a triangle by parts of it.
     fn replace(draft: &mut Draft, triangle: usize, parts: &[[u32; 3]]) {
         let source = match draft.sources[triangle] {
             Source::Whole(of) => Source::Part(of),
@@ -295,7 +295,7 @@ pub(in crate::mesh_repair) mod tests {
         draft.sources.resize(draft.triangles.len(), source);
     }
 
-    /// Makes a vertex in a triangle, where weights of its corners put it.
+    /// Adds a vertex in a triangle, at barycentric weights.
     pub fn split(draft: &mut Draft, triangle: usize, weights: [f64; 3]) {
         let [a, b, c] = draft.triangles[triangle];
         let [p, q, r] = [a, b, c].map(|corner| draft.positions[corner as usize]);
@@ -304,7 +304,7 @@ pub(in crate::mesh_repair) mod tests {
         replace(draft, triangle, &[[a, b, made], [b, c, made], [c, a, made]]);
     }
 
-    /// Makes a vertex on the first edge of a triangle, at a share of it.
+    /// Adds a vertex on the first edge of a triangle, at a fraction of its length.
     pub fn split_edge(draft: &mut Draft, triangle: usize, share: f64) {
         let [a, b, c] = draft.triangles[triangle];
         let runs_back = |corners: &[u32; 3]| (0..3).any(|n| corners[n] == b && corners[(n + 1) % 3] == a);
@@ -316,7 +316,7 @@ pub(in crate::mesh_repair) mod tests {
         replace(draft, beyond, &[[b, made, d], [made, a, d]]);
     }
 
-    /// A pyramid over a square whose tip, 4, was made, and a tetrahedron of vertices 6 to 9 apart from it.
+    /// A pyramid over a square whose tip, 4, is new, and a separate tetrahedron of vertices 6 to 9.
     fn draft() -> Draft {
         let pyramid = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [0, 2, 1], [0, 3, 2]];
         let tetrahedron = [[6, 8, 7], [6, 7, 9], [7, 8, 9], [8, 6, 9]];
@@ -343,13 +343,13 @@ pub(in crate::mesh_repair) mod tests {
     fn only_sound_changes_are_offered() {
         let mut draft = draft();
         let fans = Fans::of(&mut draft);
-        // 1 and 3 are beside 0 and 4, but 2 is, too.
+        // Vertices 1 and 3 are adjacent to 0 and 4, but 2 is, too.
         assert!(!fans.may_join(4, 0) && !fans.may_join(4, 2));
-        // Beside 1 and 4 are 0 and 2 alone.
+        // Only 0 and 2 are adjacent to 1 and 4.
         assert!(fans.may_join(4, 1) && fans.may_join(4, 3));
         let [a, b, c, d] = [1, 4, 0, 2];
         let into = Change::Collapse { from: 4, to: 1, position: DVec3::repeat(1.0) };
-        // The edge 0-2 is there already; that from 1 to 3 is not, but 0-1 has a whole triangle beyond.
+        // The edge 0-2 exists already; that from 1 to 3 does not, but 0-1 has a whole triangle beyond it.
         assert_eq!(fans.flip(0, [a, b, c]), None);
         let flip = Change::Flip { triangles: [0, 3], corners: [4, 0, 1, 3] };
         assert_eq!(fans.changes(0), [into, flip]);
@@ -365,7 +365,7 @@ pub(in crate::mesh_repair) mod tests {
             assert_eq!(touched.len(), [3, 2][change]);
             fans.finish();
             assert!(Topology::of(draft.positions.len(), &draft.triangles).is_watertight());
-            // Vertex 5 stays: it was not made.
+            // Vertex 5 stays: it is not new.
             let (vertices, triangles) = [(9, 8), (10, 10)][change];
             assert_eq!((draft.positions.len(), draft.triangles.len()), (vertices, triangles));
             assert_eq!((draft.is_made.len(), draft.sources.len()), (vertices, triangles));

@@ -1,8 +1,8 @@
-//! Takes slivers out of the triangles that a repair made: pieces of a cut as thin as rounding, points beside vertices or at the same
-//! position, corners almost on the edge opposite. A made vertex goes into a neighbour, or an edge flips ([`editable_mesh`]).
+//! Removes slivers from the triangles that a repair created: pieces of a cut as thin as rounding, points beside vertices or at the same
+//! position, corners almost on the opposite edge. A new vertex is merged into a neighbour, or an edge is flipped ([`editable_mesh`]).
 //!
-//! Quality is the altitude of a triangle on its longest edge over that edge, 0.87 at best. Edges shorter than [`SHORT`] count as that
-//! long: triangles among points that all but coincide look well shaped by chance, and are none once their positions have 32 bits.
+//! Quality is the altitude of a triangle on its longest edge over that edge, 0.87 at best. Edges shorter than [`SHORT`] count as that long:
+//! triangles among almost coincident points may look well shaped by chance, but degenerate once their positions have 32 bits.
 
 mod editable_mesh;
 
@@ -12,34 +12,34 @@ use super::{Draft, Source};
 use crate::geometry::DVec3;
 use editable_mesh::{Change, Fans, flipped};
 
-/// Quality below which a triangle is a sliver: what a repaired mesh promises, 1e-4, with a margin.
+/// Quality below which a triangle is a sliver: the 1e-4 guaranteed for a repaired mesh, with a margin.
 const LEAST: f64 = 4e-4;
-/// Quality from which on a triangle is left alone.
+/// Triangles of at least this quality are left alone.
 const GOOD: f64 = 0.05;
 /// Length up to which edges are short (cells).
 const SHORT: f64 = 1e-3;
-/// How far a vertex may move at once (cells).
+/// Largest displacement of a vertex in one change (cells).
 const FARTHEST: f64 = 0.5;
-/// How far the surface may move where an edge flips (cells): between large triangles that meet in a ridge it would go far.
+/// Largest displacement of the surface where an edge flips (cells): between large triangles that meet in a ridge it would be far.
 const BEVEL: f64 = 0.1;
-/// How often a triangle is queued in a sweep, at most.
+/// Maximum number of times a triangle is queued in a sweep.
 const TRIES: u8 = 8;
-/// Sweeps by one rule before the next has its turn, at most.
+/// Maximum number of sweeps by one rule before the next rule is applied.
 const SWEEPS: usize = 4;
-/// How often all rules have their turns, at most.
+/// Maximum number of rounds over all rules.
 const ROUNDS: usize = 3;
 
-/// For which triangles a change is looked for, and what it must keep to.
+/// Which triangles are improved, and the constraints on a change.
 struct Rule {
-    /// Triangles of less quality are looked at.
+    /// Triangles below this quality are improved.
     below: f64,
-    /// Slivers must become fewer; else the worst triangle must become better, and slivers not more.
+    /// A change must reduce the number of slivers; else it must improve the worst triangle without adding slivers.
     by_count: bool,
-    /// How far a vertex may move (cells).
+    /// Largest displacement of a vertex (cells).
     farthest: f64,
-    /// Edges may flip, not only collapse.
+    /// Edges may be flipped, not only collapsed.
     may_flip: bool,
-    /// A collapse may turn triangles over.
+    /// A collapse may invert triangles.
     may_turn: bool,
     /// A flip may fold its two triangles.
     may_fold: bool,
@@ -55,8 +55,8 @@ const RESORT: Rule = Rule {
     may_fold: false,
 };
 
-/// One after another: points that all but coincide become one before a flip can part them; then triangles become better; what is
-/// left of slivers goes in ever ruder ways.
+/// Applied in order: almost coincident points are merged before a flip can separate them; then triangles are improved; the slivers that are
+/// left are removed by ever less careful rules.
 const RULES: [Rule; 5] = [
     Rule { farthest: SHORT, may_flip: false, ..RESORT },
     Rule { below: GOOD, by_count: false, ..RESORT },
@@ -65,9 +65,9 @@ const RULES: [Rule; 5] = [
     Rule { may_turn: true, may_fold: true, ..RESORT },
 ];
 
-/// Takes slivers out of the created triangles, then drops made vertices that no triangle names; all others keep their order. The
-/// mesh must be a closed 2-manifold by index in which only created triangles name made vertices, and stays one. Returns how many
-/// created triangles are left whose least altitude is below [`LEAST`] of their longest edge, however short that is.
+/// Removes slivers from the created triangles, then drops new vertices that no triangle uses; all others keep their order. The mesh must be
+/// a closed 2-manifold by index in which only created triangles use new vertices, and stays one. Returns how many created triangles are left
+/// whose smallest altitude is below [`LEAST`] of their longest edge, however short that is.
 pub(super) fn tidy(draft: &mut Draft) -> usize {
     let mut tidy = Tidy::new(draft);
     for _ in 0..ROUNDS {
@@ -87,11 +87,11 @@ pub(super) fn tidy(draft: &mut Draft) -> usize {
     left
 }
 
-/// How far apart the two diagonals of a quadrangle are, a b and c d (cells).
+/// Distance between the two diagonals of a quadrangle, a b and c d (cells).
 fn apart([a, b, c, d]: [DVec3; 4]) -> f64 {
     let across = (b - a).cross(&(d - c));
     let length = across.norm();
-    // Along one line they are not apart, and parallel ones bound no area.
+    // Collinear diagonals have no distance, and parallel ones bound no area.
     if length > 0.0 { (c - a).dot(&across).abs() / length } else { 0.0 }
 }
 
@@ -100,8 +100,8 @@ fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
     (b - a).cross(&(c - a))
 }
 
-/// Altitude of a triangle on its longest edge, over that edge, which counts as `least` (cells) where it is shorter; 0 where all
-/// corners are at one position.
+/// Altitude of a triangle on its longest edge, over that edge, which counts as at least `least` (cells); 0 if all corners are at one
+/// position.
 fn altitude(corners: &[DVec3; 3], least: f64) -> f64 {
     let [a, b, c] = corners;
     let square = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
@@ -116,7 +116,7 @@ fn quality(corners: &[DVec3; 3]) -> f64 {
 /// The triangles that a change touches, before or after it.
 #[derive(Clone, Copy)]
 struct Score {
-    /// Least quality.
+    /// Lowest quality.
     worst: f64,
     slivers: usize,
 }
@@ -130,13 +130,13 @@ impl Score {
     }
 }
 
-/// A change that a rule allows, and what comes of it.
+/// A change that a rule allows, and its outcome.
 #[derive(Clone, Copy)]
 struct Outcome {
     change: Change,
-    /// Least quality after it; at most [`GOOD`]: more is not worth a longer way.
+    /// Lowest quality after it, capped at [`GOOD`]: more is not worth a longer displacement.
     worst: f64,
-    /// How far the surface moves (cells).
+    /// Displacement of the surface (cells).
     far: f64,
 }
 
@@ -146,12 +146,12 @@ impl Outcome {
     }
 }
 
-/// A mesh out of which slivers are taken.
+/// A mesh from which slivers are being removed.
 struct Tidy<'a> {
     fans: Fans<'a>,
-    /// Triangles that were created, ascending; collapses may have taken some away.
+    /// Created triangles, ascending; collapses may have removed some.
     created: Vec<u32>,
-    /// Triangles to look at, each of them once.
+    /// Triangles still to be looked at, each once.
     waiting: VecDeque<u32>,
     is_waiting: Vec<bool>,
     /// How often each triangle was queued in this sweep.
@@ -202,13 +202,13 @@ impl<'a> Tidy<'a> {
         }
     }
 
-    /// Count of created triangles whose least altitude is below [`LEAST`] of their longest edge.
+    /// Count of created triangles whose smallest altitude is below [`LEAST`] of their longest edge.
     fn slivers(&self) -> usize {
         let there = self.created.iter().filter(|&&triangle| self.fans.is_created(triangle));
         there.filter(|&&triangle| altitude(&self.positions(triangle), 0.0) < LEAST).count()
     }
 
-    /// Whether a triangle was created, is there still, and has less than a quality.
+    /// Whether a triangle was created, still exists, and is below a quality.
     fn is_below(&self, triangle: u32, bound: f64) -> bool {
         self.fans.is_created(triangle) && quality(&self.positions(triangle)) < bound
     }
@@ -217,7 +217,7 @@ impl<'a> Tidy<'a> {
         self.fans.corners(triangle).map(|corner| self.fans.position(corner))
     }
 
-    /// The best change that a rule allows for a triangle; of equal ones the first.
+    /// The best change that a rule allows for a triangle; the first of equal ones.
     fn best(&self, triangle: u32, rule: &Rule) -> Option<Change> {
         let mut best: Option<Outcome> = None;
         for change in self.fans.changes(triangle) {
@@ -230,7 +230,7 @@ impl<'a> Tidy<'a> {
         best.map(|best| best.change)
     }
 
-    /// What comes of a change; none where a rule forbids it.
+    /// The outcome of a change; none if a rule forbids it.
     fn outcome(&self, change: Change, rule: &Rule) -> Option<Outcome> {
         let far = match change {
             Change::Collapse { from, position, .. } => (position - self.fans.position(from)).norm(),
@@ -272,7 +272,7 @@ impl<'a> Tidy<'a> {
             }
             let moved = |at: u32| if at == from || at == to { position } else { self.fans.position(at) };
             let new = corners.map(moved);
-            // Which way a sliver looks says nothing.
+            // The normal of a sliver is meaningless.
             let turns = old_quality >= LEAST && normal(&old).dot(&normal(&new)) <= 0.0;
             if turns && !rule.may_turn {
                 return None;
@@ -327,8 +327,8 @@ mod tests {
         (0..draft.triangles.len()).map(six).sum::<f64>() / 6.0
     }
 
-    /// Tidies what a mesh has become, and checks what holds however many slivers are left; returns how many. The volume changes by
-    /// less than a share.
+    /// Tidies a changed mesh, and checks what holds however many slivers are left; returns their number. The volume changes by less than a
+    /// share.
     fn tidied(draft: &mut Draft, first: &Draft, share: f64) -> usize {
         let own = |draft: &Draft| -> Vec<DVec3> {
             let all = draft.positions.iter().zip(&draft.is_made);
@@ -471,7 +471,7 @@ mod tests {
         let mut tetrahedron = body(&needle, &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]);
         assert_eq!(tidy(&mut tetrahedron), 4);
         assert!(is_watertight(&tetrahedron) && tetrahedron.positions.len() == 4);
-        // Two pyramids, base to base: the tip of one is almost on an edge of the base.
+        // Two pyramids, base to base: the tip of one lies almost on an edge of the base.
         let flat = [[0.0; 3], [0.4, 0.0, 0.0], [0.2, 0.3, 0.0], [0.2, 1e-9, 1e-9], [0.2, 0.1, -0.1]];
         let sides = [[0, 1, 3], [1, 2, 3], [2, 0, 3], [1, 0, 4], [2, 1, 4], [0, 2, 4]];
         let mut doubled = body(&flat, &sides);

@@ -6,9 +6,9 @@ use super::file::File;
 use super::nodes::{Local, rotation};
 use crate::geometry::DVec3;
 
-/// Kinks closer together than this are one (s): times in files are 32-bit floats.
+/// Kinks closer together than this (s) are one: times in files are 32-bit floats.
 const SAME_TIME: f64 = 1e-5;
-/// How long before its time a jump begins (s).
+/// A jump begins this long before its key (s).
 pub(super) const JUMP: f64 = 1e-4;
 
 /// One animated property of one node.
@@ -16,9 +16,9 @@ struct Channel {
     node: usize,
     property: Property,
     interpolation: Interpolation,
-    /// Key times (s), not falling.
+    /// Key times (s), non-decreasing.
     times: Vec<f64>,
-    /// `width` numbers a key; three such rows a key for cubic splines: in-tangent, value, out-tangent.
+    /// `width` numbers for each key; for cubic splines three such rows: in-tangent, value, out-tangent.
     values: Vec<f64>,
     width: usize,
 }
@@ -80,7 +80,7 @@ impl Clip {
         }
     }
 
-    /// Sets the transforms that the clip animates to those at a time of the clip (s).
+    /// Sets the transforms that the clip animates to their values at a time of the clip (s).
     pub fn apply(&self, time: f64, locals: &mut [Local]) {
         let mut row = Vec::new();
         for channel in &self.channels {
@@ -96,7 +96,7 @@ impl Clip {
         }
     }
 
-    /// Times of its own (s), ascending, where its motion has a kink; a jump is a pair of them, close together.
+    /// Times of the clip (s), ascending, at which its motion has a kink; a jump is two of them, close together.
     pub fn kinks(&self) -> Vec<f64> {
         let mut out: Vec<f64> = Vec::new();
         for channel in &self.channels {
@@ -121,7 +121,7 @@ impl Channel {
         &self.values[row * self.width..(row + 1) * self.width]
     }
 
-    /// The value at a time; the first and last key's outside of them.
+    /// The value at a time; before the first key and after the last, theirs.
     fn at(&self, time: f64, out: &mut Vec<f64>) {
         out.clear();
         let next = self.times.partition_point(|&key| key <= time);
@@ -143,7 +143,7 @@ impl Channel {
             Interpolation::CubicSpline => {
                 let row = |key: usize, which: usize| &self.values[(3 * key + which) * self.width..];
                 let (square, cube) = (part * part, part * part * part);
-                // Hermite's basis; tangents are per second.
+                // Hermite basis; tangents are per second.
                 let weights = [
                     2.0 * cube - 3.0 * square + 1.0,
                     span * (cube - 2.0 * square + part),
@@ -157,7 +157,7 @@ impl Channel {
     }
 }
 
-/// Between two rotations (x, y, z, w), the shorter way round.
+/// Interpolates two rotations (x, y, z, w) along the shorter arc.
 fn slerp(a: &[f64], b: &[f64], part: f64) -> [f64; 4] {
     let [a, b] = [a, b].map(|q| [q[0], q[1], q[2], q[3]]);
     let (a, mut b) = (rotation(a).into_inner().coords, rotation(b).into_inner().coords);

@@ -1,4 +1,4 @@
-//! The file: its buffers, and the numbers that its accessors point at.
+//! The file: its buffers, and the numbers of its accessors.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
@@ -21,7 +21,7 @@ pub(super) struct File {
     /// The data of compressed buffer views, by their index.
     decoded: HashMap<usize, Vec<u8>>,
     instances: HashMap<usize, Instancing>,
-    /// Accessors of zeros, for which there is no data.
+    /// Accessors of zeros, which have no data.
     zeros: HashSet<usize>,
     /// Whether it has materials, which are not read.
     pub has_materials: bool,
@@ -30,18 +30,17 @@ pub(super) struct File {
 }
 
 impl File {
-    /// Reads a .gltf or .glb file and the buffers that it names; textures are not touched.
+    /// Reads a .gltf or .glb file and its buffers; textures are ignored.
     ///
     /// # Errors
-    /// A file that is missing, cut short or malformed; a buffer that is missing (named); an extension that is
-    /// required and unknown.
+    /// A file that is missing, truncated or malformed; a buffer that is missing (named); a required extension that is unknown.
     pub fn open(path: &Path) -> Result<Self> {
         let bytes = source::read(path)?;
         check_length(&bytes).map_err(|what| Error::file(path, what))?;
         let parsed = json::parse(&bytes).map_err(|what| Error::file(path, what))?;
         let json::Parsed { document, blob, compressed, fallbacks, instances, zeros, has_materials } = parsed;
         let folder = path.parent().unwrap_or(Path::new("."));
-        // Each by itself, so that the message can name the one at fault.
+        // Each on its own, so that the message can name the one at fault.
         let mut blob = blob;
         let buffers = document.buffers().map(|buffer| {
             let name = match buffer.source() {
@@ -81,7 +80,7 @@ impl File {
     /// The elements of an accessor as rows of `N` numbers; normalised integers become 0..=1 or -1..=1.
     ///
     /// # Errors
-    /// Another number of components; data that lies beyond its buffer; a number that is not finite.
+    /// A different number of components; data beyond its buffer; a number that is not finite.
     pub fn rows<const N: usize>(&self, accessor: &Accessor) -> std::result::Result<Vec<[f32; N]>, String> {
         let scale = |value: f64| match (accessor.normalized(), accessor.data_type()) {
             (true, DataType::I8) => (value / 127.0).max(-1.0),
@@ -98,7 +97,7 @@ impl File {
         Ok(rows)
     }
 
-    /// The whole numbers of an accessor in rows of `N`: indices, joints.
+    /// The integers of an accessor in rows of `N`: indices, joints.
     ///
     /// # Errors
     /// As [`File::rows`].
@@ -107,7 +106,7 @@ impl File {
         Ok(rows.map(|row| row.map(|value| value as u32)).collect())
     }
 
-    /// The transforms of the copies of a node's mesh, relative to the node; none where it is drawn once.
+    /// The transforms of the copies of a node's mesh, relative to the node; `None` if it is drawn once.
     ///
     /// # Errors
     /// As [`File::rows`]; transforms of different counts.
@@ -144,7 +143,7 @@ impl File {
         Ok(Some((0..count).map(local).collect()))
     }
 
-    /// The elements of an accessor as they are stored, with those that a sparse accessor replaces.
+    /// The elements of an accessor as they are stored, with the replacements of a sparse accessor.
     fn values<const N: usize>(&self, accessor: &Accessor) -> std::result::Result<Vec<[f64; N]>, String> {
         let name = format!("accessor {}", accessor.index());
         if components(accessor.dimensions()) != N {
@@ -156,7 +155,7 @@ impl File {
             Some(view) => self
                 .numbers::<N>(&view, accessor.offset(), accessor.count(), accessor.data_type())
                 .ok_or_else(beyond)?,
-            // Zeros that no data stands for: as many as there are vertices, and each of those has bytes somewhere.
+            // Zeros without data: at most one for each vertex, and every vertex has bytes somewhere.
             None if accessor.count() > self.bytes() => return Err(beyond()),
             None => vec![[0.0; N]; accessor.count()],
         };
@@ -177,12 +176,12 @@ impl File {
         Ok(rows)
     }
 
-    /// Bytes of all buffers and of what was decompressed.
+    /// Bytes of all buffers and of the decompressed data.
     fn bytes(&self) -> usize {
         self.buffers.iter().chain(self.decoded.values()).map(Vec::len).sum()
     }
 
-    /// The bytes of a buffer view; none when they lie beyond the data.
+    /// The bytes of a buffer view; `None` if they lie beyond the data.
     fn data(&self, view: &gltf::buffer::View) -> Option<&[u8]> {
         if let Some(decoded) = self.decoded.get(&view.index()) {
             return Some(decoded);
@@ -191,7 +190,7 @@ impl File {
         buffer.get(view.offset()..view.offset().checked_add(view.length())?)
     }
 
-    /// Reads packed or strided numbers; none when they lie beyond the data.
+    /// Reads packed or strided numbers; `None` if they lie beyond the data.
     fn numbers<const N: usize>(
         &self,
         view: &gltf::buffer::View,
@@ -199,13 +198,13 @@ impl File {
         count: usize,
         kind: DataType,
     ) -> Option<Vec<[f64; N]>> {
-        // Nothing is made of the numbers once readers are to stop.
+        // Skips the work once readers are to stop.
         if count == 0 || source::is_stopped() {
             return Some(Vec::new());
         }
         let size = kind.size();
         let stride = view.stride().unwrap_or(size * N);
-        // Rows that overlap could be any number of them.
+        // Overlapping rows could be any number of them.
         if stride < size * N {
             return None;
         }
@@ -228,7 +227,7 @@ impl File {
     }
 }
 
-/// A .glb says its own length.
+/// A .glb states its own length.
 fn check_length(bytes: &[u8]) -> std::result::Result<(), String> {
     if bytes.is_empty() {
         return Err("the file is empty".into());

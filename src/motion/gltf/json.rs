@@ -1,5 +1,5 @@
-//! The JSON of a file, reduced to what moves vertices before the glTF crate reads it: that crate refuses valid files for what
-//! frazil does not look at (materials, textures, channels of extensions, application-specific attributes).
+//! The JSON of a file, reduced to what moves vertices before the glTF crate reads it: that crate refuses valid files because of data that
+//! frazil ignores (materials, textures, channels of extensions, application-specific attributes).
 
 use std::collections::{HashMap, HashSet};
 
@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 
 use crate::error::one_line;
 
-/// Extensions that are read here, beside those of [`is_harmless`].
+/// Extensions that are read here, besides those of [`is_harmless`].
 const READ: [&str; 4] =
     ["KHR_mesh_quantization", "KHR_animation_pointer", "EXT_mesh_gpu_instancing", COMPRESSION];
 const COMPRESSION: &str = "EXT_meshopt_compression";
@@ -26,28 +26,28 @@ pub(super) struct Parsed {
     pub blob: Option<Vec<u8>>,
     /// Compressed buffer views by their index.
     pub compressed: HashMap<usize, Compressed>,
-    /// Buffers that exist for readers without decompression only.
+    /// Buffers that exist only for readers without decompression.
     pub fallbacks: Vec<usize>,
     /// Nodes whose mesh is drawn several times.
     pub instances: HashMap<usize, Instancing>,
-    /// Accessors of zeros, for which there is no data.
+    /// Accessors of zeros, which have no data.
     pub zeros: HashSet<usize>,
     pub has_materials: bool,
 }
 
-/// Where the data of a buffer view is, compressed by meshoptimizer.
+/// Where the data of a buffer view compressed by meshoptimizer is.
 pub(super) struct Compressed {
     pub buffer: usize,
     pub offset: usize,
     pub length: usize,
-    /// Bytes of an element, and how many elements there are.
+    /// Bytes of an element, and the number of elements.
     pub stride: usize,
     pub count: usize,
     pub mode: String,
     pub filter: String,
 }
 
-/// Accessors of the transforms of instances, each of which may be missing.
+/// Accessors of the transforms of instances; each may be missing.
 #[derive(Default)]
 pub(super) struct Instancing {
     pub translation: Option<usize>,
@@ -55,10 +55,10 @@ pub(super) struct Instancing {
     pub scale: Option<usize>,
 }
 
-/// Reads the JSON and checks that what it names is there.
+/// Reads the JSON and checks that everything it references exists.
 ///
 /// # Errors
-/// A file that is malformed, or needs an extension that is not read.
+/// A file that is malformed, or requires an extension that is not read.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, String> {
     let invalid = |what: String| format!("not a whole glTF file ({what})");
     let (text, blob) = if bytes.starts_with(b"glTF") {
@@ -82,7 +82,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, String> {
     Ok(Parsed { document, blob, compressed, fallbacks, instances, zeros, has_materials })
 }
 
-/// The JSON and the binary chunk of a .glb; others are for extensions.
+/// The JSON and the binary chunk of a .glb; other chunks are for extensions.
 fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     if word(4) != Some(2) {
@@ -104,7 +104,7 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     Ok((json.ok_or("its first chunk is no JSON")?, binary))
 }
 
-/// Refuses files that need what is not read.
+/// Refuses files that require an extension that is not read.
 fn check_extensions(root: &Map<String, Value>) -> Result<(), String> {
     let mut required = elements(root, "extensionsRequired").iter().filter_map(Value::as_str);
     match required.find(|name| !READ.contains(name) && !is_harmless(name)) {
@@ -113,7 +113,7 @@ fn check_extensions(root: &Map<String, Value>) -> Result<(), String> {
     }
 }
 
-/// Whether an extension concerns only how surfaces look: materials, textures and their formats, lights, descriptions.
+/// Whether an extension concerns only the look of surfaces: materials, textures and their formats, lights, descriptions.
 fn is_harmless(name: &str) -> bool {
     let subject = name.split_once('_').map_or("", |(_, subject)| subject);
     ["materials_", "texture_", "lights_", "xmp"].iter().any(|start| subject.starts_with(start))
@@ -158,7 +158,7 @@ fn compressed(root: &Map<String, Value>) -> Result<HashMap<usize, Compressed>, S
     Ok(out)
 }
 
-/// Buffers that only stand for what is compressed: they need no data.
+/// Placeholder buffers for compressed data: they need no data of their own.
 fn fallbacks(root: &Map<String, Value>) -> Vec<usize> {
     let is_fallback = |buffer: &Value| {
         extension(buffer, COMPRESSION).and_then(|found| found.get("fallback")).is_some_and(|f| *f == true)
@@ -190,7 +190,7 @@ fn instances(root: &Map<String, Value>) -> Result<HashMap<usize, Instancing>, St
     Ok(out)
 }
 
-/// Accessors without data: they hold zeros. The crate wants a buffer view, so that each gets one, which is not read.
+/// Accessors without data: they hold zeros. The crate requires a buffer view, so each gets one, which is not read.
 fn without_data(root: &mut Map<String, Value>) -> HashSet<usize> {
     let mut zeros = HashSet::new();
     if elements(root, "bufferViews").is_empty() {
@@ -206,7 +206,7 @@ fn without_data(root: &mut Map<String, Value>) -> HashSet<usize> {
     zeros
 }
 
-/// Channels that point at a node's property (KHR_animation_pointer) become ordinary ones.
+/// Turns channels that point at a node's property (KHR_animation_pointer) into ordinary ones.
 fn point_at_nodes(root: &mut Map<String, Value>) {
     for animation in elements_mut(root, "animations").iter_mut().filter_map(Value::as_object_mut) {
         for target in elements_mut(animation, "channels").iter_mut().filter_map(|c| c.get_mut("target")) {
@@ -222,7 +222,7 @@ fn point_at_nodes(root: &mut Map<String, Value>) {
     }
 }
 
-/// Takes out what moves no vertex.
+/// Removes everything that moves no vertex.
 fn reduce(root: &mut Map<String, Value>) {
     for key in
         ["cameras", "images", "materials", "samplers", "textures", "extensionsRequired", "extensionsUsed"]
@@ -240,7 +240,7 @@ fn reduce(root: &mut Map<String, Value>) {
     let animations = root.get_mut("animations").and_then(Value::as_array_mut).into_iter().flatten();
     for animation in animations {
         if let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) {
-            // A channel without a node, or of another property, is for extensions.
+            // Channels without a node, or of another property, are for extensions.
             channels.retain(animates_node);
         }
     }
@@ -268,7 +268,7 @@ fn is_read(attribute: &str) -> bool {
     SEMANTICS.contains(&attribute) || NUMBERED_SEMANTICS.iter().any(is_numbered)
 }
 
-/// Takes out extensions and what applications add, at any depth.
+/// Removes extensions and application data, at any depth.
 fn without_additions(value: &mut Value) {
     match value {
         Value::Array(values) => values.iter_mut().for_each(without_additions),
@@ -285,12 +285,11 @@ fn without_keys(object: &mut Map<String, Value>) {
     object.remove("extras");
 }
 
-/// The document, once all that it names is there.
+/// The document, once everything that it references exists.
 fn checked(root: Value) -> Result<Document, String> {
     let mut root: gltf::json::Root =
         serde_json::from_value(root).map_err(|error| one_line(&error.to_string()))?;
-    // The check below looks at the bounds of positions before it knows that they are there, and insists on them;
-    // nothing here needs the bounds.
+    // The check below reads the bounds of positions before it knows that they exist, and requires them; nothing here needs the bounds.
     for attribute in root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|p| p.attributes.values())
     {
         let accessor = root.accessors.get_mut(attribute.value()).ok_or("an attribute names no accessor")?;

@@ -7,13 +7,13 @@ use meshopt_rs::vertex::filter;
 
 use super::json::Compressed;
 
-/// No byte of compressed data stands for more than this many.
+/// Maximum bytes that one byte of compressed data expands to.
 const MOST_EXPANSION: usize = 256;
 
 /// The bytes of a view.
 ///
 /// # Errors
-/// What is wrong with the data, as a part of a sentence about the view.
+/// What is wrong with the data, as part of a sentence about the view.
 pub(super) fn decode(view: &Compressed, data: &[u8]) -> Result<Vec<u8>, String> {
     let size = view.stride.checked_mul(view.count).filter(|size| *size / MOST_EXPANSION <= data.len());
     let size = size.ok_or("is shorter than its count")?;
@@ -43,7 +43,7 @@ fn damaged(error: impl std::fmt::Debug) -> String {
     format!("is damaged ({error:?})")
 }
 
-/// The decoder takes the size of a vertex from a type.
+/// The decoder infers the size of a vertex from a type.
 fn vertices(view: &Compressed, data: &[u8]) -> Result<Vec<u8>, String> {
     fn of_size<const N: usize>(count: usize, data: &[u8]) -> Result<Vec<u8>, String> {
         let mut out = vec![[0u8; N]; count];
@@ -63,7 +63,7 @@ fn vertices(view: &Compressed, data: &[u8]) -> Result<Vec<u8>, String> {
         240 244 248 252 256)
 }
 
-/// Indices as bytes of 16 or 32 bits each.
+/// Indices as integers of 16 or 32 bits.
 fn narrowed(indices: &[u32], stride: usize) -> Result<Vec<u8>, String> {
     match stride {
         2 => Ok(indices.iter().flat_map(|index| (*index as u16).to_le_bytes()).collect()),

@@ -1,7 +1,7 @@
 //! Animated characters in glTF 2.0 files (.gltf, .glb): node animation, skins, morph targets.
 //!
-//! The file's own rules apply (Khronos, glTF 2.0 specification, sections 3.7 and 3.11): a skinned vertex is the weighted sum
-//! of its joints' matrices, its own node's position does not count; rotations are interpolated along the shorter arc.
+//! As the format specifies (Khronos, glTF 2.0 specification, sections 3.7 and 3.11): a skinned vertex is the weighted sum of its joints'
+//! matrices, and its own node's transform does not count; rotations are interpolated along the shorter arc.
 
 mod clip;
 mod file;
@@ -24,24 +24,24 @@ use file::File;
 use nodes::Node;
 use skin::Vertices;
 
-/// A round whose ends differ by more than this part of the character's size starts with a jump.
+/// A repeat whose ends differ by more than this fraction of the character's size starts with a jump.
 const SAME_POSE: f64 = 1e-3;
-/// Kinks this close to the ends of an interval (s) are those ends: times in files are 32-bit floats.
+/// Kinks this close to the ends of an interval (s) count as the ends: times in files are 32-bit floats.
 const AT_END: f64 = 2e-5;
 
 /// A clip shorter than this (s) is a pose: it does not repeat.
 const SHORTEST_ROUND: f64 = 1e-3;
 
-/// What of a file is wanted, and when it plays.
+/// Which parts of a file are wanted, and when they play.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Play {
-    /// Only nodes of this name, and what hangs on them; `*` stands for any letters. None: all.
+    /// Only nodes of this name, and their descendants; `*` matches any letters. None: all.
     pub node: Option<String>,
-    /// The clip's name; an empty one for the pose at rest. None: the only clip, or the rest pose without any.
+    /// The clip's name; empty: the rest pose. None: the only clip, or the rest pose if there is none.
     pub clip: Option<String>,
     /// Whether the clip starts again when it ends.
     pub repeat: bool,
-    /// When the clip's first key is (s).
+    /// Time of the clip's first key (s).
     pub start: f64,
 }
 
@@ -51,14 +51,14 @@ impl Default for Play {
     }
 }
 
-/// What a glTF file holds.
+/// Contents of a glTF file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contents {
     /// Clips with their lengths (s).
     pub clips: Vec<(String, f64)>,
     /// Names of the nodes with a mesh.
     pub mesh_nodes: Vec<String>,
-    /// Those and all that they hang on, parents first: name, depth in the tree, whether it has a mesh.
+    /// Those nodes and all their ancestors, parents first: name, depth in the tree, whether it has a mesh.
     pub tree: Vec<(String, usize, bool)>,
     /// Number of skins.
     pub skins: usize,
@@ -67,26 +67,26 @@ pub struct Contents {
 /// The moving meshes of a glTF file.
 pub struct Character {
     nodes: Vec<Node>,
-    /// Node numbers, parents first.
+    /// Node indices, parents first.
     order: Vec<usize>,
     vertices: Vertices,
-    /// The vertices that triangles name, and the triangles over these; none when they name all.
+    /// The vertices that triangles use, and the triangles over these; `None` if they use all.
     moving: Option<(Vec<u32>, Vec<[u32; 3]>)>,
     clip: Option<Clip>,
     play: Play,
     kinks: Vec<f64>,
-    /// Length of a round's last step, when its ends differ (the file's unit).
+    /// Length of the jump when the clip repeats, if its ends differ (the file's unit).
     jump: Option<f64>,
     /// Hash of the file and its buffers.
     content: String,
 }
 
 impl Character {
-    /// Opens a file. Vertices are welded when they agree in place, joints, weights and morph targets.
+    /// Opens a file. Vertices are welded if they agree in position, joints, weights and morph targets.
     ///
     /// # Errors
-    /// A file that is cut short, malformed, or names a buffer that is not there; a clip or node that does not
-    /// exist (those that do are named); several clips and none chosen; no triangles.
+    /// A file that is truncated or malformed, or names a missing buffer; a clip or node that does not exist (the existing ones are named);
+    /// several clips and none chosen; no triangles.
     pub fn open(path: &Path, play: Play) -> Result<Self> {
         caught(path, || Self::read(path, play))
     }
@@ -125,15 +125,15 @@ impl Character {
         Ok(character)
     }
 
-    /// Hash of the file and the buffers that it names, as they were read.
+    /// Hash of the file and its buffers, as they were read.
     pub fn content(&self) -> &str {
         &self.content
     }
 
-    /// What a file holds.
+    /// The contents of a file.
     ///
     /// # Errors
-    /// A file that is cut short or malformed; a clip whose keys are.
+    /// A file that is truncated or malformed; a clip with malformed keys.
     pub fn describe(path: &Path) -> Result<Contents> {
         caught(path, || Self::contents(path))
     }
@@ -155,7 +155,7 @@ impl Character {
         })
     }
 
-    /// The meshes of a file as they are at a time (s) of a shot (the file's unit).
+    /// The meshes of a file at a time (s) of a shot (the file's unit).
     ///
     /// # Errors
     /// As [`Character::open`].
@@ -167,10 +167,10 @@ impl Character {
         Ok(TriMesh { positions, triangles: character.triangles().to_vec() })
     }
 
-    /// Names of what a file holds besides positions, triangles and motion, in the plural: "UVs", "materials" ...
+    /// Names of a file's contents besides positions, triangles and motion, in the plural: "UVs", "materials" ...
     ///
     /// # Errors
-    /// A file that is cut short or malformed.
+    /// A file that is truncated or malformed.
     pub fn extras(path: &Path) -> Result<Vec<&'static str>> {
         caught(path, || {
             let File { document, has_materials, .. } = File::open(path)?;
@@ -189,7 +189,7 @@ impl Character {
         })
     }
 
-    /// The meshes of a file in their pose at rest (the file's unit).
+    /// The meshes of a file in their rest pose (the file's unit).
     ///
     /// # Errors
     /// As [`Character::open`].
@@ -197,7 +197,7 @@ impl Character {
         Self::at_rest_from(path, DVec3::zeros())
     }
 
-    /// As [`Character::at_rest`], less `origin`, which is subtracted in 64 bits.
+    /// As [`Character::at_rest`], minus `origin`, which is subtracted in 64 bits.
     ///
     /// # Errors
     /// As [`Character::open`].
@@ -243,10 +243,10 @@ impl Character {
         self.vertices.pose(&locals, &globals, out);
     }
 
-    /// Keeps the positions of vertices that triangles name.
+    /// Keeps only the positions of vertices that triangles use.
     fn keep_moving(&self, positions: &mut Vec<DVec3>) {
         if let Some((used, _)) = &self.moving {
-            // They ascend: none is overwritten before it is read.
+            // Indices ascend: no position is overwritten before it is read.
             used.iter().enumerate().for_each(|(to, &from)| positions[to] = positions[from as usize]);
             positions.truncate(used.len());
         }
@@ -368,7 +368,7 @@ fn tree(file: &File, nodes: &[Node]) -> Vec<(String, usize, bool)> {
             None => roots.push(index),
         }
         let mut at = node.parent.filter(|_| has_mesh[index]);
-        // As many steps as there are nodes: a tree that runs in a circle ends too.
+        // At most as many steps as there are nodes: ends even if the tree has a cycle.
         for _ in 0..nodes.len() {
             let Some(parent) = at else { break };
             shown[parent] = true;
@@ -386,7 +386,7 @@ fn tree(file: &File, nodes: &[Node]) -> Vec<(String, usize, bool)> {
     out
 }
 
-/// A name for each clip: its own, or its index where it has none; clips that share a name are numbered: "go #1", "go #2".
+/// A name for each clip: its own, or its index if it has none; clips that share a name are numbered: "go #1", "go #2".
 fn clip_names(file: &File) -> Vec<String> {
     let own =
         |clip: gltf::Animation| clip.name().map_or_else(|| format!("clip {}", clip.index()), str::to_string);
@@ -440,7 +440,7 @@ fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
     text.join(", ")
 }
 
-/// Whether a name fits a pattern in which `*` stands for any letters and `?` for one.
+/// Whether a name matches a pattern in which `*` stands for any letters and `?` for one.
 fn matches(pattern: &str, name: &str) -> bool {
     let (pattern, name): (Vec<char>, Vec<char>) = (pattern.chars().collect(), name.chars().collect());
     let (mut p, mut n, mut star) = (0, 0, None);
@@ -452,7 +452,7 @@ fn matches(pattern: &str, name: &str) -> bool {
             }
             Some(&letter) if letter == '?' || letter == name[n] => (p, n) = (p + 1, n + 1),
             _ => match star {
-                // The last star takes one letter more.
+                // The last star takes one more letter.
                 Some((at, taken)) => {
                     star = Some((at, taken + 1));
                     (p, n) = (at + 1, taken + 1);

@@ -1,10 +1,10 @@
-//! The tree of nodes: where each one is, from its own position and its parents'.
+//! The node tree: transforms of nodes, from their own and their parents'.
 
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion};
 
 use crate::geometry::DVec3;
 
-/// A node's own position, which a clip may animate.
+/// A node's own transform, which a clip may animate.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Local {
     pub translation: DVec3,
@@ -19,7 +19,7 @@ pub(super) struct Node {
     pub name: String,
     pub parent: Option<usize>,
     pub rest: Local,
-    /// Its transform when the file has it as a matrix: such a node cannot be animated.
+    /// Its transform, if the file has it as a matrix: such a node cannot be animated.
     pub matrix: Option<Matrix4<f64>>,
 }
 
@@ -76,7 +76,7 @@ pub(super) fn matrix4(columns: &[[f32; 4]; 4]) -> Matrix4<f64> {
     Matrix4::from_fn(|row, column| f64::from(columns[column][row]))
 }
 
-/// The nodes in an order that has parents first; none when the tree runs in a circle.
+/// The nodes in an order with parents first; `None` if the tree has a cycle.
 pub(super) fn parents_first(nodes: &[Node]) -> Option<Vec<usize>> {
     let mut order = Vec::with_capacity(nodes.len());
     let mut placed = vec![false; nodes.len()];

@@ -1,4 +1,4 @@
-//! The vertices: morphed by their targets, carried by their joints or by their node.
+//! The vertices: morphed by their targets, moved by their joints or by their node.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -11,13 +11,13 @@ use super::file::File;
 use super::nodes::{Local, matrix4};
 use crate::geometry::{DVec3, Uvs, Vec3};
 
-/// A skin: nodes that carry vertices, and from where.
+/// A skin: the nodes that move vertices, and their inverse bind matrices.
 struct Skin {
     joints: Vec<usize>,
     inverse_bind: Vec<Matrix4<f64>>,
 }
 
-/// Most triangles, or vertices, that copies of a mesh may have.
+/// Maximum triangles, or vertices, that copies of a mesh may have.
 const MOST_COPIED: usize = 1 << 25;
 
 /// Vertices of one node that move alike: all by joints of one skin, or all by the node.
@@ -25,21 +25,21 @@ const MOST_COPIED: usize = 1 << 25;
 struct Part {
     node: usize,
     skin: Option<usize>,
-    /// Where this copy of the mesh is, relative to the node; none where there is one.
+    /// Transform of this copy of the mesh, relative to the node; `None` if there is only one.
     instance: Option<Matrix4<f64>>,
-    /// Its triangles in the whole.
+    /// Its triangles among all.
     triangles: Range<usize>,
-    /// Numbers of its vertices in the whole: `first..first + rest.len()`.
+    /// Its vertices among all: `first..first + rest.len()`.
     first: usize,
     rest: Vec<DVec3>,
     /// One list for each morph target.
     deltas: Vec<Vec<DVec3>>,
-    /// Joints of each vertex and their weights, which add up to 1: `spans[v]..spans[v + 1]` of `influences`.
+    /// Joints of each vertex and their weights, which sum to 1: `spans[v]..spans[v + 1]` of `influences`.
     spans: Vec<u32>,
     influences: Vec<(u32, f64)>,
 }
 
-/// What a corner of the file is made of: corners that agree in all of it are one vertex.
+/// Data of a corner in the file: corners that agree in all of it are one vertex.
 #[derive(PartialEq, Eq, Hash)]
 struct Corner {
     position: [u32; 3],
@@ -57,14 +57,14 @@ pub(super) struct Vertices {
     pub drawn: Sheet,
 }
 
-/// The vertices as the file has them: those of each primitive of each node, in its accessor's order.
+/// The vertices in the order of the file: primitive by primitive of each node, in the accessor's order.
 #[derive(Default)]
 pub(super) struct Sheet {
-    /// For each the vertex that moves like it.
+    /// For each, the vertex that moves like it.
     pub vertices: Vec<u32>,
-    /// As many as above, in the same order, over these vertices.
+    /// The same triangles as `Vertices` has, in the same order, over these vertices.
     pub triangles: Vec<[u32; 3]>,
-    /// One pair for each vertex, once a primitive has any.
+    /// One pair for each vertex, as soon as a primitive has any.
     pub uvs: Option<Uvs>,
     /// Vertices of the current node that primitives share: their accessors, and where they begin.
     shared: Vec<(Vec<usize>, usize)>,
@@ -99,7 +99,7 @@ impl Vertices {
         }
         for node in file.document.nodes().filter(|node| wanted(node.index())) {
             let Some(mesh) = node.mesh() else { continue };
-            // A skin puts vertices where its joints are, whatever the node's transform.
+            // A skin places vertices by its joints, whatever the node's transform.
             let instances = if node.skin().is_some() { None } else { file.instances(node.index())? };
             if instances.as_ref().is_some_and(Vec::is_empty) {
                 continue;
@@ -132,7 +132,7 @@ impl Vertices {
         Ok(out)
     }
 
-    /// Adds copies of the last part, whose triangles, drawn vertices and drawn triangles begin at `begin`.
+    /// Adds copies of the last part; its triangles, drawn vertices and drawn triangles begin at `begin`.
     fn copy_last(&mut self, copies: &[Local], begin: [usize; 3]) -> Result<(), String> {
         let original = self.parts.last().expect("a part to copy").clone();
         let [triangles, corners] = [original.triangles.len(), self.drawn.vertices.len() - begin[1]];
@@ -184,7 +184,7 @@ impl Vertices {
         if targets.iter().any(|target| target.len() != positions.len()) {
             return Err("a morph target has another number of vertices".into());
         }
-        // Primitives with fewer targets stay where they are under the others.
+        // Primitives with fewer targets do not move under the others.
         while part.deltas.len() < targets.len() {
             part.deltas.push(vec![DVec3::zeros(); part.rest.len()]);
         }
@@ -222,7 +222,7 @@ impl Vertices {
         self.drawn.add(file, primitive, &numbers, &own)
     }
 
-    /// Flips the triangles of parts that the transforms of their node or of their joints mirror.
+    /// Flips the triangles of parts that are mirrored by the transforms of their node or their joints.
     pub fn face_outward(&mut self, globals: &[Matrix4<f64>]) {
         for part in &self.parts {
             if self.is_mirrored(part, globals) {
@@ -233,8 +233,8 @@ impl Vertices {
         }
     }
 
-    /// Whether the transforms of a part turn its faces round: of a skinned one most of its vertices by weight, wherever in the
-    /// tree the mirroring node is.
+    /// Whether the transforms of a part mirror it: for a skinned part, most of its vertices by weight, wherever in the tree the mirroring
+    /// node is.
     fn is_mirrored(&self, part: &Part, globals: &[Matrix4<f64>]) -> bool {
         let handedness = |matrix: Matrix4<f64>| {
             let determinant = matrix.fixed_view::<3, 3>(0, 0).determinant();
@@ -286,14 +286,14 @@ impl Vertices {
 }
 
 impl Part {
-    /// What carries its vertices where it has no skin.
+    /// The transform of its vertices if it has no skin.
     fn node_matrix(&self, globals: &[Matrix4<f64>]) -> Matrix4<f64> {
         self.instance.map_or(globals[self.node], |instance| globals[self.node] * instance)
     }
 }
 
 impl Sheet {
-    /// Adds a copy of some vertices and of the triangles over them; `shift` is from the index of a moving vertex to its copy's.
+    /// Adds a copy of some vertices and of the triangles over them; `shift` leads from the index of a moving vertex to that of its copy.
     fn copy(&mut self, vertices: Range<usize>, triangles: Range<usize>, shift: u32) {
         let by = (self.vertices.len() - vertices.start) as u32;
         for at in triangles {
@@ -307,7 +307,7 @@ impl Sheet {
         }
     }
 
-    /// Adds a primitive: its vertices, by what moves like them, and its triangles over those.
+    /// Adds a primitive: its vertices, by the vertices that move like them, and its triangles over those.
     fn add(
         &mut self,
         file: &File,
@@ -335,7 +335,7 @@ impl Sheet {
         Ok(())
     }
 
-    /// Texture coordinates of the vertices from `begin` on: their own ones point down from the top.
+    /// Texture coordinates of the vertices from `begin` on; in glTF v points down from the top.
     fn add_positions(
         &mut self,
         file: &File,
@@ -361,7 +361,7 @@ impl Sheet {
     }
 }
 
-/// The joints and weights over 0 of each vertex; a skinned vertex without any hangs on the first joint.
+/// The joints and the weights above 0 of each vertex; a skinned vertex without any follows the first joint.
 fn joints(
     file: &File,
     primitive: &gltf::Primitive,

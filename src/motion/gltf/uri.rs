@@ -1,4 +1,4 @@
-//! The buffers of a file: inside it, or files beside it.
+//! The buffers of a file: embedded, or files beside it.
 
 use std::path::{Component, Path};
 
@@ -9,13 +9,13 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use crate::error::Result;
 use crate::io::files::source;
 
-/// Why a buffer cannot be had: behind its name.
+/// Or why a buffer cannot be read, to follow its name.
 pub(super) type Told<T> = std::result::Result<T, String>;
 
-/// Reads a buffer. A file must lie in the model's folder or below: a model is data, and names no other file.
+/// Reads a buffer. A file must lie in the model's folder or below: a model is data, and may not read other files.
 ///
 /// # Errors
-/// Another position, a missing file, something that is not a regular file, text that is not base64.
+/// Another folder, a missing file, something that is not a regular file, text that is not base64.
 pub(super) fn read(
     buffer: &gltf::Buffer,
     folder: &Path,
@@ -43,21 +43,21 @@ pub(super) fn read(
     }
 }
 
-/// Base64 (RFC 4648, section 4), with its padding or without.
+/// Base64 (RFC 4648, section 4), with or without padding.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &alphabet::STANDARD,
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
 
-/// The bytes of a buffer whose URI holds them; none when they are not base64.
+/// The bytes of a buffer embedded in its URI; `None` if they are not base64.
 fn written_out(uri: &str) -> Option<Vec<u8>> {
     let mut bytes = BASE64.decode(uri.split_once(";base64,")?.1).ok()?;
-    // As long as the chunk of a .glb would be.
+    // Padded like the chunk of a .glb.
     bytes.resize(bytes.len().next_multiple_of(4), 0);
     Some(bytes)
 }
 
-/// A URI without its percent signs; none when it is not text.
+/// A URI with its percent encoding decoded; `None` if the result is not text.
 fn decoded(uri: &str) -> Option<String> {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();
@@ -91,7 +91,7 @@ mod tests {
                 "{text}"
             );
         }
-        // A letter too many, bits that say nothing, signs of another alphabet, a line's end, padding inside.
+        // One letter too many, non-zero unused bits, signs of another alphabet, a line end, padding inside.
         for wrong in ["Z", "Zm9vY", "Zh==", "Zm9=", "Zm-v", "Zm9v\n", "Zg==Zm9v", "Zg==="] {
             assert_eq!(written_out(&format!("data:;base64,{wrong}")), None, "{wrong}");
         }

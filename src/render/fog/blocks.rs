@@ -19,16 +19,15 @@ type Samples = [f32; EDGE * EDGE * EDGE];
 pub(super) const NODE: i32 = 16;
 /// Blocks of a node.
 const NODE_BLOCKS: usize = (NODE * NODE * NODE) as usize;
-/// Most nodes in the box around a fog: their table takes 64 MB.
+/// Maximum number of nodes in the box around a fog: their table takes 64 MB.
 const MOST_NODES: f64 = (1 << 24) as f64;
-/// Voxels have coordinates below this, either way.
+/// Voxel coordinates have magnitudes below this.
 const FARTHEST: i32 = 1 << 30;
-/// Greatest extinction (1/m): no light passes a micrometre.
+/// Maximum extinction (1/m): no light passes a micrometre.
 const MOST_EXTINCTION: f64 = 1.0e6;
-/// Voxels below this part of the greatest extinction are left out of the bounds, so that wisps which nobody sees do not widen
-/// the view.
+/// Voxels below this share of the maximum extinction are left out of the bounds, so that invisible wisps do not widen the view.
 const SEEN: f32 = 0.01;
-/// Memory (bytes) of a block with samples of its own while a fog is made: these, twice, and its light.
+/// Memory (bytes) of a block with its own samples while a fog is made: these, twice, and its light.
 const DENSE_BYTES: u64 = 2 * size_of::<Samples>() as u64 + 1500;
 /// Memory (bytes) of any block position while a fog is made.
 const POSITION_BYTES: u64 = 256;
@@ -38,7 +37,7 @@ const NONE: u32 = u32::MAX;
 /// A fog volume, ready to be drawn.
 pub struct Fog {
     placement: Placement,
-    /// Least corner of the box of nodes, in nodes, and how many there are along each axis.
+    /// Minimum corner of the box of nodes, in nodes, and the number of nodes along each axis.
     low: [i32; 3],
     counts: [usize; 3],
     /// For each node of the box its index, or [`NONE`].
@@ -46,7 +45,7 @@ pub struct Fog {
     /// For each block of a node its index, or [`NONE`].
     nodes: Vec<Box<[u32; NODE_BLOCKS]>>,
     blocks: Vec<FogBlock>,
-    /// Blocks of one value share theirs.
+    /// Samples of the blocks; blocks of one uniform value share them.
     samples: Vec<Samples>,
     bounds: Option<(DVec3, DVec3)>,
 }
@@ -54,23 +53,23 @@ pub struct Fog {
 /// A block that is not empty.
 #[derive(Clone, Copy)]
 pub(super) struct FogBlock {
-    /// Least corner, in voxels.
+    /// Minimum corner, in voxels.
     pub origin: Origin,
     samples: u32,
 }
 
-/// Where the voxels of a fog are in the world.
+/// Positions of the voxels of a fog in the world.
 #[derive(Debug, Clone, Copy)]
 pub struct Placement {
     /// The centre of voxel (0, 0, 0) (m).
     origin: DVec3,
-    /// The ways (m) from one voxel to the next along x, y and z.
+    /// Displacements (m) from one voxel to the next along x, y and z.
     axes: Matrix3<f64>,
     inverse: Matrix3<f64>,
 }
 
 impl Placement {
-    /// From the centre of voxel (0, 0, 0) and the ways to its neighbours (m); none where these lie in a plane.
+    /// From the centre of voxel (0, 0, 0) and the displacements to its neighbours (m); none if these are coplanar.
     pub fn new(origin: DVec3, axes: [DVec3; 3]) -> Option<Self> {
         let axes = Matrix3::from_columns(&axes);
         let inverse = axes.try_inverse()?;
@@ -87,7 +86,7 @@ impl Placement {
         [self.inverse * (origin - self.origin), self.inverse * toward]
     }
 
-    /// Shortest way (m) between neighbouring voxels.
+    /// Minimum distance (m) between neighbouring voxels.
     pub fn cell(self) -> f64 {
         self.axes.column_iter().map(|axis| axis.norm()).fold(f64::INFINITY, f64::min)
     }
@@ -132,9 +131,8 @@ impl Filled {
 }
 
 impl Fog {
-    /// A fog of densities by block position (a multiple of 8 on each axis), each at most once. Density 1 loses the part
-    /// `extinction` of the light per metre, for short ways (1/m, over 0; what comes to more than a million counts as that).
-    ///
+    /// A fog of densities by block position (a multiple of 8 on each axis), each at most once. Density 1 attenuates light by `extinction`
+    /// per metre (1/m, over short paths, over 0; products above a million count as a million).
     /// # Errors
     /// Densities too far apart, or too many for the memory limit; cancel.
     pub fn of_parts(
@@ -146,7 +144,7 @@ impl Fog {
         parts.retain(|(_, part)| !part.is_empty());
         let (low, counts) = node_box(&parts)?;
         const WHAT: &str = "a fog";
-        // Of each block, the eight positions in which its samples count.
+        // For each block, the eight positions whose samples it contributes to.
         ctx.allow(WHAT, 8 * parts.len() as u64 * size_of::<Origin>() as u64)?;
         let positions = ctx.pool().install(|| positions(&parts));
         ctx.allow(WHAT, parts.len() as u64 * POSITION_BYTES + positions.len() as u64 * POSITION_BYTES)?;
@@ -211,7 +209,7 @@ impl Fog {
         self.blocks.push(block);
     }
 
-    /// Where the node of a block is in the table, none outside of the box, and where the block is in the node.
+    /// Position of a block's node in the table (none outside the box), and of the block in the node.
     fn slot(&self, position: [i32; 3]) -> (Option<usize>, usize) {
         let [x, y, z] = [0, 1, 2].map(|axis| i64::from(position[axis].div_euclid(NODE) - self.low[axis]));
         let inside = [x, y, z].iter().zip(&self.counts).all(|(at, count)| (0..*count as i64).contains(at));
@@ -220,7 +218,7 @@ impl Fog {
         (inside.then_some(slot), (x * NODE as usize + y) * NODE as usize + z)
     }
 
-    /// What is at a block position, in blocks.
+    /// Contents of a block position, in blocks.
     pub(super) fn look(&self, position: [i32; 3]) -> Look {
         let (Some(slot), within) = self.slot(position) else { return Look::Outside };
         match self.table[slot] {
@@ -232,7 +230,7 @@ impl Fog {
         }
     }
 
-    /// Least block position of the box of nodes, and the first one beyond it, in blocks.
+    /// Minimum block position of the box of nodes, and the first one beyond it, in blocks.
     pub(super) fn block_box(&self) -> [[i32; 3]; 2] {
         let end = [0, 1, 2].map(|axis| (self.low[axis] + self.counts[axis] as i32) * NODE);
         [self.low.map(|low| low * NODE), end]
@@ -243,12 +241,12 @@ impl Fog {
         &self.blocks
     }
 
-    /// Where its voxels are.
+    /// Positions of its voxels.
     pub(super) fn placement(&self) -> Placement {
         self.placement
     }
 
-    /// Extinction (1/m) at a position in a block, in voxels from its least corner, 0 to 8.
+    /// Extinction (1/m) at a position in a block, in voxels from its minimum corner, 0 to 8.
     #[inline]
     pub(super) fn extinction(&self, block: usize, local: [f32; 3]) -> f32 {
         let samples = &self.samples[self.blocks[block].samples as usize];
@@ -264,7 +262,7 @@ impl Fog {
         near + (far - near) * x
     }
 
-    /// Greatest extinction (1/m) of the samples of a block around a position, less than `reach` voxels away along each axis.
+    /// Maximum extinction (1/m) of the samples of a block around a position, less than `reach` voxels away along each axis.
     pub(super) fn most_near(&self, block: usize, local: [i32; 3], reach: i32) -> f32 {
         let samples = &self.samples[self.blocks[block].samples as usize];
         let [x, y, z] =
@@ -279,8 +277,8 @@ impl Fog {
         self.blocks.is_empty()
     }
 
-    /// Least and greatest corner (m) of what is seen of it: of the voxels with a hundredth of the greatest density or more;
-    /// none when it is empty.
+    /// Minimum and maximum corner (m) of its visible part: of the voxels with at least a hundredth of the maximum density; none if it is
+    /// empty.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         self.bounds
     }
@@ -307,19 +305,19 @@ impl Fog {
     }
 }
 
-/// What is at a block position.
+/// Contents of a block position.
 pub(super) enum Look {
     /// A block that is not empty, by its index.
     Block(usize),
     /// Nothing.
     Empty,
-    /// Nothing, nor in the whole node.
+    /// Nothing in the whole node.
     EmptyNode,
-    /// It is outside of the box of nodes.
+    /// Outside the box of nodes.
     Outside,
 }
 
-/// The box of nodes around some blocks and what lies before them: its least node and the number of nodes along each axis.
+/// The box of nodes around some blocks and the positions before them: its minimum node and the number of nodes along each axis.
 fn node_box(parts: &[(Origin, Part<'_>)]) -> Result<([i32; 3], [usize; 3])> {
     let too_far = || Error::argument("has densities too far apart, or too far from its origin, to be drawn");
     let ends = parts.iter().map(|(origin, _)| (*origin, *origin)).reduce(|(low, high), (at, _)| {
@@ -339,7 +337,7 @@ fn node_box(parts: &[(Origin, Part<'_>)]) -> Result<([i32; 3], [usize; 3])> {
     Ok((first, counts))
 }
 
-/// The block positions in which something may be: those of the parts and those before them, whose last cells end there.
+/// The block positions that may not be empty: those of the parts and those before them, whose last cells end there.
 fn positions(parts: &[(Origin, Part<'_>)]) -> Vec<Origin> {
     let before = |n: usize, origin: &Origin| [0, 1, 2].map(|axis| origin[axis] - (n >> axis & 1) as i32 * 8);
     let mut positions: Vec<Origin> =
@@ -349,14 +347,14 @@ fn positions(parts: &[(Origin, Part<'_>)]) -> Vec<Origin> {
     positions
 }
 
-/// The block at a position and those behind it along the axes.
+/// The block at a position and the next ones along the axes.
 fn near<'a>(position: Origin, parts: &HashMap<Origin, Part<'a>>) -> [Option<Part<'a>>; 8] {
     std::array::from_fn(|n| {
         parts.get(&[0, 1, 2].map(|axis| position[axis] + (n >> axis & 1) as i32 * DIM as i32)).copied()
     })
 }
 
-/// The density of all samples of the block at a position; none where they may differ.
+/// The density of all samples of the block at a position; none if they may differ.
 fn even_at(position: Origin, parts: &HashMap<Origin, Part<'_>>) -> Option<f32> {
     let near = near(position, parts);
     let Some(Part::Even(first)) = near[0] else { return None };

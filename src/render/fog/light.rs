@@ -1,4 +1,4 @@
-//! The light in fogs: how much of the sun and of the sky reaches each part, computed once for a picture.
+//! The light in fogs: how much of the sun and of the sky reaches each part, computed once per picture.
 
 use rayon::prelude::*;
 
@@ -9,22 +9,22 @@ use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::numeric::blocks::DIM;
 
-/// Voxels between two samples of light: it changes less from place to place than the density does.
+/// Voxels between two samples of light, which varies less from position to position than the density does.
 const SPACING: usize = 2;
 /// Samples along an edge of a block.
 const EDGE: usize = DIM / SPACING + 1;
 /// The light in a block; sample (x, y, z) lies at `(x * 5 + y) * 5 + z`.
 type Lattice = [Lit; EDGE * EDGE * EDGE];
-/// Greatest step (voxels) of rays towards the light.
+/// Maximum step (voxels) of rays towards the light.
 const STRIDE: f64 = 2.0;
-/// Optical depth behind which nothing arrives.
+/// Optical depth beyond which no light arrives.
 const OPAQUE: f64 = 12.0;
-/// A block in which no sample has more sun or sky counts as dark.
+/// A block whose samples all have less sun and sky than this counts as dark.
 const DARK: f32 = 1.0e-4;
-/// Part of the sky's light that arrives in the thickest fog: it comes from the side, scattered many times.
+/// Share of the sky's light that arrives in the thickest fog: it comes from the sides, scattered many times.
 const LEAST_SKY: f32 = 0.35;
 
-/// The light at a position, each as a part of what there is in the open, 0 to 1.
+/// The light at a position, each as a share of the unobstructed light, 0 to 1.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lit {
     /// Sun that the fogs let through.
@@ -42,13 +42,13 @@ pub(in crate::render) struct LitFogs<'a> {
     pub(super) sun: DVec3,
     /// For each fog and block the index of its light.
     of_block: Vec<Vec<u32>>,
-    /// The first is that of dark blocks.
+    /// The first one is for dark blocks.
     lattices: Vec<Lattice>,
 }
 
 impl<'a> LitFogs<'a> {
-    /// Lights fogs by a sun in a direction (a unit vector); `blocked` returns whether something besides fog hides a
-    /// direction from a point (m).
+    /// Lights fogs by a sun in a direction (a unit vector); `blocked` returns whether something other than fog blocks a direction from a
+    /// point (m).
     ///
     /// # Errors
     /// Cancel.
@@ -79,9 +79,9 @@ impl<'a> LitFogs<'a> {
         Ok(Self { fogs, sun, of_block, lattices })
     }
 
-    /// Part of the sun's light, 0 to 1, that the fogs let through to a point (m), `toward` the sun (a unit vector).
+    /// Share of the sun's light, 0 to 1, that the fogs transmit to a point (m); `toward` is the direction of the sun (a unit vector).
     pub fn sunlight(&self, point: DVec3, toward: DVec3) -> f64 {
-        // Where the ray enters the first fog, it is known what that and all behind it let through.
+        // Where the ray enters the first fog, the light accounts for that fog and all behind it.
         entry(self.fogs, (point, toward)).map_or(1.0, |here| f64::from(self.at(here).sun))
     }
 
@@ -114,13 +114,13 @@ fn lattice(
 ) -> Option<Box<Lattice>> {
     let of = &fogs[fog];
     let corner = DVec3::from(of.blocks()[block].origin.map(f64::from));
-    // Rays towards the sun start a little off, so that fog on the ground is not in the ground's shade.
+    // Rays towards the sun start slightly off the point, so that fog on the ground is not in the ground's shadow.
     let skin = sun * (SPACING as f64 * of.placement().cell());
     let lit = |n: usize| {
         let position = [n / (EDGE * EDGE), n / EDGE % EDGE, n % EDGE].map(|at| (at * SPACING) as i32);
         let point = of.placement().to_world(corner + DVec3::from(position.map(f64::from)));
         let sun_left = left(fogs, point, sun);
-        // Light where there is no fog around is only asked for by [`LitFogs::sunlight`].
+        // Where there is no fog around, only [`LitFogs::sunlight`] asks for light.
         let is_seen = sun_left > DARK && of.most_near(block, position, SPACING as i32) > 0.0;
         let open = if is_seen && blocked(point + skin, sun) { 0.0 } else { 1.0 };
         Lit { sun: sun_left, open, sky: left(fogs, point, DVec3::y()) }
@@ -133,7 +133,7 @@ fn lattice(
     Some(lattice)
 }
 
-/// Part of the light, 0 to 1, that is left on the way from far away to a point (m) in a direction (a unit vector).
+/// Share of the light, 0 to 1, that arrives from far away at a point (m) from a direction (a unit vector).
 fn left(fogs: &[Fog], point: DVec3, toward: DVec3) -> f32 {
     let mut depth = 0.0f64;
     along(fogs, (point, toward), f64::INFINITY, STRIDE, |from, to, here| {

@@ -1,8 +1,8 @@
-//! Along rays of view: what a fog hides of what is behind it, and what it adds.
+//! Fog along view rays: how much it hides of what is behind it, and the light that it adds.
 //!
-//! Light that was scattered once comes from the sun through the fog (Henyey and Greenstein 1941); what was scattered more
-//! often is added as one wider and weaker lobe that reaches deeper (after Wrenninge, Kulla and Lundqvist 2013), since the
-//! crystals of powder snow absorb next to nothing. The sky lights it from all sides.
+//! Light scattered once comes from the sun through the fog (Henyey and Greenstein 1941). Light scattered more often is added as one wider
+//! and weaker lobe that reaches deeper (after Wrenninge, Kulla and Lundqvist 2013), since the crystals of powder snow absorb next to
+//! nothing. The sky lights the fog from all sides.
 
 use super::light::LitFogs;
 use super::walk::along;
@@ -10,32 +10,32 @@ use crate::geometry::DVec3;
 use crate::render::camera::{Camera, Size};
 use crate::render::shade::{Colour, SUN, SURROUNDINGS};
 
-/// Greatest step (voxels).
+/// Maximum step (voxels).
 const STRIDE: f64 = 1.0;
 /// Mean cosine of the angle by which light is scattered: a little forward.
 const FORWARD: f64 = 0.3;
-/// The lobe of light that was scattered several times, over that of light that was scattered once.
+/// The lobe of light scattered several times, relative to that of light scattered once.
 const SEVERAL: f64 = 0.9;
-/// A fog that lets less through is opaque.
+/// A fog that transmits less than this is opaque.
 const OPAQUE: f64 = 0.002;
 
-/// What fog does to what is behind it at some distance.
+/// Effect of fog on what is behind it at some distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::render) struct Veil {
-    /// Part of the light that comes through, 0 to 1.
+    /// Share of the light that passes, 0 to 1.
     pub through: f64,
     /// Light that the fog adds.
     pub light: Colour,
 }
 
 impl Veil {
-    /// That of no fog.
+    /// The veil without fog.
     pub const NONE: Self = Self { through: 1.0, light: Colour::new(0.0, 0.0, 0.0) };
 }
 
 impl LitFogs<'_> {
-    /// Whether one ray through the middle of a pixel sees what all its samples see: no voxel is smaller than a pixel at the
-    /// middle of its fog.
+    /// Whether one ray through the middle of a pixel can stand for all its samples: no voxel is smaller than a pixel at the middle of its
+    /// fog.
     pub fn is_smooth(&self, camera: &Camera, size: Size) -> bool {
         let pixel = 2.0 * libm::tan(camera.fov_deg.to_radians() * 0.5) / f64::from(size.height);
         let is_smooth =
@@ -45,7 +45,7 @@ impl LitFogs<'_> {
             .all(|fog| fog.bounds().is_none_or(|bounds| is_smooth(bounds, fog.placement().cell())))
     }
 
-    /// The veils from a point (m) along a ray (a unit vector) before what is at some distances (m).
+    /// The veils along a ray (a unit vector) from a point (m), in front of things at some distances (m).
     pub fn veils<const N: usize>(&self, eye: DVec3, toward: DVec3, distances: [f64; N]) -> [Veil; N] {
         let mut order: [usize; N] = std::array::from_fn(|n| n);
         order.sort_unstable_by(|a, b| distances[*a].total_cmp(&distances[*b]).then(a.cmp(b)));
@@ -60,7 +60,7 @@ impl LitFogs<'_> {
                 let of = f64::from(self.fogs[here.fog].extinction(here.block, here.local));
                 if of > 0.0 {
                     let lit = self.at(*here);
-                    // The fourth root is what a quarter of the way lets through.
+                    // The fourth root is the transmittance of a quarter of the path.
                     let deep = f64::from(lit.sun).sqrt().sqrt();
                     sun += of * f64::from(lit.open) * (lobe * f64::from(lit.sun) + SEVERAL * deep);
                     sky += of * f64::from(lit.sky);
@@ -88,18 +88,18 @@ impl LitFogs<'_> {
     }
 }
 
-/// A ray on its way.
+/// State of a march along a ray.
 #[derive(Clone, Copy)]
 struct March {
-    /// Part of the light that comes through so far.
+    /// Share of the light that passes so far.
     through: f64,
-    /// Light of the sun and of the sky that was added so far, over what there is of them.
+    /// Light of the sun and of the sky added so far, relative to their full strength.
     sun: f64,
     sky: f64,
 }
 
 impl March {
-    /// After a part with an optical depth that has these sources of light.
+    /// The state after a segment with this optical depth and these sources of light.
     fn after(self, depth: f64, sun: f64, sky: f64) -> Self {
         let left = libm::exp(-depth);
         let added = self.through * (1.0 - left);
@@ -113,7 +113,7 @@ impl March {
     }
 }
 
-/// Light that is scattered by an angle with this cosine, over the mean of all.
+/// Light that is scattered by an angle with this cosine, relative to the mean over all angles.
 fn lobe(cosine: f64) -> f64 {
     let g = FORWARD;
     let spread = 1.0 + g * g - 2.0 * g * cosine;

@@ -1,20 +1,20 @@
-//! Along a ray from block to block, past empty blocks and nodes (Amanatides and Woo 1987, on two levels).
+//! Walks along a ray from block to block, skipping empty blocks and nodes (Amanatides and Woo 1987, on two levels).
 
 use super::blocks::{Fog, Look, NODE};
 use crate::geometry::DVec3;
 use crate::numeric::blocks::DIM;
 
-/// A ray on its way through a fog.
+/// State of a ray that passes through a fog.
 struct Walk<'a> {
     fog: &'a Fog,
-    /// Position at its beginning, in voxels, and voxels per metre along it.
+    /// Its origin, in voxels, and voxels per metre along it.
     origin: DVec3,
     direction: DVec3,
     /// Block position.
     position: [i32; 3],
-    /// Where on the ray (m) it leaves the block through each side.
+    /// Distance (m) along the ray at which it leaves the block through each side.
     sides: [f64; 3],
-    /// Where it is (m), and where it ends.
+    /// Current distance (m) along the ray, and its end.
     at: f64,
     end: f64,
 }
@@ -45,7 +45,7 @@ impl<'a> Walk<'a> {
             enter = enter.max(a.min(b));
             leave = leave.min(a.max(b));
         }
-        // Of a fog without blocks the box is empty, and holds no position to settle at.
+        // The box of a fog without blocks is empty, and contains no position to settle at.
         if enter >= leave || low == high {
             return None;
         }
@@ -55,17 +55,17 @@ impl<'a> Walk<'a> {
         Some(walk)
     }
 
-    /// Finds the block position at `at`, within a box of them (least and greatest).
+    /// Finds the block position at `at`, within a box of them (minimum and maximum).
     fn settle(&mut self, [low, high]: [[i32; 3]; 2]) {
         for axis in 0..3 {
             let at = (self.origin[axis] + self.direction[axis] * self.at) / DIM as f64;
-            // A number that an i32 does not hold becomes its greatest or least.
+            // A number that does not fit an i32 becomes its maximum or minimum.
             self.position[axis] = (at.floor() as i32).clamp(low[axis], high[axis]);
             self.sides[axis] = self.side(axis, self.position[axis], 1);
         }
     }
 
-    /// Where the ray (m) leaves the `count` block positions from one on along an axis.
+    /// Distance (m) along the ray at which it leaves the `count` block positions from `position` on along an axis.
     fn side(&self, axis: usize, position: i32, count: i32) -> f64 {
         let direction = self.direction[axis];
         if direction == 0.0 {
@@ -75,7 +75,7 @@ impl<'a> Walk<'a> {
         (f64::from(plane) * DIM as f64 - self.origin[axis]) / direction
     }
 
-    /// To the next block position.
+    /// Steps to the next block position.
     fn step(&mut self) {
         let axis = least(self.sides);
         self.at = self.at.max(self.sides[axis]);
@@ -83,7 +83,7 @@ impl<'a> Walk<'a> {
         self.sides[axis] = self.side(axis, self.position[axis], 1);
     }
 
-    /// Beyond the node.
+    /// Steps beyond the node.
     fn leave_node(&mut self) {
         let low = self.position.map(|at| at.div_euclid(NODE) * NODE);
         let sides = [0, 1, 2].map(|axis| self.side(axis, low[axis], NODE));
@@ -124,11 +124,11 @@ pub(super) struct Here {
     pub fog: usize,
     /// Which of its blocks.
     pub block: usize,
-    /// Voxels from the block's least corner, 0 to 8.
+    /// Voxels from the block's minimum corner, 0 to 8.
     pub local: [f32; 3],
 }
 
-/// A ray in one of the fogs: the stretch in which it is.
+/// A ray in one of the fogs: its current stretch.
 struct InFog<'a> {
     index: usize,
     walk: Walk<'a>,
@@ -147,9 +147,9 @@ impl InFog<'_> {
     }
 }
 
-/// Goes along a ray from a point (m) in a direction (a unit vector), at most to `end` (m), through everything that is not
-/// empty, in steps of at most `stride` voxels. Calls `each` with the beginning and the end of a step (m) and the positions in
-/// its middle, one for each fog that is there, until it returns false.
+/// Goes along a ray from a point (m) in a direction (a unit vector), at most to `end` (m), through everything that is not empty, in steps
+/// of at most `stride` voxels. Calls `each` with the start and the end of a step (m) and the positions at its middle, one for each fog
+/// there, until it returns false.
 pub(super) fn along(
     fogs: &[Fog],
     (from, toward): (DVec3, DVec3),
@@ -221,7 +221,7 @@ mod tests {
         }
     }
 
-    /// How long a ray is in a block (voxels).
+    /// Length of a ray inside a block (voxels).
     fn length(origin: DVec3, direction: DVec3, corner: [i32; 3]) -> f64 {
         let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
         for axis in 0..3 {

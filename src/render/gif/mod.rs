@@ -9,10 +9,10 @@ use gif::{DisposalMethod, Encoder, EncodingError, Frame, Repeat};
 use super::camera::Size;
 use palette::Palette;
 
-/// Least time of a frame (1/100 s): most programs show shorter ones for a tenth of a second.
+/// Minimum time of a frame (1/100 s): most programs show shorter ones for a tenth of a second.
 const LEAST_DELAY: u16 = 2;
 
-/// A GIF file while its frames come in, one after the other; it plays over and over.
+/// A GIF file that is written frame by frame; it loops forever.
 pub struct Gif<'a, W: Write> {
     encoder: Encoder<W>,
     size: [u16; 2],
@@ -31,7 +31,7 @@ impl<'a, W: Write> Gif<'a, W> {
             u16::try_from(pixels).map_err(|_| Error::other("a GIF has at most 65,535 pixels along an edge"))
         };
         let edges = [edge(size.width)?, edge(size.height)?];
-        // One colour more stands for what a frame does not change.
+        // One more colour stands for unchanged pixels.
         let colours: Vec<u8> = palette.colours().iter().copied().chain([[0; 3]]).flatten().collect();
         let mut encoder = Encoder::new(out, edges[0], edges[1], &colours).map_err(failed)?;
         encoder.set_repeat(Repeat::Infinite).map_err(failed)?;
@@ -85,7 +85,7 @@ fn failed(error: EncodingError) -> Error {
     }
 }
 
-/// The box of what is different between two frames (left, top, right, bottom; the last two not included); at least a pixel.
+/// The box of the differences between two frames (left, top, right, bottom; the last two exclusive); at least one pixel.
 fn changed(before: &[u8], after: &[u8], width: usize) -> [usize; 4] {
     let mut edges = [width, usize::MAX, 0, 0];
     for (y, (old, new)) in before.chunks(width).zip(after.chunks(width)).enumerate() {
@@ -98,9 +98,9 @@ fn changed(before: &[u8], after: &[u8], width: usize) -> [usize; 4] {
     if edges[3] == 0 { [0, 0, 1, 1] } else { edges }
 }
 
-/// How long each of some frames of a shot is shown (1/100 s), so that they play at `fps` frames of the shot a second,
-/// whatever is left out between them: the times at which frames begin are rounded, so that the error does not add up. The
-/// last one is shown as long as the one before it. None is shown for less than 2, which is what programs play.
+/// How long each of some frames of a shot is shown (1/100 s), so that they play at `fps` frames of the shot per second, even with frames
+/// left out between them. Start times are rounded, so that the error does not add up. The last frame is shown as long as the one before it.
+/// None is shown for less than 2, which is what programs play.
 pub fn delays(frames: &[i32], fps: f64) -> Vec<u16> {
     let gap = |pair: &[i32]| i64::from(pair[1]) - i64::from(pair[0]);
     let gaps: Vec<i64> = frames.windows(2).map(gap).collect();
@@ -127,7 +127,7 @@ mod tests {
             let sum: u32 = delays(&frames, fps).iter().map(|delay| u32::from(*delay)).sum();
             assert!((f64::from(sum) - 300.0 * 100.0 / fps).abs() <= 0.5, "{fps}: {sum}");
         }
-        // Every fifth frame is shown five times as long, and what is left out is waited for.
+        // Every fifth frame is shown five times as long, to cover those left out.
         assert_eq!(delays(&[-5, 0, 5], 25.0), [20, 20, 20]);
         assert_eq!(delays(&[1, 2, 12], 25.0), [4, 40, 40]);
         assert_eq!(delays(&[7], 25.0), [4]);

@@ -6,25 +6,25 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::render::picture::Picture;
 
-/// Most colours: an index of a byte is left for what a frame does not change.
+/// Maximum number of colours: one index of a byte is left for unchanged pixels.
 const MOST: usize = 255;
 /// Bits of a channel by which pixels are counted...
 const COUNTED_BITS: u32 = 6;
 /// ...and by which the nearest colour is looked up.
 const LOOKED_UP_BITS: u32 = 7;
-/// How much a difference of red, green and blue matters to the eye.
+/// How much differences in red, green and blue matter to the eye.
 const WEIGHTS: [i32; 3] = [2, 4, 3];
-/// Rounds in which colours move to the mean of what is nearest to them.
+/// Iterations in which colours move to the mean of the bins nearest to them.
 const ROUNDS: usize = 6;
-/// Edge of the pattern of thresholds (pixels).
+/// Edge of the threshold pattern (pixels).
 const PATTERN: usize = 8;
-/// Greatest change of a channel by the pattern, from end to end.
+/// Maximum change of a channel by the pattern, from end to end.
 const MOST_DITHER: f64 = 12.0;
 
 /// Colours for a flipbook.
 pub struct Palette {
     colours: Vec<[u8; 3]>,
-    /// The nearest colour of each cell of the cube of all colours.
+    /// The nearest colour of each cell of the colour cube.
     nearest: Vec<u8>,
     /// How much the pattern changes a channel, from end to end.
     dither: f64,
@@ -38,7 +38,7 @@ struct Bin {
 }
 
 impl Palette {
-    /// At most 255 colours that fit pictures, the same at any number of threads.
+    /// At most 255 colours that fit pictures, the same with any number of threads.
     ///
     /// # Errors
     /// Cancel.
@@ -66,8 +66,8 @@ impl Palette {
         &self.colours
     }
 
-    /// For each pixel of a picture the index of a colour. A fixed pattern of thresholds mixes neighbouring colours, so that
-    /// what stands still in a flipbook does not flicker.
+    /// For each pixel of a picture the index of a colour. A fixed threshold pattern mixes neighbouring colours, so that parts of a flipbook
+    /// that stand still do not flicker.
     pub fn indices(&self, ctx: &Context, picture: &Picture) -> Vec<u8> {
         let width = picture.size.width as usize;
         let mut out = vec![0; width * picture.size.height as usize];
@@ -89,8 +89,8 @@ fn cell(colour: [u8; 3]) -> usize {
     colour.iter().fold(0, |cell, value| cell << LOOKED_UP_BITS | usize::from(*value) >> (8 - LOOKED_UP_BITS))
 }
 
-/// Pixels by colour, in the order of the colours. Many pixels of a colour count less than as many of several: the sky is
-/// large and even.
+/// Pixels by colour, in the order of the colours. Many pixels of one colour count less than as many of several: the sky is large and
+/// uniform.
 fn count(pictures: &[Picture]) -> Vec<Bin> {
     let shift = 8 - COUNTED_BITS;
     let mut bins = vec![([0u64; 3], 0u64); 1 << (3 * COUNTED_BITS)];
@@ -109,7 +109,7 @@ fn count(pictures: &[Picture]) -> Vec<Bin> {
     filled.map(bin).collect()
 }
 
-/// Groups of bins, split where they differ most until there are enough: their means.
+/// Means of groups of bins, which are split where they differ most until there are enough.
 fn split(bins: Vec<Bin>) -> Vec<[f64; 3]> {
     if bins.is_empty() {
         return Vec::new();
@@ -144,9 +144,9 @@ fn split(bins: Vec<Bin>) -> Vec<[f64; 3]> {
 #[derive(Clone, Copy)]
 struct Spread {
     mean: [f64; 3],
-    /// Along which channel most.
+    /// The channel along which it is largest.
     axis: usize,
-    /// Sum of the squared distances from the mean along it; 0 for one colour.
+    /// Sum of the squared distances from the mean along this channel; 0 for one colour.
     amount: f64,
 }
 
@@ -165,7 +165,7 @@ impl Spread {
     }
 }
 
-/// Colours at the mean of the bins that are nearest to each; those that are nearest to none stay.
+/// Colours moved to the mean of the bins nearest to each; a colour that is nearest to none stays.
 fn moved(bins: &[Bin], colours: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let distance = |a: &[f64; 3], b: &[f64; 3]| {
         (0..3).map(|axis| f64::from(WEIGHTS[axis]) * (a[axis] - b[axis]) * (a[axis] - b[axis])).sum::<f64>()
@@ -189,7 +189,7 @@ fn moved(bins: &[Bin], colours: &[[f64; 3]]) -> Vec<[f64; 3]> {
     sums.iter().zip(colours).map(mean).collect()
 }
 
-/// The nearest colour of each cell of the cube of all colours, by the cell's middle.
+/// The nearest colour of each cell of the colour cube, by the cell's middle.
 fn look_up(ctx: &Context, colours: &[[u8; 3]]) -> Result<Vec<u8>> {
     let edge = 1usize << LOOKED_UP_BITS;
     let mut out = vec![0; edge * edge * edge];

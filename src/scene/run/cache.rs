@@ -1,4 +1,4 @@
-//! The frames of a stage in the output folder: with which settings they were made, which of them are to be made again.
+//! The frames of a stage in the output folder: the settings that they were made with, and which must be made again.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,12 +17,12 @@ use crate::io::records::input_hashes::Seen;
 use crate::io::records::manifest::Manifest;
 use crate::scene::FrameChoice;
 
-/// Frames from one on were made with these settings.
+/// The settings of all frames from `from` on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Segment {
     from: i32,
     settings: Settings,
-    /// Hash of the settings, and of the frame before as it was then.
+    /// Hash of the settings, and of the frame before `from` as it was then.
     seed: String,
 }
 
@@ -41,47 +41,47 @@ impl Segment {
     }
 }
 
-/// With which settings a stage's frames were made: `state/base.json`.
+/// The settings that a stage's frames were made with: `state/base.json`.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Record {
     segments: Vec<Segment>,
 }
 
-/// Which frames are asked for.
+/// Which frames are requested.
 #[derive(Clone, Copy)]
 pub struct Asked<'a> {
-    /// The shot's first.
+    /// The shot's first frame.
     pub first: i32,
-    /// Those that are wanted.
+    /// The wanted frames.
     pub frames: &'a FrameChoice,
-    /// The first that is to be made again; frames before it are kept as they are.
+    /// The first frame to be made again; frames before it are kept as they are.
     pub from: Option<i32>,
 }
 
 impl Asked<'_> {
-    /// What is asked of a stage: one that was never made and needs no frame before another makes all that are wanted.
+    /// The request for a stage: one that was never made and whose frames are independent makes all wanted frames.
     fn of(self, stage: &dyn Stage, stored: &Stored) -> Self {
         let is_new = !stage.remembers() && stored.frames().next().is_none();
         Self { from: self.from.filter(|_| !is_new), ..self }
     }
 }
 
-/// The frames of a stage, held by one run at a time.
+/// The frames of a stage; only one run holds them at a time.
 pub struct Cache {
-    /// The frames that are done, those left out that are to be made again.
+    /// The frames that are done, except those to be made again.
     pub stored: Stored,
     record: Record,
     chain: Chain,
-    /// Frames that are to be made again, removed by [`Cache::commit`].
+    /// Frames to be made again, removed by [`Cache::commit`].
     forgotten: Vec<Manifest>,
 }
 
 impl Cache {
-    /// Opens the frames of a stage. Nothing of the folder is changed before [`Cache::commit`].
+    /// Opens the frames of a stage. Changes nothing in the folder before [`Cache::commit`].
     ///
     /// # Errors
-    /// A folder that cannot be read or that holds frames of other settings; a record that is damaged; no frame to resume
-    /// from; frames that would leave a gap where none may be.
+    /// A folder that cannot be read or that holds frames of other settings; a damaged record; no frame to resume from; a gap between
+    /// frames, if the stage allows none.
     pub fn open(stage: &dyn Stage, seen: &Arc<Seen>, folder: &Path, asked: Asked<'_>) -> Result<Self> {
         let settings = stage.settings()?;
         let path = record_path(folder, stage);
@@ -108,7 +108,7 @@ impl Cache {
             None => match record.segments.last() {
                 Some(last) => {
                     let changed = settings::changed(&last.settings, &settings);
-                    // A sealed record may still be one that no run wrote.
+                    // A checksummed record may still be one that no run wrote.
                     if last.from < first {
                         let what = format!(
                             "says that frames from {} on were made, before the shot's first",
@@ -136,11 +136,11 @@ impl Cache {
         Ok(Self { stored, record, chain, forgotten })
     }
 
-    /// Refuses frames of a stage that others read in this run but that it does not make, where they were made with other
-    /// settings or inputs. `upstream` has the frames that these were made from.
+    /// Refuses a stage's frames that this run reads but does not make, if they were made with other settings or inputs. `upstream` has the
+    /// frames that they were made from.
     ///
     /// # Errors
-    /// The changed settings, or the frame whose inputs have changed; a record that is damaged; an input that cannot be read.
+    /// The changed settings, or the frame whose inputs have changed; a damaged record; an input that cannot be read.
     pub fn refuse_stale(
         stage: &dyn Stage,
         seen: &Arc<Seen>,
@@ -150,7 +150,7 @@ impl Cache {
     ) -> Result<()> {
         let stored = Stored::read(folder, stage.name())?;
         let record: Record = checksummed::read(&record_path(folder, stage))?.unwrap_or_default();
-        // Frames that are not there are reported by themselves.
+        // Missing frames are reported elsewhere.
         let Some(last) = record.segments.last().filter(|_| stored.frames().next().is_some()) else {
             return Ok(());
         };
@@ -169,7 +169,7 @@ impl Cache {
         }
     }
 
-    /// Removes the frames that are to be made again, and says in the folder what it is for.
+    /// Removes the frames to be made again, and records the settings in the folder.
     ///
     /// # Errors
     /// What the operating system reports.
@@ -184,20 +184,20 @@ impl Cache {
         Ok(())
     }
 
-    /// First frame that was made with the settings of now.
+    /// First frame that was made with the current settings.
     pub fn own_from(&self) -> i32 {
         self.record.segments.last().map_or(i32::MIN, |segment| segment.from)
     }
 
-    /// From what the stage can resume in a shot that begins at frame `first`.
+    /// What the stage can resume from in a shot that begins at frame `first`.
     pub fn kept(&self, first: i32) -> Kept<'_> {
         Kept { first, own_from: self.own_from(), done: &self.stored }
     }
 
-    /// Refuses frames whose inputs have changed since. One whose files of the coming frame have changed or appeared is to
-    /// be made again, if it is asked for.
+    /// Refuses frames whose inputs have changed since. A frame whose files of the coming frame have changed or appeared is made again if it
+    /// is requested.
     ///
-    /// # Errors
+    /// The changed frame; a file that cannot be read.
     /// The frame; a file that cannot be read.
     pub fn check_inputs(
         &mut self,
@@ -209,8 +209,8 @@ impl Cache {
         let frames: Vec<i32> = self.stored.frames().filter(|frame| *frame >= own).collect();
         for frame in frames {
             let Some(manifest) = self.stored.manifest(frame).cloned() else { continue };
-            // What is upstream may be on the point of being made, and is looked at again when it is there; or it is gone,
-            // and then there is nothing to compare.
+            // An upstream frame that is not done may still be made in this run, and is checked then; or it is gone, and there is nothing to
+            // compare.
             if upstream.iter().any(|upstream| !upstream.is_done(frame)) {
                 continue;
             }
@@ -225,7 +225,7 @@ impl Cache {
         Ok(())
     }
 
-    /// The first frame of the settings of now that was made from other inputs.
+    /// The first frame with the current settings that was made from other inputs.
     fn first_changed(&mut self, stage: &dyn Stage, upstream: &[&Stored]) -> Result<Option<i32>> {
         let own = self.own_from();
         let is_read = |frame: &i32| *frame >= own && upstream.iter().all(|upstream| upstream.is_done(*frame));
@@ -247,7 +247,7 @@ impl Cache {
         Error::file(self.stored.folder(), what)
     }
 
-    /// Hashes of what a frame is made from.
+    /// Hashes of a frame's inputs.
     ///
     /// # Errors
     /// A file that cannot be read.
@@ -277,11 +277,11 @@ fn refuse_other_start(
     Err(Error::file(folder, what))
 }
 
-/// Refuses a `from` that cannot resume after the frame before it, or beyond all frames that are asked for, and frames that
-/// would leave a gap where the stage needs all.
+/// Refuses a `from` that cannot resume after the frame before it, or that lies beyond all requested frames; and gaps between frames, if the
+/// stage allows none.
 ///
 /// # Errors
-/// Why.
+/// The reason.
 pub(super) fn refuse_asked(stage: &dyn Stage, asked: Asked<'_>, stored: &Stored) -> Result<()> {
     let Asked { first, frames, from } = asked.of(stage, stored);
     if let Some(from) = from {
@@ -346,7 +346,7 @@ fn record_path(folder: &Path, stage: &dyn Stage) -> PathBuf {
     folder.join("state").join(format!("{}.json", stage.name()))
 }
 
-/// What a stage reads for a frame, as messages say it.
+/// The inputs of a frame of a stage, for messages.
 fn read_by(stage: &dyn Stage, frame: i32) -> String {
     let mut names: Vec<String> =
         stage.reads(frame).files.iter().map(|file| file.display().to_string()).collect();

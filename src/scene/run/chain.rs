@@ -1,5 +1,5 @@
-//! What each frame of a stage was made from: a hash of the settings, of every file that it reads, of the upstream frames
-//! and, where a stage remembers, of the frames before it.
+//! The inputs of each frame of a stage, as a hash: of the settings, of every file that it reads, of the upstream frames and, for stages
+//! with memory, of the frames before it.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,20 +11,20 @@ use crate::io::files::hash::Hasher;
 use crate::io::records::input_hashes::Seen;
 use crate::io::records::manifest::{Manifest, Written};
 
-/// Hashes of the frames from a start on.
+/// Hashes of consecutive frames.
 pub(super) struct Chain {
     first: i32,
-    /// That of the start, then of each frame that was asked for.
+    /// The hash of the start, then that of each frame requested so far.
     links: Vec<String>,
     seen: Arc<Seen>,
 }
 
-/// Hashes of what a frame is made from.
+/// Hashes of a frame's inputs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Made {
     /// The settings, the files and upstream frames that it reads, and the frames before it.
     pub from: String,
-    /// The files of the coming frame that it reads, as far as they are there; none where it reads no such files.
+    /// The files of the coming frame that it reads, as far as they exist; `None` if it reads no such files.
     pub next: Option<String>,
 }
 
@@ -36,11 +36,11 @@ impl Chain {
         Self { first, links: vec![start.finish()], seen: seen.clone() }
     }
 
-    /// What a frame is made from; a frame before the first depends on the seed alone. Where a frame upstream is no longer
-    /// there, what the stage's own record says of it counts.
+    /// The inputs of a frame; a frame before the first depends on the seed alone. If an upstream frame no longer exists, the stage's own
+    /// record of it counts.
     ///
     /// # Errors
-    /// A file that cannot be read; a frame that is neither done nor has all that it is made from.
+    /// A file that cannot be read; a frame that is neither done nor has all its inputs.
     pub fn at(&mut self, stage: &dyn Stage, frame: i32, own: &Stored, upstream: &[&Stored]) -> Result<Made> {
         let from = if stage.remembers() {
             let wanted = (i64::from(frame) - i64::from(self.first)).max(-1) + 1;
@@ -71,7 +71,7 @@ impl Chain {
                 let recorded = own.manifest(frame).map(|manifest| manifest.inputs.clone());
                 return recorded.ok_or_else(|| missing(stage, frame, name, stored.folder()));
             };
-            // What a file of changes means depends on the frames before it; a stage that remembers has links for those.
+            // The meaning of a file of changes depends on the frames before it; stages with memory already have links for those.
             if !stage.remembers() {
                 link.add_text(&manifest.inputs);
             }
@@ -98,7 +98,7 @@ impl Chain {
     }
 }
 
-/// Says that a stage's frame lacks that of a stage upstream, or a file of it.
+/// The error for a stage's frame whose upstream frame, or a file of it, is missing.
 pub(super) fn missing(stage: &dyn Stage, frame: i32, upstream: &str, folder: &Path) -> Error {
     let name = stage.name();
     let files = Manifest::read(folder, upstream, frame).ok().flatten().map(|manifest| manifest.files);

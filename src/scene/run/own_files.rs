@@ -1,4 +1,4 @@
-//! Which files of an output folder are its own: nothing else there is ever written over or removed.
+//! Which files of an output folder are its own: all others are never overwritten or removed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -16,26 +16,26 @@ use crate::scene::FrameChoice;
 
 /// The scene with its defaults.
 pub(super) const SCENE: &str = "scene.toml";
-/// What this module writes: see [`Files`].
+/// File written by this module: see [`Files`].
 const FILES: &str = "files.json";
 
-/// What a folder's runs have written besides the records of frames: `state/files.json`.
+/// What runs have written into a folder besides the records of frames: `state/files.json`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 struct Files {
-    /// The stages that runs have begun, by name.
+    /// The stages that runs have started, by name.
     stages: BTreeMap<String, Begun>,
-    /// Hashes of the files that belong to no frame, by path: the content of now, then the one before while it is replaced.
+    /// Hashes of the files that belong to no frame, by path: the current content, then the previous one while it is being replaced.
     files: BTreeMap<String, Vec<String>>,
 }
 
-/// A stage that runs have begun.
+/// A stage that runs have started.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 struct Begun {
     /// Its folders, with the extensions of their files.
     kinds: BTreeMap<String, Vec<String>>,
     /// Extension of its exact states.
     state: String,
-    /// First and last of the frames that runs have begun to write.
+    /// First and last frame that runs have started to write.
     frames: Option<[i32; 2]>,
 }
 
@@ -51,19 +51,19 @@ impl Begun {
     }
 }
 
-/// The files of a folder that are its own.
+/// The files that belong to a folder.
 pub(super) struct Own {
     folder: PathBuf,
-    /// What is known of the folder: what it says of itself, and the stages of the run.
+    /// Everything known about the folder: its own record, and the stages of the run.
     known: Files,
     written: Option<Files>,
 }
 
 impl Own {
-    /// Reads what a folder says of itself; `stages` are those of the run that asks.
+    /// Reads a folder's own record; `stages` are those of the current run.
     ///
     /// # Errors
-    /// A record that is damaged.
+    /// A damaged record.
     pub fn read<'s>(folder: &Path, stages: impl Iterator<Item = &'s dyn Stage>) -> Result<Self> {
         let folder = folder.to_path_buf();
         let written: Option<Files> = checksummed::read(&folder.join("state").join(FILES))?;
@@ -80,26 +80,26 @@ impl Own {
         Self { folder: folder.to_path_buf(), known: Files::default(), written: None }
     }
 
-    /// Where it is.
+    /// Its path.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// The files that belong to no frame, by their paths from the folder.
+    /// The files that belong to no frame, by path relative to the folder.
     pub fn loose(&self) -> impl Iterator<Item = &str> {
         self.known.files.keys().map(String::as_str)
     }
 
-    /// The stages that runs have begun.
+    /// The stages that runs have started.
     fn stages(&self) -> impl Iterator<Item = &str> {
         self.known.stages.keys().map(String::as_str)
     }
 
-    /// Refuses to begin frames, or to write files that belong to no frame, over files that are not the folder's own;
-    /// inputs of the scene are not.
+    /// Refuses to start frames, or to write files that belong to no frame, over files that are not the folder's own; inputs of the scene
+    /// never are.
     ///
     /// # Errors
-    /// The file that stands in the way.
+    /// The file that would be overwritten.
     pub fn refuse_foreign(&self, plan: &Plan, frames: &FrameChoice) -> Result<()> {
         for input in plan.scene.files() {
             if input.parent().is_some_and(|folder| self.holds(folder, &input)) {
@@ -130,7 +130,7 @@ impl Own {
         foreign.map_or(Ok(()), |(path, _)| Err(self.foreign(path)))
     }
 
-    /// Refuses a file that is there and neither what was written nor, where given, what is to be written.
+    /// Refuses an existing file that is neither what was written nor, if given, what is about to be written.
     fn refuse_changed(&self, name: &str, new: Option<&str>) -> Result<()> {
         let path = self.folder.join(name);
         if !path.exists() {
@@ -146,14 +146,14 @@ impl Own {
         Error::file(self.folder.join(name), what)
     }
 
-    /// Whether a path in a folder is one that runs write.
+    /// Whether runs write to a path in a folder.
     fn holds(&self, folder: &Path, path: &Path) -> bool {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let mut folders = self.folders().into_iter();
         folders.any(|kind| self.is_own(&kind, &name) && is_same(folder, &self.folder.join(kind)))
     }
 
-    /// Notes that frames of a stage are begun.
+    /// Records that frames of a stage are started.
     ///
     /// # Errors
     /// What the operating system reports.
@@ -164,7 +164,7 @@ impl Own {
         self.save()
     }
 
-    /// Writes a file that belongs to no frame, if it is not there with this content.
+    /// Writes a file that belongs to no frame, unless it already exists with this content.
     ///
     /// # Errors
     /// What the operating system reports.
@@ -172,7 +172,7 @@ impl Own {
         let (path, new) = (self.folder.join(name), hash::of_bytes(bytes));
         let hashes = self.known.files.entry(name.to_string()).or_default();
         if hashes.first() != Some(&new) {
-            // Killed at any moment, the folder knows what is there as its own.
+            // Recorded first: if the run is killed at any moment, the file is still recognised as the folder's own.
             hashes.retain(|hash| *hash != new);
             hashes.insert(0, new.clone());
             self.save()?;
@@ -183,7 +183,7 @@ impl Own {
         atomic::write_bytes(&path, bytes)
     }
 
-    /// Forgets what files held before they were replaced: the run is over.
+    /// Forgets the previous contents of replaced files: the run is over.
     ///
     /// # Errors
     /// What the operating system reports.
@@ -200,7 +200,7 @@ impl Own {
         Ok(())
     }
 
-    /// What keeps the files that belong to no frame from being what was written, by path; and how many there are.
+    /// The number of files that belong to no frame, and the faults of those that are not what was written, by path.
     pub fn faults(&self) -> (usize, Vec<(String, String)>) {
         let fault = |(name, hashes): (&String, &Vec<String>)| {
             let path = self.folder.join(name);
@@ -214,13 +214,13 @@ impl Own {
         (self.known.files.len(), self.known.files.iter().filter_map(fault).collect())
     }
 
-    /// Folders that runs write into, from the output folder; its own is empty.
+    /// Folders that runs write into, relative to the output folder, which itself is "".
     fn folders(&self) -> Vec<String> {
         let kinds = self.known.stages.values().flat_map(|begun| begun.kinds.keys().cloned());
         ["", "state", "report"].into_iter().map(String::from).chain(kinds).collect()
     }
 
-    /// Whether runs write files of this name into one of the folders.
+    /// Whether runs write files of this name into a folder.
     fn is_own(&self, folder: &str, name: &str) -> bool {
         let alone = match folder {
             "" => [SCENE, usd::SHOT].contains(&name),
@@ -234,7 +234,7 @@ impl Own {
         self.known.stages.contains_key(name)
     }
 
-    /// The frame of a file in one of the folders, where its name is one that runs give to a frame's.
+    /// The frame of a file in a folder, if its name is one that runs give to a frame's file.
     fn frame_of(&self, folder: &str, name: &str) -> Option<OfFrame> {
         let (before, rest) = name.split_once('.')?;
         let (number, extension) = rest.rsplit_once('.')?;
@@ -256,7 +256,7 @@ impl Own {
         Some(OfFrame { stage: stage.to_string(), frame })
     }
 
-    /// All files that are there with names that runs give, from the folder; those of frames with their frames.
+    /// All existing files with names that runs give, by path relative to the folder; those of frames with their frames.
     ///
     /// # Errors
     /// A folder that cannot be read.
@@ -273,7 +273,7 @@ impl Own {
         Ok(out)
     }
 
-    /// The names of [`Own::names`], and those of these stages' records where the folder does not know the stages.
+    /// The names of [`Own::names`], and those of these stages' records if the folder does not know the stages.
     ///
     /// # Errors
     /// A folder that cannot be read.
@@ -285,11 +285,11 @@ impl Own {
         Ok(self.names()?.into_keys().chain(records.map(|name| format!("state/{name}"))).collect())
     }
 
-    /// Names of the files in one of the folders.
+    /// Names of the files in a folder.
     fn entries(&self, kind: &str) -> Result<Vec<String>> {
         let path = self.folder.join(kind);
         let entries = match std::fs::read_dir(&path) {
-            // Folders of kinds that are not written need not be there.
+            // Folders of kinds that are not written need not exist.
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
             other => other.map_err(|error| Error::io(&path, "read", error))?,
         };
@@ -301,7 +301,7 @@ impl Own {
         Ok(out)
     }
 
-    /// Removes what a killed run had begun to write: nobody else writes now.
+    /// Removes files that a killed run left unfinished: no other run is writing now.
     ///
     /// # Errors
     /// What the operating system reports.
@@ -317,7 +317,7 @@ impl Own {
         Ok(())
     }
 
-    /// The stages of which a folder has records, those included that it does not say it has.
+    /// The stages of which a folder has records, even if its own record does not list them.
     ///
     /// # Errors
     /// A folder that cannot be read.

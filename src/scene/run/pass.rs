@@ -1,4 +1,4 @@
-//! A stage's pass over the frames: steps, and the files of one frame written while the next is computed.
+//! A stage's pass over the frames: while one frame is computed, the files of the previous one are written.
 
 use std::panic::resume_unwind;
 use std::path::Path;
@@ -17,35 +17,35 @@ use crate::io::files::atomic;
 use crate::io::records::checksummed;
 use crate::io::records::manifest::{Keeps, Manifest};
 
-/// If so many frames in a row cannot be written, it is not for the name of one file, but because a disk is full or gone.
+/// If this many consecutive frames cannot be written, the cause is not a single file name: the disk is full or gone.
 const FAILURES: usize = 3;
-/// Steps that wait for the writer at most: a step's changes are a few MB.
+/// Maximum steps that wait for the writer: a step's changes are a few MB.
 const WAITING: usize = 2;
-/// Exact states that are kept of a stage that no other one reads, where its own files are not enough to resume from.
+/// Exact states kept of a stage that cannot resume from its own files and that no other stage reads.
 const STATES_KEPT: i32 = 2;
 
 /// Called for each frame whose files are written, with the stage, the frame and its report; from several threads.
 pub type Done<'a> = &'a (dyn Fn(&'static str, i32, &Report) + Sync);
 
-/// What the passes of a run share.
+/// Shared by the passes of a run.
 #[derive(Clone, Copy)]
 pub struct Shared<'a> {
     /// Threads and cancel.
     pub ctx: &'a Context,
     /// The shot's first frame.
     pub first: i32,
-    /// Raised when a pass has failed: the others stop after their frame.
+    /// Set when a pass has failed: the others stop after their current frame.
     pub stop: &'a AtomicBool,
     /// Called for each frame.
     pub done: Done<'a>,
 }
 
-/// From what a stage can resume.
+/// What a stage can resume from.
 #[derive(Clone, Copy)]
 pub struct Kept<'a> {
     /// The shot's first frame.
     pub first: i32,
-    /// First frame that was made with the settings of now.
+    /// First frame that was made with the current settings.
     pub own_from: i32,
     /// The frames that are done.
     pub done: &'a Stored,
@@ -53,7 +53,7 @@ pub struct Kept<'a> {
 
 /// Any stage, with the pass that makes it.
 pub trait AnyStage: Stage {
-    /// As the trait that says what it is.
+    /// As the trait that describes it.
     fn as_stage(&self) -> &dyn Stage;
 
     /// See [`Stepping::foresee`].
@@ -79,9 +79,9 @@ impl<S: Stepping> AnyStage for S {
     }
 }
 
-/// A pass that is ready to begin.
+/// A pass that is ready to start.
 pub trait Pass: Send {
-    /// Makes frames, ascending; gives the records of those that were written, also where the pass fails.
+    /// Makes frames, ascending; `cache` gets the records of those that were written, even if the pass fails.
     #[doc(hidden)]
     fn make(
         self: Box<Self>,
@@ -100,15 +100,15 @@ struct At<'a, S: Stepping> {
     state: S::State,
 }
 
-/// What the writing thread is told, in the order of the frames.
+/// Messages to the writing thread, in the order of the frames.
 enum Job<S: Stepping> {
-    /// From what the next steps start.
+    /// The state that the next steps start from.
     Start(S::Writer),
-    /// A step that was made.
+    /// A completed step.
     Step(Box<Frame<S::Step>>),
 }
 
-/// A step, with what its frame is made from where its files are wanted.
+/// A step, with the hash of its frame's inputs if its files are wanted.
 struct Frame<T> {
     frame: i32,
     made: Option<Made>,
@@ -133,7 +133,7 @@ impl<'a, S: Stepping> At<'a, S> {
         Ok(Self { stage, frame: latest.unwrap_or(first - 1), state: stage.load(ctx, done, latest)? })
     }
 
-    /// Steps to every wanted frame; `send` gives the work to the writing thread and says whether it still listens.
+    /// Steps to every wanted frame; `send` passes the work to the writing thread and returns whether that still listens.
     fn step_all(
         mut self,
         shared: &Shared<'_>,
@@ -192,7 +192,7 @@ impl<S: Stepping> Pass for At<'_, S> {
         });
         let (manifests, written) = finished.unwrap_or_else(|why| resume_unwind(why));
         manifests.into_iter().for_each(|manifest| cache.stored.add(manifest));
-        // What stopped the writer stopped the steps too, and is the reason to report.
+        // A writer's error also stopped the steps, and is the one to report.
         written.and(made)
     }
 }
@@ -202,17 +202,17 @@ struct Files<'a, S> {
     stage: &'a S,
     folder: &'a Path,
     first: i32,
-    /// Whether another stage reads the exact states of all frames.
+    /// Whether the exact states of all frames are kept, as another stage reads them.
     every_state: bool,
 }
 
 impl<S: Stepping> Files<'_, S> {
-    /// Writes until there is no more work or a file cannot be written; for a stage whose frames can be written independently, until
-    /// [`FAILURES`] frames in a row could not. Returns the records of what was written, too.
+    /// Writes until there is no more work or a file cannot be written; if the stage's frames can be written independently, until
+    /// [`FAILURES`] consecutive frames could not. Also returns the records of what was written.
     fn write_all(&self, waiting: Receiver<Job<S>>, done: Done<'_>) -> (Vec<Manifest>, Result<()>) {
         let mut manifests = Vec::new();
         let mut writer = None;
-        // The first error, and how many frames on end could not be written.
+        // The first error, and the number of consecutive frames that could not be written.
         let (mut failed, mut on_end): (Option<Error>, usize) = (None, 0);
         let goes_on = self.stage.writes_alone() && self.stage.needs_every_frame().is_none();
         for job in waiting {
@@ -243,7 +243,7 @@ impl<S: Stepping> Files<'_, S> {
         (manifests, failed.map_or(Ok(()), Err))
     }
 
-    /// Writes a frame, or passes through it.
+    /// Writes a frame, or only passes through it.
     fn write(
         &self,
         writer: &mut S::Writer,
@@ -269,8 +269,8 @@ impl<S: Stepping> Files<'_, S> {
         Ok(Some(manifest))
     }
 
-    /// Removes the exact states from which nothing resumes any more, and those that a run was killed before it removed. One
-    /// that cannot be removed does no harm.
+    /// Removes exact states that are no longer needed to resume, and those that a killed run did not remove. One that cannot be removed
+    /// does no harm.
     fn remove_states_before(&self, frame: i32) {
         let (stage, extension) = (self.stage.name(), self.stage.state_extension());
         let path = |old: i32| self.folder.join("state").join(format!("{stage}.{old:04}.{extension}"));

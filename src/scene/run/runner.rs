@@ -1,4 +1,4 @@
-//! Runs the stages of a scene into a folder: on from where an earlier run stopped.
+//! Runs the stages of a scene into a folder, resuming where an earlier run stopped.
 
 use std::fs::File;
 use std::panic::resume_unwind;
@@ -21,18 +21,18 @@ use crate::io::records::input_hashes::Seen;
 use crate::io::records::manifest::Manifest;
 use crate::scene::{FrameChoice, Scene};
 
-/// A scene with its stages, those that others read first.
+/// A scene with its stages, upstream stages first.
 pub struct Plan<'a> {
     /// The scene.
     pub scene: &'a Scene,
-    /// What its files held when they were read.
+    /// Contents of its files when they were read.
     pub seen: &'a Arc<Seen>,
     /// Its stages.
     pub stages: Vec<Box<dyn AnyStage + 'a>>,
 }
 
 impl Plan<'_> {
-    /// What the stages say of themselves.
+    /// The stages, as descriptions.
     pub fn stages(&self) -> impl Iterator<Item = &dyn Stage> {
         self.stages.iter().map(|stage| stage.as_stage())
     }
@@ -42,7 +42,7 @@ impl Plan<'_> {
         self.stages().map(|stage| stage.name()).collect()
     }
 
-    /// The stages with these names, by position; all without any.
+    /// The stages with these names, by index; all if there are no names.
     fn chosen(&self, only: &[String]) -> Result<Vec<usize>> {
         if let Some(unknown) = only.iter().find(|name| !self.names().contains(&&name[..])) {
             let names = self.names().join(", ");
@@ -58,7 +58,7 @@ impl Plan<'_> {
             .collect())
     }
 
-    /// The stages that read the frames of some, or of those that do, by position.
+    /// The stages that depend on these, directly or indirectly, by index.
     fn downstream(&self, of: &[usize]) -> Vec<usize> {
         let mut names: Vec<&str> = of.iter().map(|position| self.stages[*position].name()).collect();
         let mut out = Vec::new();
@@ -71,7 +71,7 @@ impl Plan<'_> {
         out
     }
 
-    /// Refuses to read frames, of stages that are not among some, which this scene would not make as they are.
+    /// Refuses frames that the chosen stages read from other stages, if this scene would not make them as they are.
     fn refuse_stale(&self, chosen: &[usize], folder: &Path) -> Result<()> {
         for reader in chosen.iter().map(|position| self.stages[*position].as_stage()) {
             let is_read = |position: &usize| reader.upstream().contains(&self.stages[*position].name());
@@ -88,7 +88,7 @@ impl Plan<'_> {
         Ok(())
     }
 
-    /// Whether the exact states of all frames of a stage are kept: it, or another one, reads them.
+    /// Whether the exact states of all frames of a stage are kept: the stage itself, or another one, reads them.
     fn keeps_states_of(&self, of: &dyn Stage) -> bool {
         let reads =
             |stage: &dyn Stage| stage.upstream().contains(&of.name()) && stage.reads_state_of(of.name());
@@ -99,38 +99,38 @@ impl Plan<'_> {
 /// A shot with its folder, ready to run.
 pub struct Run<'a> {
     plan: &'a Plan<'a>,
-    /// All stages, those that are not to be made too.
+    /// All stages, including those that are not to be made.
     stages: Vec<StageRun<'a>>,
     own: Own,
-    /// Held until the run ends, however it ends.
+    /// Held until the run ends, whatever ends it.
     _lock: File,
 }
 
 /// A stage in a run.
 struct StageRun<'a> {
     stage: &'a dyn AnyStage,
-    /// Its frames; none when it is not to be made.
+    /// Its frames; `None` if it is not to be made.
     cache: Option<Cache>,
-    /// Frames that are wanted and not done, ascending.
+    /// Wanted frames that are not done, ascending.
     todo: Vec<i32>,
-    /// Frames that are wanted and done.
+    /// Number of wanted frames that are done.
     there: usize,
-    /// Ready to make the first of them, where that can be had before the stages upstream have run.
+    /// Ready to make the first of them, if it could be loaded before the upstream stages have run.
     start: Option<Box<dyn Pass + 'a>>,
-    /// Frames that go because stages upstream are made again.
+    /// Frames removed because upstream stages are made again.
     forgotten: Vec<Manifest>,
 }
 
 impl<'a> Run<'a> {
-    /// Opens or makes the folder, finds what is done, loads the states that the first frames start from, and writes the
-    /// resolved scene into the folder. Of the stages those named in `only` are made, or all.
+    /// Opens or creates the folder, finds what is done, loads the states that the first frames start from, and writes the resolved scene
+    /// into the folder. Makes the stages named in `only`, or all.
     ///
-    /// `from` keeps the frames before it, whatever they were made with, and makes all others of these stages again; those
-    /// of stages downstream of them go too.
+    /// `from` keeps the frames before it, whatever they were made with, and makes all others of these stages again; those of stages
+    /// downstream of them are removed too.
     ///
     /// # Errors
-    /// A folder that cannot be written, that another run writes into, or whose frames were made with other settings
-    /// or inputs; a damaged record or frame; frames that would leave a gap where none may be. Nothing is then changed.
+    /// A folder that cannot be written, that another run writes into, or whose frames were made with other settings or inputs; a damaged
+    /// record or frame; a gap between frames, if a stage allows none. Nothing is then changed.
     pub fn prepare(
         ctx: &Context,
         plan: &'a Plan<'a>,
@@ -141,7 +141,7 @@ impl<'a> Run<'a> {
     ) -> Result<Self> {
         let chosen = plan.chosen(only)?;
         let asked = Asked { first: plan.scene.shot.frames.first, frames, from };
-        // What is refused leaves no folder behind; what another run did meanwhile is looked at again below.
+        // A refused run leaves no folder behind; changes by another run meanwhile are checked again below.
         let of_run = || chosen.iter().map(|position| plan.stages[*position].as_stage());
         for stage in of_run() {
             refuse_asked(stage, asked, &Stored::read(folder, stage.name())?)?;
@@ -168,7 +168,7 @@ impl<'a> Run<'a> {
         Ok(run)
     }
 
-    /// Opens a stage's frames and checks them against what they are made from.
+    /// Opens a stage's frames and checks them against their inputs.
     fn open(
         &self,
         stage: &'a dyn AnyStage,
@@ -195,7 +195,7 @@ impl<'a> Run<'a> {
         Ok(run)
     }
 
-    /// Refuses frames whose upstream frames, or those of a frame on the way to them, neither are there nor will be made.
+    /// Refuses frames whose upstream frames, or those of a frame that must be stepped through, neither exist nor will be made.
     fn refuse_missing(
         &self,
         stage: &dyn Stage,
@@ -222,8 +222,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// The frames of the stages upstream of one, as they are now, in its order; those that this run will make again are
-    /// left out.
+    /// The frames of a stage's upstream stages as they are now, in its order, except those that this run will make again.
     fn upstream(&self, stage: &dyn Stage, folder: &Path) -> Result<Vec<Stored>> {
         let of = |name: &&str| {
             let mut stored = Stored::read(folder, name)?;
@@ -235,7 +234,7 @@ impl<'a> Run<'a> {
         stage.upstream().iter().map(of).collect()
     }
 
-    /// Loads what the first frames start from, of stages whose upstream frames are all there.
+    /// Loads the state before the first frame to be made, for stages whose upstream frames all exist.
     fn load(&mut self, ctx: &Context) -> Result<()> {
         let first = self.plan.scene.shot.frames.first;
         let busy: Vec<&str> =
@@ -253,8 +252,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Removes the frames that are to be made again, those that read them first, and says in the folder what it is for and
-    /// which frames are begun.
+    /// Removes the frames to be made again, downstream stages first, and writes the settings, the frames that are started and the scene to
+    /// the folder.
     fn commit(&mut self) -> Result<()> {
         for run in self.stages.iter_mut().rev() {
             let stored = Stored::read(self.own.folder(), run.stage.name())?;
@@ -269,23 +268,23 @@ impl<'a> Run<'a> {
         self.own.write(own_files::SCENE, self.plan.scene.to_toml_in(self.own.folder()).as_bytes())
     }
 
-    /// Number of frames to be made, of all stages together.
+    /// Number of frames to be made, over all stages.
     pub fn to_make(&self) -> usize {
         self.stages.iter().map(|run| run.todo.len()).sum()
     }
 
-    /// Number of frames that were wanted and are there, of all stages together.
+    /// Number of wanted frames that exist, over all stages.
     pub fn there(&self) -> usize {
         self.stages.iter().map(|run| run.there).sum()
     }
 
-    /// Makes the frames, and calls `done` with the stage, the frame and its report when the files of one are written; from
-    /// several threads where stages do not depend on each other.
+    /// Makes the frames, and calls `done` with the stage, the frame and its report when a frame's files are written; from several threads
+    /// if stages are independent.
     ///
-    /// Where a stage fails, those that need nothing of it are made all the same.
+    /// If a stage fails, those that do not depend on it are still made.
     ///
     /// # Errors
-    /// What the first step or file that fails reports; whole frames are left behind, from which another run resumes.
+    /// The error of the first step or file that fails; complete frames remain, from which another run resumes.
     pub fn make(mut self, ctx: &Context, done: impl Fn(&'static str, i32, &Report) + Sync) -> Result<()> {
         let mut failed = None;
         while let Some(ready) = self.ready() {
@@ -311,7 +310,7 @@ impl<'a> Run<'a> {
         self.own.finish()
     }
 
-    /// The stages, by position, that have frames to make and wait for no other; none when all is done.
+    /// The stages, by index, that have frames to make and wait for no other; `None` if all is done.
     fn ready(&self) -> Option<Vec<usize>> {
         let busy: Vec<&str> =
             self.stages.iter().filter(|run| !run.todo.is_empty()).map(|run| run.stage.name()).collect();
@@ -333,7 +332,7 @@ impl<'a> Run<'a> {
         gone.into_iter().for_each(|n| self.stages[n].todo.clear());
     }
 
-    /// Makes the frames of some stages, side by side; how each went.
+    /// Makes the frames of some stages in parallel; returns the result of each.
     fn make_stages(
         &mut self,
         ctx: &Context,
@@ -371,7 +370,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Stops the passes beside one that is cancelled, or ends by a panic, after their frame.
+/// If a pass is cancelled or panics, stops the others after their current frame.
 struct StopOthers<'a>(&'a AtomicBool);
 
 impl Drop for StopOthers<'_> {
@@ -388,7 +387,7 @@ impl StageRun<'_> {
         let start = match self.start.take() {
             Some(start) => start,
             None => {
-                // What is upstream was made only now.
+                // The upstream frames were made only in this run.
                 cache.check_inputs(self.stage.as_stage(), &FrameChoice::none(), &upstream)?;
                 self.stage.looks_ahead(shared.ctx, &upstream, todo[todo.len() - 1])?;
                 self.stage.before(shared.ctx, todo[0], cache.kept(shared.first))?
@@ -410,14 +409,14 @@ fn make_folders<'s>(stages: impl Iterator<Item = &'s dyn Stage>, folder: &Path) 
     Ok(())
 }
 
-/// Keeps other runs from writing into a folder.
+/// Prevents other runs from writing into a folder.
 fn lock(folder: &Path) -> Result<File> {
     let path = folder.join("state").join("run.lock");
     let file = File::options().create(true).append(true).open(&path);
     let file = file.map_err(|error| Error::io(&path, "write", error))?;
     match file.try_lock() {
         Err(std::fs::TryLockError::WouldBlock) => Err(Error::Busy(folder.to_path_buf())),
-        // A file system without locks is no reason to stop.
+        // File systems without locks are allowed.
         Err(std::fs::TryLockError::Error(error)) => {
             let why = Error::io(&path, "lock", error);
             log::warn!("{why}; nothing keeps another run from writing into this folder");

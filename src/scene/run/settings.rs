@@ -1,10 +1,10 @@
-//! The settings that a stage depends on, and what two of them differ in.
+//! The settings that a stage depends on, and the differences between two sets of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Former values longer than this are not told.
+/// Former values longer than this are not reported.
 const LONG: usize = 80;
-/// What stands in place of a file's name: the same content under another name is the same input.
+/// Prefix in place of a file's name: the same content under another name is the same input.
 pub const CONTENT: &str = "content ";
 
 /// Settings by key: `snow.noise.size`, `object[1].scale`.

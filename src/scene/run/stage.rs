@@ -1,4 +1,4 @@
-//! What a part of a shot has to bring along so that the frame loop can make it.
+//! What a part of a shot must provide so that the frame loop can make it.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use crate::io::records::manifest::{Keeps, Written};
 /// A folder of a stage's files: `base/base.0012.vdb`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Kind {
-    /// Its name, lower-case letters, and that of the files in it.
+    /// Its name, lower-case letters, which is also that of the files in it.
     pub name: &'static str,
     /// Extensions of the files, lower-case letters.
     pub extensions: &'static [&'static str],
@@ -24,28 +24,28 @@ pub struct Kind {
 /// The files that a stage reads for a frame.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Reads {
-    /// Those that it cannot do without.
+    /// Required files.
     pub files: Vec<PathBuf>,
-    /// Those of the coming frame, which may not be there yet: when they appear, the frame is made again.
+    /// Files of the coming frame, which may not exist yet: when they appear, the frame is made again.
     pub ahead: Vec<PathBuf>,
 }
 
-/// What a stage says of itself: names, settings and inputs.
+/// A stage's description: names, settings and inputs.
 pub trait Stage: Sync {
     /// Its name, lower-case letters: `--stage base`, `state/base.0012.json`, `report/base.0012.json`.
     fn name(&self) -> &'static str;
 
-    /// What messages call that which it carries from frame to frame.
+    /// Noun for its state in messages.
     fn noun(&self) -> &'static str {
         "state"
     }
 
-    /// Why a folder may lack the exact state after a frame, as messages say it.
+    /// Why a folder may lack the exact state after a frame, for messages.
     fn why_states_go(&self) -> &'static str {
         "state/ keeps those of the last two frames"
     }
 
-    /// Its folders. A frame that [`Keeps::Whole`] or [`Keeps::Changes`] keeps them in the folder of the stage's own name.
+    /// Its folders. A frame that [`Keeps::Whole`] or [`Keeps::Changes`] applies to is kept in the folder of the stage's own name.
     fn kinds(&self) -> &'static [Kind];
 
     /// Whether this scene has files of a kind.
@@ -56,7 +56,7 @@ pub trait Stage: Sync {
         "vdb"
     }
 
-    /// Files of its that belong to no frame, by their paths from the folder.
+    /// Its files that belong to no frame, by path relative to the folder.
     fn loose_files(&self) -> &'static [&'static str] {
         &[]
     }
@@ -67,10 +67,10 @@ pub trait Stage: Sync {
     /// An input that cannot be read.
     fn settings(&self) -> Result<Settings>;
 
-    /// Those of its settings that make the state before the first frame: a run cannot resume from a state of others.
+    /// Those of its settings that determine the state before the first frame: a run cannot resume from a state with others.
     fn of_first_state(&self, settings: &Settings) -> Settings;
 
-    /// The stages whose frames it reads, each earlier in the scene's order.
+    /// The stages whose frames it reads, all earlier in the scene's order.
     fn upstream(&self) -> &'static [&'static str] {
         &[]
     }
@@ -80,7 +80,7 @@ pub trait Stage: Sync {
         false
     }
 
-    /// Whether it reads the exact states of a stage upstream, not only its files: those of all frames are then kept.
+    /// Whether it reads the exact states of an upstream stage, not only its files: those of all frames are then kept.
     fn reads_state_of(&self, _upstream: &str) -> bool {
         true
     }
@@ -95,10 +95,10 @@ pub trait Stage: Sync {
         Reads::default()
     }
 
-    /// From what another run can resume after a frame.
+    /// What another run can resume from after a frame.
     fn keeps(&self, frame: i32) -> Keeps;
 
-    /// The setting that lets no frame be left out, where one does.
+    /// The setting that requires every frame to be made, if one does.
     fn needs_every_frame(&self) -> Option<&'static str> {
         None
     }
@@ -118,47 +118,46 @@ pub trait Stage: Sync {
 pub trait Stepping: Stage {
     /// What it carries from frame to frame.
     type State: Send;
-    /// What a step hands to the thread that writes its files.
+    /// Passed to the thread that writes the files of a step.
     type Step: Send;
     /// What that thread carries from frame to frame.
     type Writer: Send;
 
-    /// Looks at what frames up to a last one are made from, before the first of them is; the frames of the stages upstream are
-    /// there.
+    /// Checks the inputs of all frames up to `last` before the first is made; the frames of the upstream stages exist.
     ///
     /// # Errors
-    /// Why they cannot be made.
+    /// Why the frames cannot be made.
     fn foresee(&self, _ctx: &Context, _upstream: &[&Stored], _last: i32) -> Result<()> {
         Ok(())
     }
 
-    /// The state after a frame that `done` keeps, or the one before the first.
+    /// The state after a frame that `done` keeps, or the state before the first.
     ///
     /// # Errors
-    /// Files that are not what was written; whatever the first state cannot be made from.
+    /// Files that are not what was written; anything that the first state cannot be made from.
     fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<Self::State>;
 
-    /// Takes the state to a frame from the one before it.
+    /// Advances the state to a frame from the one before it.
     ///
     /// # Errors
-    /// Whatever keeps the frame from being made; cancel.
+    /// Anything that prevents the frame from being made; cancel.
     fn step(&self, ctx: &Context, state: &mut Self::State, to: &To<'_>) -> Result<Stepped<Self::Step>>;
 
-    /// What the writing thread starts from, beside a state from which steps will follow.
+    /// The writer's initial state, for a state from which steps will follow.
     ///
     /// # Errors
-    /// What copying the state reports.
+    /// Errors of copying the state.
     fn writer(&self, ctx: &Context, state: &Self::State) -> Result<Self::Writer>;
 
-    /// Whether a frame whose files cannot be written leaves the writer as it was: those after it are then written all the same.
+    /// Whether a frame that cannot be written leaves the writer unchanged: later frames are then still written.
     fn writes_alone(&self) -> bool {
         false
     }
 
-    /// Writes what a step made; without `files` the frame is passed through only.
+    /// Writes the result of a step; without `files` the frame is only passed through.
     ///
     /// # Errors
-    /// What the operating system or a library reports; the frame is then not done.
+    /// Errors of the operating system or a library; the frame is then not done.
     fn write(
         &self,
         writer: &mut Self::Writer,
@@ -170,52 +169,52 @@ pub trait Stepping: Stage {
 /// The frame that a step leads to.
 #[derive(Clone, Copy)]
 pub struct To<'a> {
-    /// Which.
+    /// The frame.
     pub frame: i32,
-    /// Hash of all that the frame depends on, where its files are wanted.
+    /// Hash of everything that the frame depends on, if its files are wanted.
     pub made_from: Option<&'a str>,
     /// The frames of the stages upstream, in the order of [`Stage::upstream`].
     pub upstream: &'a [&'a Stored],
 }
 
-/// A step that was made.
+/// The result of a step.
 pub struct Stepped<T> {
-    /// What the writing thread needs.
+    /// For the writing thread.
     pub step: T,
-    /// What is reported of it.
+    /// The frame's report.
     pub report: Report,
 }
 
-/// What is reported of a frame: `report/base.0012.json`.
+/// The report of a frame: `report/base.0012.json`.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
-    /// Results by name; units stand in the names.
+    /// Results by name; names include units.
     pub results: Map<String, Value>,
-    /// How long its phases took.
+    /// Durations of its phases.
     pub phases: Vec<PhaseTime>,
 }
 
-/// The files of a frame while they are written.
+/// The files of a frame while they are being written.
 pub struct FrameFiles<'a> {
     folder: &'a Path,
     stage: &'static str,
     state_extension: &'static str,
-    /// Which frame.
+    /// The frame.
     pub frame: i32,
-    /// Hash of all that it depends on.
+    /// Hash of everything that it depends on.
     pub made_from: &'a str,
     files: Vec<Written>,
     state: Option<Written>,
 }
 
 impl<'a> FrameFiles<'a> {
-    /// None yet, of a stage's frame.
+    /// No files yet, for a frame of a stage.
     pub(super) fn new(folder: &'a Path, stage: &dyn Stage, frame: i32, made_from: &'a str) -> Self {
         let (stage, state_extension) = (stage.name(), stage.state_extension());
         Self { folder, stage, state_extension, frame, made_from, files: Vec::new(), state: None }
     }
 
-    /// Writes a file of a kind, whole or not at all.
+    /// Writes a file of a kind atomically.
     ///
     /// # Errors
     /// What the operating system reports.
@@ -226,7 +225,7 @@ impl<'a> FrameFiles<'a> {
         Ok(())
     }
 
-    /// Writes the exact state after the frame, whole or not at all.
+    /// Writes the exact state after the frame atomically.
     ///
     /// # Errors
     /// What the operating system reports.
@@ -237,7 +236,7 @@ impl<'a> FrameFiles<'a> {
         Ok(())
     }
 
-    /// What was written: files, and the exact state.
+    /// The files written, and the exact state.
     pub(super) fn written(self) -> (Vec<Written>, Option<Written>) {
         (self.files, self.state)
     }

@@ -1,4 +1,4 @@
-//! The frames of a stage that a folder holds: which are done, and from which files the state after one can be had.
+//! The frames of a stage in a folder: which are done, and which files the state after one can be read from.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::io::records::checksummed;
 use crate::io::records::manifest::{Keeps, Manifest, Written};
 
-/// The frames of a stage that a folder holds.
+/// The frames of a stage in a folder.
 pub struct Stored {
     folder: PathBuf,
     stage: String,
@@ -18,8 +18,8 @@ pub struct Stored {
 }
 
 impl Stored {
-    /// Reads the records of a stage in a folder; frames whose files are not there with their lengths are not done, and a folder
-    /// without records has none.
+    /// Reads the records of a stage in a folder; frames whose files are missing or have another length are not done; a folder without
+    /// records has no frames.
     ///
     /// # Errors
     /// A folder that cannot be read; a record that is damaged or of a newer version.
@@ -47,7 +47,7 @@ impl Stored {
         Ok(stored(done))
     }
 
-    /// Where they are.
+    /// Their folder.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -72,7 +72,7 @@ impl Stored {
         self.done.insert(manifest.frame, manifest);
     }
 
-    /// The files of a kind, ascending by frame, with their paths from the folder.
+    /// The files of a kind, ascending by frame, with their paths relative to the folder.
     pub fn files(&self, kind: &str) -> Vec<(i32, String)> {
         let of_frame = |(frame, manifest): (&i32, &Manifest)| -> Vec<(i32, String)> {
             manifest.files_of(kind).map(|written| (*frame, written.path.clone())).collect()
@@ -80,7 +80,7 @@ impl Stored {
         self.done.iter().flat_map(of_frame).collect()
     }
 
-    /// Leaves out the frames from one on, as if they were not done; they stay where they are.
+    /// Leaves out the frames from `from` on, as if they were not done; their files remain.
     pub(super) fn leave_out_from(&mut self, from: i32) -> Vec<Manifest> {
         self.done.split_off(&from).into_values().collect()
     }
@@ -90,7 +90,7 @@ impl Stored {
         self.done.remove(&frame);
     }
 
-    /// Removes a frame that was left out: first what says that it is done, then its files.
+    /// Removes a frame that was left out: first the record, then its files.
     ///
     /// # Errors
     /// What the operating system reports.
@@ -109,7 +109,7 @@ impl Stored {
         Ok(())
     }
 
-    /// The latest frame in a range after which the state can be had.
+    /// The latest frame in a range after which the state can be read.
     pub fn latest_state(&self, frames: RangeInclusive<i32>) -> Option<i32> {
         if frames.is_empty() {
             return None;
@@ -129,15 +129,15 @@ impl Stored {
         latest
     }
 
-    /// Whether a frame keeps only what it changed.
+    /// Whether a frame stores only its changes.
     pub fn keeps_changes(&self, frame: i32) -> bool {
         self.done.get(&frame).is_some_and(|manifest| manifest.keeps == Keeps::Changes)
     }
 
-    /// The frames whose files make up the state after a frame: a whole one, and those that keep their changes since.
+    /// The frames whose files make up the state after a frame: a whole one, and all later ones up to it, which store changes.
     ///
     /// # Errors
-    /// A frame that is not there.
+    /// A missing frame.
     pub fn frames_to(&self, frame: i32) -> Result<RangeInclusive<i32>> {
         let whole = (0..).map(|back| frame - back).find(|&frame| !self.keeps_changes(frame));
         let whole = whole.filter(|whole| self.is_done(*whole));
@@ -145,10 +145,10 @@ impl Stored {
         Ok(whole.ok_or_else(missing)?..=frame)
     }
 
-    /// The report of a frame that is done; none where it is gone.
+    /// The report of a frame that is done; `None` if it is gone.
     ///
     /// # Errors
-    /// One that is not what was written.
+    /// A report that is not what was written.
     pub fn report(&self, frame: i32) -> Result<Option<Value>> {
         let path = self.folder.join("report").join(format!("{}.{frame:04}.json", self.stage));
         let bytes = match std::fs::read(&path) {
@@ -159,10 +159,10 @@ impl Stored {
         report.map(Some).ok_or_else(|| Error::file(path, "is not the report that was written"))
     }
 
-    /// The file from which the state after a frame, or what the frame changed, is read; its content was compared.
+    /// The file with the state after a frame, or with its changes; the content was verified.
     ///
     /// # Errors
-    /// A frame that is not there; a file that is not what was written.
+    /// A missing frame; a file that is not what was written.
     pub fn state_file(&self, frame: i32) -> Result<PathBuf> {
         let missing = || Error::file(&self.folder, format!("frame {frame} is not there"));
         let manifest = self.done.get(&frame).ok_or_else(missing)?;
@@ -173,15 +173,15 @@ impl Stored {
         self.compared(written.ok_or_else(missing)?)
     }
 
-    /// A frame's file of a kind; its content was compared.
+    /// A frame's file of a kind; the content was verified.
     ///
     /// # Errors
-    /// A frame that is not there or has none; a file that is not what was written.
+    /// A missing frame or one without such a file; a file that is not what was written.
     pub fn file(&self, frame: i32, kind: &str) -> Result<PathBuf> {
         self.find(frame, kind, |_| true)
     }
 
-    /// A frame's file of a kind with an extension; its content was compared.
+    /// A frame's file of a kind with an extension; the content was verified.
     ///
     /// # Errors
     /// As [`Stored::file`].
@@ -198,7 +198,7 @@ impl Stored {
         self.compared(written.ok_or_else(missing)?)
     }
 
-    /// Where a file is whose content is what was written.
+    /// The path of a file whose content is what was written.
     fn compared(&self, written: &Written) -> Result<PathBuf> {
         let path = self.folder.join(&written.path);
         match written.fault(&self.folder) {

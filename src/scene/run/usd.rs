@@ -1,4 +1,4 @@
-//! `shot.usda`: everything that a shot made, for programs that read USD.
+//! `shot.usda`: the whole shot for programs that read USD.
 
 use super::own_files::Own;
 use super::runner::Plan;
@@ -13,7 +13,7 @@ use crate::io::usd::{self, Field};
 /// The shot for programs that read USD.
 pub(super) const SHOT: &str = "shot.usda";
 
-/// A volume in a kind of a stage's files.
+/// A volume in the files of a kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Volume {
     /// The kind.
@@ -22,17 +22,17 @@ pub struct Volume {
     pub prim: &'static str,
     /// Its fields, each a grid of the files.
     pub fields: &'static [Field],
-    /// Whether it is there to be looked at and not to be rendered.
+    /// Whether it is a guide: to be viewed, not rendered.
     pub is_guide: bool,
 }
 
-/// A kind of a stage's files with a .usda file a frame.
+/// A kind of files with one .usda file for each frame.
 pub struct Clip<'a> {
     /// The kind.
     pub kind: &'static str,
     /// What the frames have in common: a file that belongs to no frame.
     pub manifest: &'static str,
-    /// What the frames hold.
+    /// Contents of the frames.
     pub prims: Prims<'a>,
 }
 
@@ -40,7 +40,7 @@ pub struct Clip<'a> {
 pub struct MovingMesh<'a> {
     /// Name of its prim.
     pub name: String,
-    /// What it is made of.
+    /// Its material.
     pub look: Look,
     /// Its texture coordinates.
     pub uvs: Option<&'a Uvs>,
@@ -48,17 +48,17 @@ pub struct MovingMesh<'a> {
     pub primvars: Vec<Primvar>,
 }
 
-/// What the frames of a [`Clip`] hold.
+/// Contents of the frames of a [`Clip`].
 pub enum Prims<'a> {
     /// Moving meshes.
     Meshes(Vec<MovingMesh<'a>>),
-    /// A surface that is another mesh at each frame, without velocities: name of its prim.
+    /// A surface that is a different mesh at each frame, without velocities: name of its prim.
     Surface(&'static str),
-    /// Points, in a prim of the kind's name; these have their attributes.
+    /// Points, in a prim named after the kind; these have their attributes.
     Points(Points),
 }
 
-/// Writes the description of the frames that are there, by relative paths.
+/// Writes the description of the existing frames, by relative paths.
 ///
 /// # Errors
 /// What the operating system reports.

@@ -1,4 +1,4 @@
-//! Reads everything that an output folder holds and compares it with what was written.
+//! Reads all files in an output folder and compares them with what was written.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -15,28 +15,28 @@ use crate::error::{Error, Result};
 use crate::io::records::checksummed;
 use crate::io::records::manifest::{Manifest, Written};
 
-/// What a folder's runs wrote besides the records of frames.
+/// What runs wrote into a folder besides the records of frames.
 const FILES: &str = "state/files.json";
 
-/// What a folder holds.
+/// Contents of a folder.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Verified {
-    /// Frames of which some stage is done.
+    /// Frames of which at least one stage is done.
     pub frames: usize,
-    /// Files that were compared, records among them.
+    /// Files that were compared, including records.
     pub files: usize,
     /// Bytes of the frames' files.
     pub bytes: u64,
-    /// What is not what was written, in the order of the names.
+    /// Files that are not what was written, ordered by name.
     pub damaged: Vec<Damage>,
-    /// Files with names of a run's that no record knows: begun and not finished, or not a run's.
+    /// Files named like those of runs that no record knows: unfinished, or not written by a run.
     pub unknown: Vec<String>,
 }
 
 /// A file that is not what was written.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Damage {
-    /// Its path from the folder.
+    /// Its path relative to the folder.
     pub file: String,
     /// What is wrong.
     pub what: String,
@@ -112,7 +112,7 @@ fn told(file: &str, error: Error) -> Damage {
     Damage { file: file.to_string(), what }
 }
 
-/// The record of a frame, where a name is one's, with that name.
+/// The record of a frame, if a file has the name of one.
 fn manifest(folder: &Path, name: &str, damaged: &mut Vec<Damage>) -> Option<(String, Manifest)> {
     let (stage, frame) = record_of(name.strip_prefix("state/")?)?;
     match Manifest::read(folder, stage, frame) {
@@ -124,7 +124,7 @@ fn manifest(folder: &Path, name: &str, damaged: &mut Vec<Damage>) -> Option<(Str
     }
 }
 
-/// A frame's exact state, as long as it is kept.
+/// A frame's exact state, if it is still kept.
 fn state_of<'a>(folder: &Path, manifest: &'a Manifest) -> Option<&'a Written> {
     manifest.state.as_ref().filter(|state| folder.join(&state.path).exists())
 }

@@ -1,4 +1,4 @@
-//! Reads a scene file: its tables, the values of their keys, and what systems make of them.
+//! Reads a scene file: its tables, the values of their keys, and the typed data of its system.
 
 use super::key::{Fallback, Key, heading, is_many};
 use super::keys::{self, tables};
@@ -14,14 +14,12 @@ impl Scene {
     /// Reads a scene file. Relative paths in it are taken from its own folder.
     ///
     /// # Errors
-    /// An unreadable file, a TOML mistake, an unknown key, a wrong type or a value outside its range, each
-    /// with file and line.
+    /// An unreadable file, a TOML error, an unknown key, a wrong type or a value out of range, each with file and line.
     pub fn read(path: &Path) -> Result<Self> {
         Self::read_with(path, &[])
     }
 
-    /// Reads a scene file with settings of the command line put over its own; relative paths in those are taken
-    /// from the current folder.
+    /// Reads a scene file with settings of the command line overriding its own; relative paths in those start from the current folder.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -31,7 +29,7 @@ impl Scene {
         Self::parse(&text, path, overrides)
     }
 
-    /// Reads a scene from text; `path` names it in messages and gives the folder of its relative paths.
+    /// Reads a scene from text; `path` is its name in messages, and its folder the start of relative paths.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -39,7 +37,7 @@ impl Scene {
         Self::parse_keys(text, path, overrides, keys::of)
     }
 
-    /// The same with other keys than those that there are.
+    /// The same with another list of keys.
     pub(super) fn parse_keys(
         text: &str,
         path: &Path,
@@ -67,7 +65,7 @@ impl Scene {
         Ok(Self::of(path, system, values))
     }
 
-    /// The scene that some values make.
+    /// The scene with these values.
     fn of(path: &Path, system: System, values: Values) -> Self {
         Self {
             path: path.to_path_buf(),
@@ -76,17 +74,17 @@ impl Scene {
             snow: Snow::of(&values),
             surface: Surface::of(&values),
             shallow: Shallow::of(&values),
-            // Those of a shallow liquid are obstacles of another kind.
+            // Those of a shallow liquid are a different kind of obstacle.
             objects: if system == System::Shallow { Vec::new() } else { Object::all_of(&values) },
             output: Output::of(&values),
             values,
         }
     }
 
-    /// Makes the cells `factor` times as large, for a quick look; noise too fine for them becomes coarser.
+    /// Makes the cells `factor` times as large, for a preview; noise too fine for them becomes coarser.
     ///
     /// # Errors
-    /// A layer from a .vdb file, whose cells are what they are; a cell out of range.
+    /// A layer from a .vdb file, whose cells are fixed; a cell out of range.
     pub fn coarsen(&mut self, factor: f64) -> Result<()> {
         let mut values = self.values.clone();
         self.snow()?
@@ -98,7 +96,7 @@ impl Scene {
 }
 
 impl System {
-    /// The system whose table a scene has; of snow where it has none, whose absence is then told.
+    /// The system whose table a scene has; snow if it has none: the missing table is then reported.
     fn of(document: &Document, root: &DeTable) -> Result<Self> {
         let position = |system: &Self| root.iter().find(|(key, _)| key.get_ref() == system.name());
         let span = |system: Self| Some((position(&system)?.0.span().start, system));
@@ -115,7 +113,7 @@ impl System {
     }
 }
 
-/// Reads a table, the tables in it, or every one of its name. One whose keys may not be left out is read only where it is.
+/// Reads a table and the tables in it, or every one of its name. A table with required keys is read only if it is there.
 fn read_table<'d>(
     document: &'d Document<'d>,
     root: &Table<'d, '_>,
@@ -155,7 +153,7 @@ fn read_table<'d>(
     Ok(())
 }
 
-/// Checks what the keys of a table mean together.
+/// Checks the keys of a table in combination.
 fn check(name: &str, table: &Table, values: &Values) -> Result<()> {
     match name {
         "snow" => Snow::check(table, values),
@@ -168,7 +166,7 @@ fn check(name: &str, table: &Table, values: &Values) -> Result<()> {
     }
 }
 
-/// The names of a table's keys, and of the tables in it; of the file itself for an empty name.
+/// The names of a table's keys, and of the tables in it; for an empty name, those of the file itself.
 fn known(keys: &[Key], table: &str) -> Vec<&'static str> {
     let own = keys.iter().filter(|key| key.table == table).map(|key| key.name);
     own.chain(inner_tables(keys, table)).collect()

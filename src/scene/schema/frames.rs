@@ -3,10 +3,10 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Most frames of a shot.
+/// Maximum frames of a shot.
 const MOST: i64 = 10_000_000;
 
-/// Greatest number of a frame, either way.
+/// Maximum frame number, positive or negative.
 const FARTHEST: i32 = 1_000_000_000;
 
 /// First and last frame of a shot, both included.
@@ -24,7 +24,7 @@ impl Frames {
         (i64::from(self.last) - i64::from(self.first) + 1) as usize
     }
 
-    /// Whether a frame is among them.
+    /// Whether it contains a frame.
     pub fn contains(&self, frame: i32) -> bool {
         self.iter().contains(&frame)
     }
@@ -71,12 +71,12 @@ pub struct FrameChoice {
 }
 
 impl FrameChoice {
-    /// The least frame.
+    /// The smallest frame.
     pub fn first(&self) -> i32 {
         self.frames[0]
     }
 
-    /// The greatest frame.
+    /// The largest frame.
     pub fn last(&self) -> i32 {
         self.frames[self.frames.len() - 1]
     }
@@ -91,14 +91,14 @@ impl FrameChoice {
         self.frames.len()
     }
 
-    /// Whether a frame is among them.
+    /// Whether it contains a frame.
     pub fn contains(&self, frame: i32) -> bool {
         self.frames.binary_search(&frame).is_ok()
     }
 }
 
 impl FrameChoice {
-    /// No frame at all.
+    /// No frames.
     pub(in crate::scene) fn none() -> Self {
         Self { frames: Vec::new() }
     }

@@ -1,4 +1,4 @@
-//! The keys that every system shares, those of each system, and the settings that a stage depends on.
+//! The keys that all systems share, those of each system, and the settings that a stage depends on.
 
 use std::sync::LazyLock;
 
@@ -11,10 +11,10 @@ use crate::io::records::input_hashes::Seen;
 use crate::scene::run::{CONTENT, Settings};
 use crate::scene::{Role, Scene, System, shallow, snow, surface};
 
-/// Farthest coordinate that a scene may name (m): f32 positions keep millimetres up to here.
+/// Farthest coordinate allowed in a scene (m): f32 positions keep millimetres up to here.
 pub const FAR: f64 = 1.0e5;
 
-/// An origin of a file: of any map projection, in any unit.
+/// The origin of a file: of any map projection, in any unit.
 pub const ORIGIN: Kind = Kind::Numbers(3, 1.0e12, "");
 /// What it means.
 pub const ORIGIN_MEANS: &str =
@@ -24,13 +24,13 @@ pub const NO_ORIGIN: &str = "[0.0, 0.0, 0.0]";
 
 type Scopes = &'static [(&'static str, Scope)];
 
-/// Concerns every stage that knows the objects.
+/// For every stage that uses the objects.
 const MOVES: Scopes = &[("base", Object), ("grains", Object), ("mist", Object), ("objects", Step)];
 
-/// Tables whose stages a scene has only where it has the table.
+/// Tables whose stages exist only if a scene has the table.
 pub const OPTIONAL: &[&str] = &["grains", "mist"];
 
-/// Extensions of what moves: characters and meshes.
+/// Extensions of moving objects: characters and meshes.
 const MOVING: &[&str] = &["glb", "gltf", EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2]];
 
 const SHOT: &[Key] = &[
@@ -60,12 +60,12 @@ const OBJECTS: &[Key] = &[
     Key::new(OBJECT, "file", Kind::File(MOVING), "character, mesh, or sequence \"body.%04d.obj\"")
         .begins_with("\"hero.glb\"")
         .concerns(MOVES),
-    Key::new(OBJECT, "node", Kind::Text, "only nodes of this name (* stands for any letters) and what hangs on them")
+    Key::new(OBJECT, "node", Kind::Text, "only nodes of this name (* matches any letters) and their descendants")
         .or_nothing()
         .of_characters()
         .such_as("\"hero*\"")
         .concerns(MOVES),
-    Key::new(OBJECT, "clip", Kind::Text, "needed where there are several; \"\": the pose at rest")
+    Key::new(OBJECT, "clip", Kind::Text, "required if there are several; \"\": the rest pose")
         .or_nothing()
         .of_characters()
         .such_as("\"Walk\"")
@@ -74,7 +74,7 @@ const OBJECTS: &[Key] = &[
         .or("true")
         .of_characters()
         .concerns(MOVES),
-    Key::new(OBJECT, "offset", Kind::Number(-1.0e7, 1.0e7, "frames"), "frames that a sequence or clip starts later")
+    Key::new(OBJECT, "offset", Kind::Number(-1.0e7, 1.0e7, "frames"), "frames by which a sequence or clip starts later")
         .or("0.0")
         .concerns(MOVES),
     Key::new(OBJECT, "scale", Kind::Number(1.0e-9, 1.0e9, ""), "from the file's unit to metres: 0.01 for centimetres")
@@ -86,12 +86,12 @@ const OBJECTS: &[Key] = &[
         OBJECT,
         "role",
         Kind::Choice(&["collide", "base", "grains", "static", "ignore"]),
-        "collide, base (takes snow, pushes no grains), grains (pushes grains, takes no snow), static (the snow lies on it from the start) or ignore",
+        "collide, base (removes snow, pushes no grains), grains (pushes grains, removes no snow), static (the snow lies on it from the start) or ignore",
     )
     .or("\"collide\"")
     .concerns(MOVES),
-    Key::new(OBJECT, "ease", Kind::Flag, "true: keys are joined smoothly, from rest to rest; else straight").or("false").concerns(MOVES),
-    Key::new(OBJECT, "keys", Kind::Poses(FAR), "rigid motion over the file's own: m, degrees about x, then y, then z")
+    Key::new(OBJECT, "ease", Kind::Flag, "true: smooth motion through the keys, from rest to rest; false: linear between them").or("false").concerns(MOVES),
+    Key::new(OBJECT, "keys", Kind::Poses(FAR), "rigid motion on top of the file's own: m, degrees about x, then y, then z")
         .or("[]")
         .begins_with(
             "[\n    { frame = 1, at = [0.0, 0.1, -2.5] },\n    { frame = 120, at = [0.0, 0.1, 2.5], turn_deg = [0.0, 0.0, 0.0] },\n]",
@@ -104,8 +104,8 @@ const OUTPUT: &[Key] =
     &[Key::new("output", "usd", Kind::Flag, "shot.usda: the whole shot for programs that read USD")
         .or("true")];
 
-/// The keys of a system's scenes, in the order in which a scene has them: the system's between the shot and the objects, and those
-/// that it has of each object behind the shared ones.
+/// The keys of a system's scenes, in the order of a scene: the system's keys between the shot and the objects, and its own keys of objects
+/// after the shared ones.
 pub fn of(system: System) -> &'static [Key] {
     static SNOW: LazyLock<Vec<Key>> = LazyLock::new(|| {
         let own = [snow::KEYS, snow::GRAIN_KEYS, snow::MIST_KEYS, snow::OUTPUT_KEYS];
@@ -139,8 +139,8 @@ pub fn tables(keys: &[Key]) -> Vec<&'static str> {
     out
 }
 
-/// The settings that a stage depends on, with the content of the objects' files in place of their names; of the objects
-/// those with these roles count, each as its role has it. Of the frames only the first counts: a shot may grow.
+/// The settings that a stage depends on, with the content of the objects' files in place of their names. Only objects with these roles
+/// count, each according to its role. Of the frames only the first counts: a shot may be extended.
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -173,16 +173,16 @@ pub fn settings_of(scene: &Scene, stage: &str, seen: &Seen, roles: &[Role]) -> R
         settings.insert(format!("object[{}].file", index + 1), format!("{CONTENT}{content}"));
     }
     settings.insert("shot.frames".into(), scene.shot.frames.first.to_string());
-    // Another version may compute something else.
+    // Other versions may compute different results.
     settings.insert("frazil".into(), env!("CARGO_PKG_VERSION").into());
     Ok(settings)
 }
 
-/// Those of a stage's settings that make its first state.
+/// Those of a stage's settings that determine its first state.
 pub fn first_of(system: System, settings: &Settings, stage: &str) -> Settings {
     let is_first = |path: &str| {
         let (table, name) = path.rsplit_once('.').unwrap_or_default();
-        // Of one of many tables: `object[1]`.
+        // The index is dropped: `object[1]`.
         let table = table.split('[').next().unwrap_or(table);
         let declared = of(system).iter().find(|key| key.table == table && key.name == name);
         declared.is_some_and(|key| key.scope(stage) == Some(First))

@@ -1,6 +1,5 @@
-//! The text of scene files. A key is declared once (`key.rs`: how; `keys.rs`: those that every system shares; each system's
-//! `keys.rs`: its own); reading, defaults, ranges, the resolved scene, the scene to begin with, the reference and the
-//! settings of the stages follow from that.
+//! The text of scene files. A key is declared once (`key.rs`: how; `keys.rs`: shared keys; each system's `keys.rs`: its own); reading,
+//! defaults, ranges, the resolved scene, the starter scene, the reference and the settings of the stages follow from that.
 
 mod file;
 mod frames;
@@ -91,7 +90,7 @@ mod tests {
             .lines()
             .map(|line| format!("{}\n", line.trim_start_matches("# ")))
             .collect();
-        // Every line of the scene to begin with is a value that is taken, but for `top`, which excludes `depth`.
+        // Every line of the starter scene is a valid value, except `top`, which excludes `depth`.
         let text: String = shown
             .lines()
             .skip_while(|line| *line != "[shot]")

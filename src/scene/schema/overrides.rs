@@ -1,4 +1,4 @@
-//! Settings from the command line (`--set snow.noise.seed=2`) put over those of a scene file.
+//! Settings from the command line (`--set snow.noise.seed=2`) that override those of a scene file.
 
 use std::path::Path;
 
@@ -35,9 +35,9 @@ impl Override {
         &self.text
     }
 
-    /// Puts the value into a document; `position` is where messages find it.
+    /// Puts the value into a document; `position` is its position for messages.
     pub(super) fn apply<'i>(&'i self, root: &mut DeTable<'i>, position: usize, path: &Path) -> Result<()> {
-        // What is not TOML is taken as a text: names of files and choices need no quotes.
+        // What is not TOML is taken as text: names of files and choices need no quotes.
         let value = match DeValue::parse(&self.value) {
             Ok(value) => moved(value.into_inner(), position),
             Err(_) => Spanned::new(position..position, DeValue::String(self.value.as_str().into())),
@@ -74,7 +74,7 @@ impl Override {
     }
 }
 
-/// A value whose parts all lie at one position.
+/// A value with all its parts at one position.
 fn moved(value: DeValue<'_>, position: usize) -> Spanned<DeValue<'_>> {
     let value = match value {
         DeValue::Table(table) => {

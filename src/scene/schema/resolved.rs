@@ -1,4 +1,4 @@
-//! Writes a scene with every default filled in and commented: the file beside the output that reproduces it.
+//! Writes a scene with every default filled in and commented: the file next to the output that reproduces it.
 
 use super::key::{Key, heading, is_many};
 use super::keys::tables;
@@ -8,7 +8,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 impl Scene {
-    /// The scene as TOML with every key, its meaning and absolute paths: for any folder.
+    /// The scene as TOML with every key, its meaning and absolute paths: valid in any folder.
     pub fn to_toml(&self) -> String {
         let mut out = format!(
             "# Every setting of this output, defaults filled in, made by frazil {}.\n\
@@ -26,13 +26,13 @@ impl Scene {
         out
     }
 
-    /// The same for a file in `folder`: what lies in the scene's own folder, with `folder` in there too, is named
-    /// relative to it, so that the whole may be moved; so is what lies around two output folders side by side, when the
-    /// scene is the other one's. All other paths are absolute.
+    /// The same for a file in `folder`. If that lies in the scene's own folder, paths in the scene's folder are written relative to it, so
+    /// that the whole can be moved; if it is a sibling of the scene's folder, so are paths in their common parent. All other paths are
+    /// absolute.
     pub fn to_toml_in(&self, folder: &Path) -> String {
         let mut scene = self.clone();
         let home = self.path.parent().filter(|home| !home.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        // Links are followed: `..` goes up from where a folder really is.
+        // Links are resolved: `..` goes up from a folder's real position.
         if let (Ok(home), Ok(folder)) = (home.canonicalize(), folder.canonicalize()) {
             let around =
                 home.parent().filter(|around| folder.parent() == Some(around) && *around != Path::new("/"));
@@ -67,12 +67,12 @@ fn lines(key: &Key, value: &Value) -> String {
     }
 }
 
-/// An assignment with what it means behind it.
+/// An assignment followed by its meaning as a comment.
 pub(super) fn line(assignment: &str, meaning: &str) -> String {
     format!("{assignment:<32} # {meaning}\n")
 }
 
-/// A file's path from a folder, where both lie in `home`; folder and home are free of links.
+/// A file's path relative to a folder, if both lie in `home`; folder and home must be free of links.
 fn relative(path: &Path, folder: &Path, home: &Path) -> Option<PathBuf> {
     let up: PathBuf = folder.strip_prefix(home).ok()?.components().map(|_| "..").collect();
     let parent = path.parent()?.canonicalize().ok()?;

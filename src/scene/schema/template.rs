@@ -1,4 +1,4 @@
-//! What is said of all keys: a scene to begin with, and a table of them.
+//! Documentation of all keys: a starter scene, and a table.
 
 use super::key::{Example, Fallback, Key, Kind, heading, is_many};
 use super::keys::{self, tables};
@@ -8,12 +8,12 @@ use super::values::any_of;
 use crate::scene::System;
 use std::fmt::Write;
 
-/// A commented scene to begin with: every key of a system, those that may be left out behind a `#`.
+/// A commented starter scene: every key of a system; optional ones are commented out.
 pub fn template(system: System) -> String {
     template_of(system, keys::of(system))
 }
 
-/// A table of a system's keys in Markdown: what they hold, unit, range, default and meaning.
+/// A table of a system's keys in Markdown: type, unit, range, default and meaning.
 pub fn reference(system: System) -> String {
     reference_of(keys::of(system))
 }
@@ -40,7 +40,7 @@ pub(super) fn template_of(system: System, keys: &[Key]) -> String {
     out
 }
 
-/// A key's line in a scene to begin with.
+/// A key's line in a starter scene.
 fn example(key: &Key, keys: &[Key]) -> String {
     let (mark, value) = match key.example {
         Example::Needed(value) => ("", value.to_string()),
@@ -55,7 +55,7 @@ fn example(key: &Key, keys: &[Key]) -> String {
     line(&format!("{mark}{} = {first}", key.name), &meaning) + &rest
 }
 
-/// Which value is taken, in the cells of the scene to begin with.
+/// The default, with the cell size of the starter scene.
 fn default_value(key: &Key, keys: &[Key]) -> String {
     let cell = || {
         let example = keys.iter().find(|key| key.table == "snow" && key.name == "cell")?.example;
@@ -97,7 +97,7 @@ pub(super) fn reference_of(keys: &[Key]) -> String {
     out.trim_start().to_string()
 }
 
-/// What a key may hold, with range and unit.
+/// The values of a key, with range and unit.
 fn holds(key: &Key) -> String {
     let texts = |texts: &[&str], or: &str| {
         texts.iter().map(|text| format!("`\"{text}\"`")).collect::<Vec<_>>().join(or)
@@ -129,13 +129,13 @@ fn holds(key: &Key) -> String {
     if key.of_characters { format!("{held}; .glb and .gltf") } else { held }
 }
 
-/// A bound of a range, without a row of zeros.
+/// A bound of a range, without long rows of zeros.
 fn short(bound: f64) -> String {
     let size = bound.abs();
     if size != 0.0 && !(1e-3..1e5).contains(&size) { format!("{bound:e}") } else { bound.to_string() }
 }
 
-/// A number with five digits, to be read by people.
+/// A number with five digits, for people to read.
 pub(in crate::scene) fn rounded(number: f64) -> f64 {
     format!("{number:.4e}").parse().unwrap_or(number)
 }

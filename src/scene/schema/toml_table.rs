@@ -1,7 +1,7 @@
 //! Tables of a TOML file read key by key, so that every refusal names the file, the line and the key.
 //!
-//! serde's own errors know neither the table nor the nearest key, and say nothing useful of a key that may be
-//! a number or a text; this reader walks the parsed document instead.
+//! serde's own errors know neither the table nor the nearest key, and are of no use for a key that may be a number or a text; this reader
+//! walks the parsed document instead.
 
 use super::overrides::Override;
 use crate::error::{Error, Result};
@@ -17,7 +17,7 @@ pub struct Document<'a> {
     pub text: &'a str,
     /// The absolute folder that relative paths start from.
     pub folder: PathBuf,
-    /// Settings of the command line; the one of index i has its position behind the text, at [`Document::place_of`].
+    /// Settings of the command line; setting i has a position after the end of the text: [`Document::position_of`].
     pub overrides: &'a [Override],
 }
 
@@ -31,7 +31,7 @@ impl Document<'_> {
         Error::argument(format!("{}:{line}: {what}", self.path.display()))
     }
 
-    /// Where the values of a setting of the command line lie.
+    /// Position of the values of a command-line setting.
     pub fn position_of(&self, index: usize) -> usize {
         self.text.len() + 1 + index
     }
@@ -54,7 +54,7 @@ pub struct Table<'a, 'i> {
     document: &'a Document<'a>,
     /// As written in the file: `[shot]`; empty for the file itself.
     name: String,
-    /// None where the table is not there: it has no keys then.
+    /// `None` if the table is missing: it has no keys then.
     entries: Option<&'a DeTable<'i>>,
     offset: usize,
 }
@@ -84,7 +84,7 @@ impl<'a, 'i> Table<'a, 'i> {
         }
     }
 
-    /// A table that is not there: it has no keys.
+    /// A missing table: it has no keys.
     pub fn absent(document: &'a Document<'a>, name: &str) -> Self {
         Self { document, name: name.to_string(), entries: None, offset: 0 }
     }
@@ -93,12 +93,12 @@ impl<'a, 'i> Table<'a, 'i> {
         self.entries?.get(key)
     }
 
-    /// Whether the key is there.
+    /// Whether the key is present.
     pub fn has(&self, key: &str) -> bool {
         self.entry(key).is_some()
     }
 
-    /// An error about a key's value, at its line; about the table's own line when the key is not there.
+    /// An error about a key's value, at its line; at the table's own line if the key is missing.
     pub fn error(&self, key: &str, what: impl std::fmt::Display) -> Error {
         let offset = self.entry(key).map_or(self.offset, |value| value.span().start);
         let position = if self.name.is_empty() { String::new() } else { format!(" in {}", self.name) };
@@ -178,13 +178,13 @@ impl<'a, 'i> Table<'a, 'i> {
         }
     }
 
-    /// A text out of a few.
+    /// One of a few texts.
     pub fn choice(&self, key: &str, choices: &[&'static str]) -> Result<Option<&'static str>> {
         let Some(text) = self.text(key)? else { return Ok(None) };
         self.chosen(key, text, choices).map(Some)
     }
 
-    /// A list of texts out of a few.
+    /// A list of texts from a fixed set.
     pub fn choices(&self, key: &str, choices: &[&'static str]) -> Result<Option<Vec<&'static str>>> {
         let values = match self.entry(key).map(|value| value.get_ref()) {
             None => return Ok(None),
@@ -234,7 +234,7 @@ impl<'a, 'i> Table<'a, 'i> {
         entries.iter().map(read).collect::<Result<_>>().map(Some)
     }
 
-    /// A list of so many finite numbers.
+    /// A list of `count` finite numbers.
     pub fn numbers(&self, key: &str, count: usize) -> Result<Option<Vec<f64>>> {
         let Some(value) = self.entry(key).map(|value| value.get_ref()) else { return Ok(None) };
         let read = || -> Option<Vec<f64>> {
@@ -278,7 +278,7 @@ impl<'a, 'i> Table<'a, 'i> {
     }
 }
 
-/// Reads a value that no file has, such as a default, from a table with its key only.
+/// Reads a value that is not in a file, such as a default, from a table with only its key.
 pub fn with_value<T>(key: &str, value: &str, read: impl FnOnce(&Table) -> Result<T>) -> Result<T> {
     let text = format!("{key} = {value}");
     let document = Document { path: Path::new(key), text: &text, folder: PathBuf::new(), overrides: &[] };
@@ -316,7 +316,7 @@ fn listed(names: &[&str]) -> String {
     }
 }
 
-/// The known name closest to what was typed, if it is close enough to have been meant.
+/// The known name closest to the typed one, if it is close enough to have been meant.
 fn nearest<'n>(typed: &str, known: &[&'n str]) -> Option<&'n str> {
     let typed = typed.to_lowercase();
     let best = known.iter().map(|name| (edits(&typed, name), *name)).min()?;
@@ -324,8 +324,7 @@ fn nearest<'n>(typed: &str, known: &[&'n str]) -> Option<&'n str> {
     (2 * best.0 <= longest).then_some(best.1)
 }
 
-/// Insertions, deletions, replacements and swaps of neighbours that make one word of the other
-/// (optimal string alignment distance).
+/// Insertions, deletions, replacements and swaps of neighbours that turn one word into the other (optimal string alignment distance).
 fn edits(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
     let mut rows = vec![(0..=b.len()).collect::<Vec<usize>>()];

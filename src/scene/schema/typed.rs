@@ -1,4 +1,4 @@
-//! What every system shares, from the values of a scene: the shot, the objects, the output.
+//! Typed data shared by all systems, from the values of a scene: the shot, the objects, the output.
 
 use super::toml_table::Table;
 use super::values::{Value, Values};
@@ -17,7 +17,7 @@ impl Shot {
 }
 
 impl Object {
-    /// Those of a scene, in the file's order.
+    /// The objects of a scene, in the file's order.
     pub(super) fn all_of(values: &Values) -> Vec<Self> {
         let is_there = |index: &usize| values.of_object(*index, "file").is_some();
         (0..).take_while(is_there).map(|index| Self::of(values, index)).collect()
@@ -82,10 +82,10 @@ impl Output {
         }
     }
 
-    /// Checks what single keys do not show.
+    /// Checks the keys in combination.
     ///
     /// # Errors
-    /// Values that are not exact where changes are kept.
+    /// 16-bit values where changes are stored, which must be exact.
     pub(super) fn check(table: &Table, values: &Values) -> Result<()> {
         let output = Self::of(values);
         if snow::has_grains(values) && (output.half || !output.base) {

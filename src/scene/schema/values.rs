@@ -1,4 +1,4 @@
-//! The values of a scene: read as their keys are declared, defaults filled in.
+//! The values of a scene: read as their keys are declared, with defaults filled in.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -14,16 +14,16 @@ use crate::io::particles;
 use crate::motion::is_gltf;
 use crate::scene::{Frames, KeyPose};
 
-/// What a key of a scene holds. As text, it is TOML in one line.
+/// The value of a scene's key. As text, it is TOML in one line.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
     /// First and last frame.
     Frames(Frames),
     /// `true` or `false`.
     Flag(bool),
-    /// A text, or one of a few.
+    /// A text, or one of a fixed set.
     Text(String),
-    /// Some of a few texts, in the order of the key's declaration.
+    /// Some of a fixed set of texts, in the order of the key's declaration.
     Choices(Vec<&'static str>),
     /// A number, in the key's unit.
     Number(f64),
@@ -39,18 +39,18 @@ pub enum Value {
     Poses(Vec<KeyPose>),
 }
 
-/// The values of a scene's keys: those of the tables that it has, and of each object, and whatever else it may have many of. A key that
-/// has none is not there.
+/// The values of a scene's keys: of its tables, its objects and all other tables that it may have many of. A key without a value is not in
+/// it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
     keys: &'static [Key],
-    /// By the key's position in `keys` and the index of its table, where there may be many.
+    /// By the index of the table, if there may be many, and the key's index in `keys`.
     values: BTreeMap<(Option<usize>, usize), Value>,
 }
 
-/// What the value of a key may be taken as.
+/// A type that a key's value converts to.
 pub trait Settled: Sized {
-    /// None of a value of another type.
+    /// `None` for a value of another type.
     fn of(value: &Value) -> Option<Self>;
 }
 
@@ -93,20 +93,20 @@ pub fn path(key: &Key, object: Option<usize>) -> String {
 }
 
 impl Values {
-    /// None yet, of these keys.
+    /// No values yet, for these keys.
     pub(super) fn new(keys: &'static [Key]) -> Self {
         Self { keys, values: BTreeMap::new() }
     }
 
-    /// The keys that it may have.
+    /// The declared keys.
     pub(super) fn keys(&self) -> &'static [Key] {
         self.keys
     }
 
-    /// Reads the keys of a table, of an object (or another of many) its index: with their defaults, also where the table is not there.
+    /// Reads the keys of a table, with its index if there may be many, and fills in defaults, even if the table is missing.
     ///
     /// # Errors
-    /// A key that is missing, a wrong type or a value outside its range, with file and line.
+    /// A key that is missing, a wrong type or a value out of range, with file and line.
     pub(super) fn read(&mut self, name: &str, object: Option<usize>, table: &Table) -> Result<()> {
         for (position, key) in self.keys.iter().enumerate().filter(|(_, key)| key.table == name) {
             let allowed = !key.of_characters || self.path_of(object, name, "file").is_some_and(is_gltf);
@@ -133,7 +133,8 @@ impl Values {
         key.presets.iter().find(|(name, _)| *name == chosen).map(|(_, value)| *value)
     }
 
-    /// Every value with its key and, of an object, its index: in the order of the keys, object by object.
+    /// Every value with its key and, for tables of which there may be many, the index: single tables first, then index by index, in the
+    /// order of the keys.
     pub(in crate::scene) fn iter(&self) -> impl Iterator<Item = (&'static Key, Option<usize>, &Value)> {
         self.values.iter().map(|((object, position), value)| (&self.keys[*position], *object, value))
     }
@@ -149,21 +150,21 @@ impl Values {
         self.of(None, table, name)
     }
 
-    /// An object's value.
+    /// A value of an object.
     pub fn of_object(&self, index: usize, name: &str) -> Option<&Value> {
         self.of_many(super::key::OBJECT, index, name)
     }
 
-    /// A value of one of many tables: `source`, the first of which has the index 0.
+    /// A value of one of many tables, such as `source`; the first has index 0.
     pub fn of_many(&self, table: &str, index: usize, name: &str) -> Option<&Value> {
         self.of(Some(index), table, name)
     }
 
-    /// The value of a key that has a default or may not be left out, of one of many tables its index: its declaration alone says what the
-    /// default is.
+    /// The value of a key that has a default or is required, with the index of its table if there may be many. The default comes only from
+    /// the key's declaration.
     ///
     /// # Panics
-    /// A key that is not declared, has no default, or holds something else: a mistake in the program, whatever the scene.
+    /// A key that is not declared, has no default, or holds something else: a programming error, whatever the scene.
     pub fn settled<T: Settled>(&self, table: &str, index: Option<usize>, name: &str) -> T {
         let value = self.of(index, table, name).cloned().or_else(|| self.declared(table, name));
         let value = value.as_ref().and_then(T::of);
@@ -177,7 +178,7 @@ impl Values {
         with_value(key.name, text, |table| read(key, table, None)).ok()?
     }
 
-    /// How many tables of a name there are, of which there may be many.
+    /// Number of tables of a name, for tables of which there may be many.
     pub fn count(&self, table: &str) -> usize {
         let indices = self.iter().filter(|(key, _, _)| key.table == table).filter_map(|(_, index, _)| index);
         indices.max().map_or(0, |last| last + 1)
@@ -192,7 +193,7 @@ impl Values {
         self.of(object, table, name)?.path()
     }
 
-    /// Puts a number in place of another.
+    /// Replaces a number.
     pub(in crate::scene) fn set_number(&mut self, key: &str, number: f64) {
         let position = self.keys.iter().position(|declared| path(declared, None) == key);
         let value = position.and_then(|position| self.values.get_mut(&(None, position)));
@@ -201,7 +202,7 @@ impl Values {
         }
     }
 
-    /// All of them by their paths in settings: `object[1].scale`.
+    /// All values by their paths in settings: `object[1].scale`.
     pub fn by_path(&self) -> BTreeMap<String, Value> {
         self.iter().map(|(key, object, value)| (path(key, object), value.clone())).collect()
     }
@@ -251,7 +252,7 @@ impl Value {
         if let Self::File(path) = self { Some(path) } else { None }
     }
 
-    /// Whether a list holds a text.
+    /// Whether a list contains a text.
     pub fn holds(&self, text: &str) -> bool {
         matches!(self, Self::Choices(texts) if texts.contains(&text))
     }
@@ -316,7 +317,7 @@ fn quoted(text: &str) -> String {
     toml::Value::String(text.to_string()).to_string()
 }
 
-/// Reads a key; none where it is left out.
+/// Reads a key; `None` if it is left out.
 fn read(key: &Key, table: &Table, cell: Option<f64>) -> Result<Option<Value>> {
     let name = key.name;
     Ok(match key.kind {
@@ -421,7 +422,7 @@ fn poses(name: &str, object: &Table, far: f64) -> Result<Vec<KeyPose>> {
     Ok(poses)
 }
 
-/// What is taken where a key is left out.
+/// The default of a key that is left out.
 fn default(
     key: &Key,
     preset: Option<&'static str>,

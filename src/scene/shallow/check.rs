@@ -1,4 +1,4 @@
-//! Looks at every input of every frame of a scene with `[shallow]`, and computes nothing else.
+//! Checks every input of every frame of a scene with `[shallow]`, without simulating.
 
 use std::collections::BTreeMap;
 
@@ -16,21 +16,21 @@ use crate::shallow::columns::grid::TOP;
 use crate::shallow::pipes::Border;
 use crate::shallow::sources::Kind;
 
-/// Fewer cells than this look like a mistake.
+/// Fewer cells than this are probably a mistake.
 const FEW: usize = 100;
 
-/// What a scene will do.
+/// Summary of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// First and last frame.
     pub frames: [i32; 2],
-    /// Frames a second.
+    /// Frames per second.
     pub fps: f64,
     /// Name of the terrain's file at the first frame.
     pub terrain: String,
-    /// How many files the terrain has.
+    /// Number of files of the terrain.
     pub files: usize,
-    /// Triangles of the terrain, where it is a mesh.
+    /// Triangles of the terrain, if it is a mesh.
     pub triangles: Option<usize>,
     /// Width, height and depth of the terrain at the first frame (m).
     pub size_m: [f64; 3],
@@ -38,44 +38,44 @@ pub struct Report {
     pub cell_m: f64,
     /// Count of cells along x and along z.
     pub cells: [usize; 2],
-    /// Least and greatest x and z of the cells (m).
+    /// Minimum and maximum x and z of the cells (m).
     pub area_m: [f64; 4],
-    /// Columns: positions for liquid in a cell, one above each solid.
+    /// Columns that can hold liquid: in each cell one above each solid.
     pub columns: usize,
-    /// Most columns in a cell.
+    /// Maximum columns in a cell.
     pub layers: usize,
     /// Cells without ground, through which liquid is lost.
     pub void_cells: usize,
-    /// Least and greatest height of ground and liquid (m).
+    /// Minimum and maximum height of ground and liquid (m).
     pub heights_m: [f64; 2],
     /// Smallest difference of depths (m).
     pub unit_m: f64,
-    /// Kinematic viscosity (m2/s); of a liquid that thins, at rest.
+    /// Kinematic viscosity (m2/s); at rest if the liquid thins.
     pub viscosity_m2_per_s: f64,
     /// Liquid at the first frame (ml).
     pub begins_with_ml: f64,
-    /// Liquid that comes later, poured and from sources, over the shot (ml).
+    /// Liquid added later, from pours and sources, over the shot (ml).
     pub comes_ml: f64,
-    /// Greatest depth at the first frame (m).
+    /// Maximum depth at the first frame (m).
     pub deepest_m: f64,
     /// Whether liquid falls freely.
     pub falls: bool,
     /// Names of the scalars that it carries.
     pub scalars: Vec<String>,
-    /// Memory that the run needs, about (bytes).
+    /// Estimated memory of the run (bytes).
     pub memory_bytes: u64,
-    /// Space that the files need at most (bytes): when all columns are wet.
+    /// Maximum size of the files (bytes): if all columns are wet.
     pub disk_bytes: u64,
-    /// Space that the files of a frame need at most (bytes).
+    /// Maximum size of the files of a frame (bytes).
     pub frame_bytes: u64,
-    /// What looks wrong, one sentence each.
+    /// Probable mistakes, one sentence each.
     pub warnings: Vec<String>,
     /// Every setting, defaults filled in.
     pub settings: BTreeMap<String, Value>,
 }
 
 impl Report {
-    /// Fails where the run would need more memory than a limit (bytes).
+    /// Fails if the run would need more memory than a limit (bytes).
     ///
     /// # Errors
     /// [`Error::Memory`] names the counts of cells and columns.
@@ -92,7 +92,7 @@ impl Report {
 /// Checks a scene whose inputs are open.
 ///
 /// # Errors
-/// A file that cannot be read; a source inside solid, and what else a run would refuse; cancel.
+/// A file that cannot be read; a source inside solid, and anything else that a run would refuse; cancel.
 pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let (of, frames) = (scene.shallow()?, scene.shot.frames);
     let course = Course::begin(ctx, (scene, of, inputs))?;
@@ -138,9 +138,9 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     })
 }
 
-/// Goes through terrain, obstacles and points of all later frames; of points that then should act and rest, a sentence each.
+/// Steps through terrain, obstacles and points of all later frames; a sentence for each point that should act but is resting.
 fn later(ctx: &Context, scene: &Scene, mut course: Course<'_>) -> Result<Vec<String>> {
-    // By their names: the first frame, and how many.
+    // By name: the first frame, and the number of frames.
     let mut resting: BTreeMap<String, (i32, usize)> = BTreeMap::new();
     for frame in scene.shot.frames.iter().skip(1) {
         ctx.check()?;
@@ -157,7 +157,7 @@ fn later(ctx: &Context, scene: &Scene, mut course: Course<'_>) -> Result<Vec<Str
     Ok(resting.into_iter().map(told).collect())
 }
 
-/// Liquid that comes after the first frame (m3).
+/// Liquid added after the first frame (m3).
 fn comes(scene: &Scene, of: &Shallow) -> f64 {
     let frames = scene.shot.frames;
     let later = |frame: i32| frame > frames.first && frame <= frames.last;
@@ -168,11 +168,11 @@ fn comes(scene: &Scene, of: &Shallow) -> f64 {
         let to = point.until.unwrap_or(frames.last).min(frames.last);
         point.point.rate * f64::from((to - from + 1).max(0)) / scene.shot.fps
     });
-    // A sum of nothing is -0.
+    // An empty sum is -0.
     poured.sum::<f64>() + sourced.sum::<f64>() + 0.0
 }
 
-/// What looks like a mistake.
+/// Probable mistakes.
 fn odd(of: &Shallow, inputs: &Inputs, course: &Course<'_>, void_cells: usize) -> Vec<String> {
     let mut out = Vec::new();
     let (grid, heights) = (inputs.grid, inputs.heights);

@@ -1,6 +1,6 @@
-//! A little liquid on a terrain in scenes: the keys of `[shallow]` and of what there may be many of beside it, what the files hold
-//! ([`Inputs`]), what a check says of it ([`check`]), memory and disk space that it takes among it, the stage `liquid` (`stage.rs`), and
-//! what a picture of it shows besides ([`Around`]).
+//! A little liquid on a terrain in scenes: the keys of `[shallow]` and of the tables beside it, the contents of its files ([`Inputs`]), the
+//! check ([`check`]), estimates of memory and disk space, the stage `liquid` (`stage.rs`), and the surroundings for a picture of it
+//! ([`Around`]).
 
 mod check;
 mod estimate;
@@ -33,12 +33,12 @@ use crate::shallow::{Params, Staining, sources};
 /// Cubic metres in a millilitre.
 pub const ML: f64 = 1.0e-6;
 
-/// A liquid that flows over a terrain, and what is written of it.
+/// A liquid that flows over a terrain, and its output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shallow {
-    /// A mesh, the pattern of a sequence of one that moves, a level set or an image of heights.
+    /// A mesh, the pattern of a sequence of a moving mesh, a level set or an image of heights.
     pub terrain: PathBuf,
-    /// How an image lies on the ground.
+    /// Placement of an image on the ground.
     pub image: Option<ImagePlace>,
     /// A mesh's unit and upward axis.
     pub space: Space,
@@ -46,39 +46,39 @@ pub struct Shallow {
     pub offset: i32,
     /// Edge of a cell (m).
     pub cell: f64,
-    /// Least and greatest x and z of the cells, `[x0, z0, x1, z1]` (m); none: those of the terrain.
+    /// Minimum and maximum x and z of the cells, `[x0, z0, x1, z1]` (m); `None`: those of the terrain.
     pub area: Option<[f64; 4]>,
-    /// Least height (m); none: as the terrain has it.
+    /// Minimum height (m); `None`: from the terrain.
     pub bottom: Option<f64>,
-    /// Greatest height (m); none: as the terrain has it.
+    /// Maximum height (m); `None`: from the terrain.
     pub top: Option<f64>,
-    /// What it looks like: water, blood, paint or honey.
+    /// Its look: water, blood, paint or honey.
     pub look: String,
     /// How it flows.
     pub params: Params,
     /// Height up to which it stands at the first frame (m).
     pub fill: Option<f64>,
-    /// What the liquid carries.
+    /// The scalars that the liquid carries.
     pub scalars: Vec<Carried>,
-    /// What is poured at frames.
+    /// Liquid poured at given frames.
     pub pours: Vec<Pour>,
     /// Sources, then drains, then absorbers, each in the file's order.
     pub points: Vec<Point>,
-    /// What stands or moves in its way.
+    /// Obstacles, at rest or moving.
     pub obstacles: Vec<Obstacle>,
-    /// How it stains a terrain that is a mesh, which is then written; none: it does not.
+    /// How it stains a terrain that is a mesh, which is then written; `None`: not at all.
     pub staining: Option<Staining>,
-    /// Whether a terrain that is a mesh does not show through films.
+    /// Whether films get minimum heights, so that a terrain that is a mesh does not show through.
     pub lifts: bool,
     /// Whether the surface comes down where the ground ends.
     pub skirts: bool,
     /// Depth from which it is opaque (m).
     pub opaque_depth: f64,
-    /// What is written.
+    /// Which files are written.
     pub output: Files,
 }
 
-/// How an image of heights lies around the origin.
+/// How an image of heights is placed around the origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImagePlace {
     /// Lengths along x and z (m).
@@ -90,52 +90,52 @@ pub struct ImagePlace {
 /// Liquid that is poured at a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pour {
-    /// Middle (m).
+    /// Centre (m).
     pub at: [f64; 3],
-    /// Of the circle, seen from above (m).
+    /// Radius of the circle, seen from above (m).
     pub radius: f64,
-    /// How much (m3).
+    /// Its volume (m3).
     pub volume: f64,
-    /// When; none: at the first frame.
+    /// Its frame; `None`: the first.
     pub frame: Option<i32>,
     /// Concentrations of the scalars.
     pub carries: Vec<f64>,
 }
 
-/// A source, a drain or an absorber, at some frames.
+/// A source, a drain or an absorber, active at some frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
     /// Its table, `source`, and its index there, from 0.
     pub name: (&'static str, usize),
-    /// What it does; of one that follows the terrain, where it is before it is put there.
+    /// The flow point itself; if it follows the terrain, before it is attached to that.
     pub point: FlowPoint,
     /// Concentrations of the scalars in what a source brings.
     pub carries: Vec<f64>,
     /// Whether it moves with the terrain.
     pub follows: bool,
-    /// First frame; none: from the beginning.
+    /// First frame; `None`: from the beginning.
     pub from: Option<i32>,
-    /// Last frame; none: to the end.
+    /// Last frame; `None`: to the end.
     pub until: Option<i32>,
 }
 
-/// What stands or moves in the liquid's way.
+/// An obstacle, at rest or moving.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obstacle {
-    /// Its form.
+    /// Its shape.
     pub form: Form,
-    /// Where it is at frames, ascending; may be empty.
+    /// Its poses at frames, ascending; may be empty.
     pub keys: Vec<KeyPose>,
-    /// Whether the keys are joined smoothly.
+    /// Whether the motion between keys is eased.
     pub ease: bool,
 }
 
-/// The form of an obstacle, around the origin.
+/// The shape of an obstacle, around the origin.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Form {
-    /// A ball, of a radius (m).
+    /// A sphere of this radius (m).
     Sphere(f64),
-    /// A capsule along y: its radius, and the distance between the middles of its ends (m).
+    /// A capsule along y: its radius, and the distance between the centres of its ends (m).
     Capsule(f64, f64),
     /// A box: lengths along x, y and z (m).
     Cuboid([f64; 3]),
@@ -143,7 +143,7 @@ pub enum Form {
     Mesh(PathBuf, Space),
 }
 
-/// What is written of the liquid.
+/// Which files and arrays are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Files {
     /// `liquid/liquid.%04d.ply`.
@@ -160,14 +160,14 @@ pub struct Files {
     pub layer: bool,
     /// Opacities.
     pub alpha: bool,
-    /// What is in the air.
+    /// Whether vertices are in the air.
     pub falling: bool,
     /// Concentrations of scalars.
     pub scalars: bool,
 }
 
 impl Shallow {
-    /// That of a scene; none where it has no such table.
+    /// The liquid of a scene; `None` if it has no such table.
     pub(super) fn of(values: &Values) -> Option<Self> {
         let value = |name: &str| values.get(&format!("shallow.{name}"));
         let number = |name: &str| value(name).and_then(Value::number);
@@ -215,7 +215,7 @@ impl Shallow {
         })
     }
 
-    /// The terrain's pattern, where it is a sequence.
+    /// The terrain's pattern, if it is a sequence.
     pub(super) fn sequence(&self) -> Option<Pattern> {
         Pattern::parse(&self.terrain)
     }
@@ -275,12 +275,12 @@ impl Point {
         Self { name: (table, index), point, carries, follows, from: frame("from"), until: frame("until") }
     }
 
-    /// Whether it acts on the way to a frame.
+    /// Whether it acts over the step to a frame.
     pub(super) fn acts(&self, frame: i32) -> bool {
         self.from.is_none_or(|from| from <= frame) && self.until.is_none_or(|until| frame <= until)
     }
 
-    /// As messages name it: `source.2`.
+    /// Its name in messages: `source.2`.
     pub(super) fn title(&self) -> String {
         format!("{}.{}", self.name.0, self.name.1 + 1)
     }
@@ -317,7 +317,7 @@ fn space(scale: Option<f64>, up: Option<&str>, origin: Option<&Value>) -> Space 
     }
 }
 
-/// How the liquid of a scene flows.
+/// Parameters of a scene's liquid.
 fn params(values: &Values) -> Params {
     let value = |name: &str| values.get(&format!("shallow.{name}"));
     let number = |name: &str| value(name).and_then(Value::number);
@@ -353,7 +353,7 @@ fn params(values: &Values) -> Params {
     }
 }
 
-/// No object of such a scene has a role.
+/// Objects of such a scene have no roles.
 const ROLES: &[Role] = &[];
 
 #[cfg(test)]
@@ -375,7 +375,7 @@ mod tests {
             let shallow = scene.shallow().unwrap();
             assert_eq!((&*shallow.look, Some(shallow.params.liquid)), (name, Liquid::named(name)));
         }
-        // But for the border and the pace, a scene's defaults are the library's.
+        // Except for border and pace, a scene's defaults are the library's.
         let params = scene("").shallow().unwrap().params.clone();
         assert_eq!(params, Params { border: Border::Open, pace: Pace::Exact, ..Params::default() });
         let thick = scene("liquid = \"paint\"\nviscosity = 0.25\n");

@@ -1,4 +1,4 @@
-//! What a picture of a liquid shows besides it: the terrain, and what stands or moves on it.
+//! Surroundings for a picture of a liquid: the terrain, and the obstacles on it.
 
 use super::inputs::obstacles;
 use super::inputs::terrain::Terrain;
@@ -12,14 +12,14 @@ use crate::scene::Scene;
 pub struct Around {
     /// The terrain.
     pub terrain: TriMesh,
-    /// What stands or moves on it, each by itself; first the meshes of files.
+    /// The obstacles, one mesh each; those from files come first.
     pub obstacles: Vec<TriMesh>,
-    /// How many meshes of files there are.
+    /// Number of meshes from files.
     pub meshes: usize,
 }
 
 impl Around {
-    /// Reads them.
+    /// Reads the surroundings.
     ///
     /// # Errors
     /// A scene without a liquid; files that cannot be read; cancel.
@@ -28,7 +28,7 @@ impl Around {
         Self::with_terrain(terrain, scene, frame)
     }
 
-    /// As [`Around::read`], where the terrain is known.
+    /// As [`Around::read`], with a given terrain.
     ///
     /// # Errors
     /// As there.
@@ -40,7 +40,7 @@ impl Around {
         Ok(Self { terrain, obstacles, meshes })
     }
 
-    /// Whether the terrain is another one at each frame.
+    /// Whether the terrain changes from frame to frame.
     pub fn moves(scene: &Scene) -> bool {
         scene.shallow().is_ok_and(|of| of.sequence().is_some())
     }

@@ -1,4 +1,4 @@
-//! Looks at every input of every frame of a scene, and computes nothing else.
+//! Checks every input of every frame of a scene, without simulating.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,34 +16,34 @@ use crate::scene::run::Stored;
 use crate::scene::{Layer, Scene, Value};
 use crate::snow::base_layer::initial::thin;
 
-/// What a scene will do.
+/// Summary of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// First and last frame.
     pub frames: [i32; 2],
-    /// Frames a second.
+    /// Frames per second.
     pub fps: f64,
-    /// Least and greatest x and z of the snow (m), where it is known before it is made.
+    /// Minimum and maximum x and z of the snow (m), if known before it is made.
     pub area_m: Option<[f64; 4]>,
     /// Edge of a voxel (m).
     pub cell_m: f64,
     /// The objects.
     pub objects: Vec<ObjectReport>,
-    /// The grains, where the scene has some and its base is there.
+    /// The grains, if the scene has some and its base exists.
     pub grains: Option<Forecast>,
-    /// The mist, where the scene has some.
+    /// The mist, if the scene has some.
     pub mist: Option<MistForecast>,
-    /// Memory that the run needs, about (bytes); without mist, and without grains that are not known yet.
+    /// Estimated memory of the run (bytes); without mist, and without grains whose number is not known yet.
     pub memory_bytes: u64,
-    /// Space that its files need, about (bytes); without mist, and without grains that are not known yet.
+    /// Estimated size of its files (bytes); without mist, and without grains whose number is not known yet.
     pub disk_bytes: Option<u64>,
-    /// What looks wrong, one sentence each.
+    /// Probable mistakes, one sentence each.
     pub warnings: Vec<String>,
     /// Every setting, defaults filled in: `snow.cell`, `object[1].scale`.
     pub settings: BTreeMap<String, Value>,
 }
 
-/// What an object does over the shot.
+/// Summary of an object over the shot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ObjectReport {
     /// Its file.
@@ -52,46 +52,46 @@ pub struct ObjectReport {
     pub role: &'static str,
     /// Its triangles.
     pub triangles: usize,
-    /// Open loops that are closed; those that share a vertex count once.
+    /// Open loops that are closed; loops that share a vertex count once.
     pub closed_loops: usize,
-    /// Holes at the first frame, counted as `frazil mesh check` does.
+    /// Holes at the first frame, counted as in `frazil mesh check`.
     pub holes: usize,
-    /// Edges where its triangles do not agree about inside and outside.
+    /// Edges where its triangles disagree on inside and outside.
     pub contradictions: usize,
     /// Width, height and depth at the first frame (m).
     pub size_m: [f64; 3],
-    /// Least and greatest position over the shot (m).
+    /// Minimum and maximum position over the shot (m).
     pub bounds_m: [[f64; 3]; 2],
-    /// Greatest speed of a vertex on its way from frame to frame (m/s), and the frame that ends that step.
+    /// Maximum speed of a vertex between two frames (m/s), and the frame that ends that step.
     pub fastest_m_per_s: f64,
     /// See [`ObjectReport::fastest_m_per_s`].
     pub fastest_frame: i32,
     /// First and last frame at which its bounds touch the snow's.
     pub touches: Option<[i32; 2]>,
-    /// How deep it goes, where the ground is known and it comes over it.
+    /// Its depth, if the ground is known and the object comes over it.
     pub deepest: Option<Deepest>,
     /// How its clip must be carried.
     pub walk: Option<Walk>,
 }
 
-/// The position of an object that lies lowest against the ground.
+/// The lowest position of an object relative to the ground.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Deepest {
-    /// Frame at which it is there.
+    /// Frame of that position.
     pub frame: i32,
     /// Its y (m).
     pub y_m: f64,
-    /// How far it is above the ground (m); negative below it.
+    /// Height above the ground (m); negative below it.
     pub above_ground_m: f64,
-    /// How deep it is under the snow's top (m); negative above it.
+    /// Depth below the snow's top (m); negative above it.
     pub below_top_m: f64,
 }
 
-/// Checks a scene whose inputs are open; `folder` is that of its output, whose base says how many grains there will be, and
-/// whose mist how far it spreads.
+/// Checks a scene whose inputs are open; `folder` is its output folder: the base there tells how many grains there will be, and the mist
+/// how far it spreads.
 ///
 /// # Errors
-/// A frame that cannot be read or fits no other; a damaged record of the base; cancel.
+/// A frame that cannot be read or does not match the others; a damaged record of the base; cancel.
 pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path>) -> Result<Report> {
     let mut warnings = inputs.warnings.clone();
     if let Layer::Depth(depth) = inputs.snow.layer {

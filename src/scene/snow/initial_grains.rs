@@ -1,4 +1,4 @@
-//! Grains that are there from the start: points of a file.
+//! Initial grains: points of a file.
 
 use std::path::Path;
 
@@ -20,9 +20,9 @@ use crate::scene::schema::rounded;
 use crate::snow::grains::{FASTEST, Grains, Params};
 use crate::vdb::{FloatGrid, points};
 
-/// Points that are tried as grains together.
+/// Points that are tested as grains together.
 const RUN: usize = 4096;
-/// Depth (diameters) in the snow or below the ground from which a point is no grain.
+/// Depth (diameters) in the snow or below the ground from which a point does not become a grain.
 const DEEP: f64 = 0.1;
 /// Share of the grains' radius by which a file's own may differ before it is reported.
 const OTHER_SIZE: f64 = 0.01;
@@ -31,20 +31,20 @@ const OTHER_SIZE: f64 = 0.01;
 pub struct Drift {
     /// Positions (m).
     pub positions: Vec<DVec3>,
-    /// Velocities (m/s), of the attribute `v`; none where there is no such attribute.
+    /// Velocities (m/s), from the attribute `v`; empty if there is none.
     pub velocities: Vec<[f32; 3]>,
 }
 
-/// The file of a scene's first grains.
+/// The file of a scene's initial grains.
 pub fn file(scene: &Scene) -> Option<&Path> {
     scene.values.get("grains.initial").and_then(|value| value.path())
 }
 
 impl Drift {
-    /// Those of a scene with cells of this size (m); adds to the warnings what the file says that grains do not follow.
+    /// The initial grains of a scene with cells of this size (m); adds warnings about data of the file that is not used.
     ///
     /// # Errors
-    /// A file that is missing, cut or damaged; a `v` that is no vector; positions or velocities that no grain can have.
+    /// A file that is missing, truncated or damaged; a `v` that is not a vector; positions or velocities out of range for grains.
     pub fn of(scene: &Scene, cell: f64, seen: &Seen, warnings: &mut Vec<String>) -> Result<Option<Self>> {
         let Some(path) = file(scene) else { return Ok(None) };
         seen.hash(path)?;
@@ -76,10 +76,10 @@ impl Drift {
         Ok(Some(drift))
     }
 
-    /// Positions (m) and velocities (m/s) of those that are not in a layer, nor below the ground; of grains with a radius (m).
+    /// Positions (m) and velocities (m/s) of the grains that are neither in a layer nor below the ground, for a radius (m).
     ///
     /// # Errors
-    /// What the grid reports; cancel.
+    /// Errors of the grid; cancel.
     pub fn outside(
         &self,
         ctx: &Context,
@@ -120,7 +120,7 @@ impl Drift {
                 ));
             }
         }
-        // How many there may be is another question.
+        // Their number is checked elsewhere.
         let params = Params { most: usize::MAX, ..params };
         let fits = |positions: &[DVec3]| Grains::new(params)?.emit(positions, &[], 0);
         for (run, positions) in self.positions.chunks(RUN).enumerate() {
@@ -134,14 +134,14 @@ impl Drift {
     }
 }
 
-/// Whether a position is more than a depth (m) below a mesh that is seen from above: the next triangle over it faces up.
+/// Whether a position is more than a depth (m) below a mesh seen from above: the next triangle above it faces up.
 fn is_below(mesh: &TriMesh, tree: &Bvh, position: DVec3, deep: f64) -> bool {
     let Some(hit) = tree.ray(position, DVec3::y(), f64::INFINITY) else { return false };
     let [a, b, c] = mesh.triangles[hit.triangle].map(|vertex| mesh.positions[vertex as usize]);
     hit.distance > deep && (b - a).cross(&(c - a)).y > 0.0
 }
 
-/// What to say of points that have another radius (m) than grains.
+/// The warning about points with another radius (m) than the grains.
 fn other_size(path: &Path, own: &[f32], radius: f64) -> Option<String> {
     let differs = |own: &&f32| (f64::from(**own) - radius).abs() > OTHER_SIZE * radius;
     own.iter().find(differs).map(|own| {

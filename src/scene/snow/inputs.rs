@@ -25,31 +25,31 @@ use crate::vdb::{FloatGrid, GridClass, VectorGrid, distances, file};
 /// Half width of the snow's narrow band (cells).
 const HALF_WIDTH: f32 = 3.0;
 
-/// What a scene's files hold.
+/// Contents of a scene's files.
 pub struct Inputs {
-    /// The layer that they make.
+    /// The layer's description.
     pub(super) snow: Snow,
     source: Source,
     statics: Vec<TriMesh>,
     /// The objects that move through the snow.
     pub bodies: Vec<Body>,
-    /// Grains that are there from the start.
+    /// Initial grains.
     pub(super) drift: Option<Drift>,
-    /// Wind that differs from place to place.
+    /// Wind that varies in space.
     pub(super) wind: Option<VectorGrid>,
-    /// What the files held when they were read.
+    /// Contents of the files when they were read.
     pub(in crate::scene) seen: Arc<Seen>,
-    /// What about the files should be told, a sentence each; the log has it too.
+    /// Warnings about the files, one sentence each; they are logged too.
     pub warnings: Vec<String>,
 }
 
-/// What the first layer is made from.
+/// Source of the first layer.
 enum Source {
     Made {
         ground: initial::Ground,
         cover: Cover,
     },
-    /// It is a file's, as it is; only grains lie on the ground.
+    /// A level set from a file; only grains lie on the ground.
     Given {
         grid: FloatGrid,
         ground: Option<Under>,
@@ -63,10 +63,10 @@ enum Under {
 }
 
 impl Inputs {
-    /// Reads every input; of sequences the first frame, after checking that none is missing.
+    /// Reads every input; for sequences the first frame, after checking that none is missing.
     ///
     /// # Errors
-    /// What the files or keys have wrong, with file and key.
+    /// Errors in files or keys, with file and key.
     pub fn load(scene: &Scene) -> Result<Self> {
         let seen = Arc::new(Seen::default());
         let snow = scene.snow()?.clone();
@@ -127,7 +127,7 @@ impl Inputs {
         let wind = match mist::wind_file(scene) {
             None => None,
             Some(path) => {
-                // OpenVDB reads the file itself: it must be the same before and after.
+                // OpenVDB reads the file itself: its content must be the same before and after.
                 seen.hash(path)?;
                 let wind = mist::wind(path)?;
                 seen.note(path, hash::of_file(path)?)?;
@@ -138,7 +138,7 @@ impl Inputs {
         Ok(Self { snow, source, statics, bodies, drift, wind, seen, warnings })
     }
 
-    /// Least and greatest x and z of the snow (m), as far as they are known before it is made.
+    /// Minimum and maximum x and z of the snow (m), if known before it is made.
     pub fn area(&self) -> Option<[f64; 4]> {
         match &self.source {
             Source::Made { ground: initial::Ground::Plane { area, .. }, .. } => Some(*area),
@@ -150,7 +150,7 @@ impl Inputs {
         }
     }
 
-    /// Height of the snow's highest point (m), as far as it is known before it is made; static objects left out.
+    /// Maximum height of the snow (m), if known before it is made; without static objects.
     pub fn top(&self) -> Option<f64> {
         let highest = |mesh: &TriMesh| mesh.bounds().map(|(_, high)| f64::from(high.y));
         match (&self.source, &self.snow.layer) {
@@ -167,8 +167,7 @@ impl Inputs {
         }
     }
 
-    /// Least and greatest corner of what the snow's ground, top and static objects span (m); of a given layer, of its
-    /// active voxels.
+    /// Minimum and maximum corner of the snow's ground, top and static objects (m); for a given layer, of its active voxels.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let of_mesh =
             |mesh: &TriMesh| mesh.bounds().map(|(low, high)| (low.cast::<f64>(), high.cast::<f64>()));
@@ -196,7 +195,7 @@ impl Inputs {
         Some((low, high))
     }
 
-    /// What is wrong with a static object that lies too far from the snow's ground.
+    /// The error for a static object too far from the snow's ground.
     pub(super) fn far_static(&self, scene: &Scene) -> Option<String> {
         let Source::Made { ground, .. } = &self.source else { return None };
         let middle = match ground {
@@ -212,14 +211,14 @@ impl Inputs {
         statics.zip(&self.statics).find_map(|((index, object), mesh)| {
             let (low, high) = mesh.bounds()?;
             let far = (low.cast::<f64>() - middle).abs().sup(&(high.cast::<f64>() - middle).abs()).max();
-            // The layer's own lattice begins at the mean of the ground's vertices, which may lie off its middle.
+            // The origin of the layer's lattice is the mean of the ground's vertices, which may differ from its centre.
             let what = format!("object {} ({}), static, reaches", index + 1, schema::name(&object.file));
             let is_far = far > 0.9 * REACH * self.snow.cell;
             is_far.then(|| sweep::too_far(&what, far, "the middle of the ground", self.snow.cell))
         })
     }
 
-    /// What the snow lies on and how much of it there is, where it is not given as a level set.
+    /// The ground and the amount of snow, unless the snow is given as a level set.
     pub(super) fn made(&self) -> Option<(&initial::Ground, &Cover)> {
         match &self.source {
             Source::Made { ground, cover } => Some((ground, cover)),
@@ -236,17 +235,17 @@ impl Inputs {
         }
     }
 
-    /// The ground, where it is a mesh.
+    /// The ground, if it is a mesh.
     pub(super) fn ground(&self) -> Option<&TriMesh> {
         self.source.ground()
     }
 
-    /// What the snow lies on: static objects.
+    /// Static objects, which the snow lies on.
     pub(super) fn statics(&self) -> &[TriMesh] {
         &self.statics
     }
 
-    /// The snow where it is given as a level set.
+    /// The snow, if it is given as a level set.
     pub(super) fn given(&self) -> Option<&FloatGrid> {
         match &self.source {
             Source::Given { grid, .. } => Some(grid),
@@ -286,7 +285,7 @@ fn object_name(index: usize, object: &Object) -> String {
     format!("object {} ({})", index + 1, schema::name(&object.file))
 }
 
-/// A mesh with its closed parts outward; what of that is not decided joins the warnings.
+/// A mesh with its closed parts outward; adds warnings about what remains ambiguous.
 fn oriented(mesh: TriMesh, name: &str, warnings: &mut Vec<String>) -> TriMesh {
     let orientation = Orientation::of_mesh(&mesh, Closing::Caps);
     warnings.extend(orientation.warning().map(|what| format!("{name}: {what}")));
@@ -295,7 +294,7 @@ fn oriented(mesh: TriMesh, name: &str, warnings: &mut Vec<String>) -> TriMesh {
 
 fn read_mesh(path: &Path, snow: &Snow, seen: &Seen, warnings: &mut Vec<String>) -> Result<TriMesh> {
     let mesh = mesh::parse_polygons_from(path, &seen.read(path)?, snow.origin)?;
-    // Vertices that no face names are not part of the snow.
+    // Unused vertices are not part of the snow.
     Ok(oriented(mesh.into_triangles().without_unused(), &path.display().to_string(), warnings))
 }
 
@@ -309,7 +308,7 @@ fn ground(snow: &Snow, seen: &Seen, warnings: &mut Vec<String>) -> Result<initia
     }
 }
 
-/// The ground beside a layer that is given.
+/// The ground beside a given layer.
 fn under(snow: &Snow, seen: &Seen, warnings: &mut Vec<String>) -> Result<Option<Under>> {
     Ok(match &snow.ground {
         None => None,
@@ -318,7 +317,7 @@ fn under(snow: &Snow, seen: &Seen, warnings: &mut Vec<String>) -> Result<Option<
     })
 }
 
-/// What to say of a ground's or top's mesh that lies far from the origin.
+/// Warnings about a mesh of ground or top that lies far from the origin.
 fn far_meshes(snow: &Snow, source: &Source) -> Vec<String> {
     let told = |path: &Path, mesh: &TriMesh| {
         far_mesh(&path.display().to_string(), mesh.farthest(), 1.0, snow.cell, FOR_SNOW)
@@ -335,7 +334,7 @@ fn far_meshes(snow: &Snow, source: &Source) -> Vec<String> {
     out
 }
 
-/// What to say of corners of a ground's or top's mesh that rounding does not decide.
+/// Warnings about corners of a mesh of ground or top that rounding does not decide.
 fn unclear_corners(snow: &Snow, source: &Source) -> Vec<String> {
     let told = |path: &Path, mesh: &TriMesh| {
         let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
@@ -354,7 +353,7 @@ fn unclear_corners(snow: &Snow, source: &Source) -> Vec<String> {
 }
 
 fn layer_grid(path: &Path, cell: f64, seen: &Seen) -> Result<FloatGrid> {
-    // OpenVDB reads the file itself: it must be the same before and after.
+    // OpenVDB reads the file itself: its content must be the same before and after.
     seen.hash(path)?;
     let grid = file::read_named(path, None)?;
     seen.note(path, hash::of_file(path)?)?;
@@ -374,7 +373,7 @@ fn layer_grid(path: &Path, cell: f64, seen: &Seen) -> Result<FloatGrid> {
     Ok(grid)
 }
 
-/// An object's motion: its file, its own frames, scale and axis, and the keys over them.
+/// An object's motion: its file, its own frames, scale and axis, with the keys on top.
 fn motion(
     scene: &Scene,
     object: &Object,
@@ -405,7 +404,7 @@ fn motion(
     };
     let mut pose = Vec::new();
     own.pose(f64::from(scene.shot.frames.first) / fps, &mut pose)?;
-    // Meshes are read less the origin.
+    // Meshes are read minus the origin.
     let space = if is_gltf(&object.file) { object.space } else { object.space.without_origin() };
     pose.iter_mut().for_each(|position| *position -= space.origin);
     let name = object.file.display().to_string();
@@ -436,11 +435,11 @@ fn character(scene: &Scene, object: &Object, seen: &Seen) -> Result<Character> {
     Ok(character)
 }
 
-/// A motion's mesh at a time (s), with vertices that are one corner at one position, and what to say about those that may not be.
+/// A motion's mesh at a time (s), with vertices that are one corner at one position, and a warning about ambiguous ones.
 fn posed(motion: &dyn Motion, time: f64) -> Result<(TriMesh, Option<String>)> {
     let mut pose = Vec::new();
     motion.pose_as_read(time, &mut pose)?;
-    // Once it is turned, nothing says what rounding its coordinates have.
+    // After transforms the rounding of its coordinates is no longer known.
     let weld = Weld::of(&pose, motion.triangles());
     motion.pose(time, &mut pose)?;
     weld.unify(&mut pose);

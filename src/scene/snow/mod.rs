@@ -1,5 +1,6 @@
-//! Snow in scenes: its keys, and with OpenVDB what its files hold ([`Inputs`]), what a check says of it ([`check`]), what memory
-//! it takes, and its stages: the base layer (`stages/base.rs`), grains (`stages/grains.rs`), mist (`stages/mist.rs`) and volumes to render (`stages/volumes.rs`).
+//! Snow in scenes: its keys, and with OpenVDB the contents of its files ([`Inputs`]), the check ([`check`]), memory estimates, and its
+//! stages: the base layer (`stages/base.rs`), grains (`stages/grains.rs`), mist (`stages/mist.rs`) and volumes for rendering
+//! (`stages/volumes.rs`).
 
 #[cfg(feature = "vdb")]
 pub mod check;

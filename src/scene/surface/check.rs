@@ -1,4 +1,4 @@
-//! Looks at every input of every frame of a scene with `[surface]`, and computes nothing else.
+//! Checks every input of every frame of a scene with `[surface]`, without simulating.
 
 use std::collections::BTreeMap;
 
@@ -15,22 +15,22 @@ use crate::geometry::DVec3;
 use crate::scene::{Scene, Value};
 use crate::surface::{Particles, disagreement};
 
-/// What a scene will do.
+/// Summary of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// First and last frame.
     pub frames: [i32; 2],
-    /// Frames a second.
+    /// Frames per second.
     pub fps: f64,
-    /// Count of files of particles.
+    /// Number of particle files.
     pub files: usize,
-    /// Least and greatest count of particles in a file; there may be none.
+    /// Minimum and maximum count of particles in a file; may be 0.
     pub particles: [usize; 2],
-    /// Whether they have ids, and velocities, in all files.
+    /// Whether all files have ids, and velocities.
     pub has_ids: bool,
     /// See `has_ids`.
     pub has_velocities: bool,
-    /// Least and greatest position of a particle over the shot (m).
+    /// Minimum and maximum position of a particle over the shot (m).
     pub particles_bounds_m: [[f64; 3]; 2],
     /// Initial distance between particles (m).
     pub spacing_m: f64,
@@ -40,22 +40,22 @@ pub struct Report {
     pub triangles: usize,
     /// Width, height and depth of the mesh at the first frame (m).
     pub size_m: [f64; 3],
-    /// Length of its edges in the mean (m).
+    /// Mean length of its edges (m).
     pub edge_m: f64,
-    /// Memory that the run needs, about (bytes); where vertices keep more than half a spacing from the surface, it may be more.
+    /// Estimated memory of the run (bytes); it may be more if vertices keep more than half a spacing from the surface.
     pub memory_bytes: u64,
-    /// Space that the files need, about (bytes).
+    /// Estimated size of the files (bytes).
     pub disk_bytes: u64,
-    /// Space that the files of a frame need, about (bytes): the mesh, its exact state, report and record.
+    /// Estimated size of the files of a frame (bytes): the mesh, its exact state, report and record.
     pub frame_bytes: u64,
-    /// What looks wrong, one sentence each.
+    /// Probable mistakes, one sentence each.
     pub warnings: Vec<String>,
     /// Every setting, defaults filled in.
     pub settings: BTreeMap<String, Value>,
 }
 
 impl Report {
-    /// Fails where the run would need more memory than a limit (bytes).
+    /// Fails if the run would need more memory than a limit (bytes).
     ///
     /// # Errors
     /// [`Error::Memory`] names the counts of particles and triangles.
@@ -68,7 +68,7 @@ impl Report {
     }
 }
 
-/// Edges longer than this (spacings) are too coarse for what the particles do.
+/// Edges longer than this (spacings) are too coarse for the motion of the particles.
 const LONG_EDGE: f64 = 2.0;
 
 /// Checks a scene whose inputs are open.
@@ -152,7 +152,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     })
 }
 
-/// Share of positions outside of a box by more than two spacings, where it is a tenth or more.
+/// Share of positions more than two spacings outside a box, if it is at least a tenth.
 fn outside(positions: &[DVec3], low: DVec3, high: DVec3, spacing: f64) -> Option<f64> {
     let margin = DVec3::repeat(2.0 * spacing);
     let is_outside = |position: &&DVec3| {

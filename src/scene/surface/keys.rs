@@ -1,4 +1,4 @@
-//! The keys of `[surface]`, and those of `[output]` in scenes that have it.
+//! The keys of `[surface]`, and those of `[output]` in such scenes.
 
 use crate::io::mesh::EXTENSIONS;
 use crate::scene::schema::key::{Key, Kind, Scope};
@@ -9,7 +9,7 @@ const FIRST: Scopes = &[("surface", Scope::First)];
 const STEP: Scopes = &[("surface", Scope::Step)];
 const OUTPUT: Scopes = &[("surface", Scope::Output)];
 
-/// Last extensions of files of particles: "gz" is that of .bgeo.gz.
+/// Last extensions of particle files: "gz" is that of .bgeo.gz.
 const PARTICLES: &[&str] = &["bgeo", "bhclassic", "gz", "ply", "vdb", "vtk", "vtu", "xyz"];
 
 /// All of them.

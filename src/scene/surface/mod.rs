@@ -1,5 +1,5 @@
-//! Meshes that follow a liquid in scenes: the keys of `[surface]`, what the files hold ([`Inputs`]), what a check says of it
-//! ([`check`]), memory and disk space that it takes among it, and the stage `surface` (`track.rs`).
+//! Meshes that follow a liquid in scenes: the keys of `[surface]`, the contents of its files ([`Inputs`]), the check ([`check`]), estimates
+//! of memory and disk space, and the stage `surface` (`track.rs`).
 
 #[cfg(feature = "vdb")]
 mod check;
@@ -28,46 +28,46 @@ use crate::io::files::sequence::Pattern;
 use crate::motion::{Space, Up};
 use crate::surface::Weighting;
 
-/// A mesh that follows the particles of a liquid, and what is written of it.
+/// A mesh that follows the particles of a liquid, and its output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
-    /// A file of particles, or the pattern of a sequence.
+    /// A particle file, or the pattern of a sequence.
     pub particles: PathBuf,
-    /// The mesh at the first frame; none: the particles' own surface there.
+    /// The mesh at the first frame; `None`: the particles' own surface there.
     pub mesh: Option<PathBuf>,
-    /// The pattern of edited meshes, which need not be there for each frame; none: there are none.
+    /// The pattern of edited meshes, which need not exist for every frame; `None`: there are none.
     pub resculpt: Option<PathBuf>,
     /// The files' unit and upward axis.
     pub space: Space,
     /// The sequence starts this many frames later.
     pub offset: f64,
-    /// Frames of the sequence that pass in one of the shot.
+    /// Frames of the sequence per frame of the shot.
     pub speed: f64,
-    /// Initial distance between particles (m); none: it is estimated.
+    /// Initial distance between particles (m); `None`: estimated.
     pub spacing: Option<f64>,
     /// Edge of a cell (spacings).
     pub cell: f64,
-    /// Greatest distance that projection moves a vertex (spacings).
+    /// Maximum distance that projection moves a vertex (spacings).
     pub change: f64,
-    /// The mesh is rebuilt where the liquid merges or splits; else it is flagged there.
+    /// Whether the mesh is rebuilt where the liquid merges or splits; else it is flagged there.
     pub rebuild: bool,
-    /// Where it is rebuilt, its topology is matched all over it in every step; else where vertices are flagged.
+    /// If it is rebuilt: whether its topology is matched everywhere in every step; else where vertices are flagged.
     pub every: bool,
-    /// Where it is rebuilt, least count of particles in a part of it.
+    /// If it is rebuilt: minimum count of particles in a part of it.
     pub min_drop: usize,
-    /// Where it is rebuilt, frames before a change from which on it eases towards it (0..=100).
+    /// If it is rebuilt: number of frames before a change over which it eases towards it (0..=100).
     pub ahead: i32,
     /// How particles carry vertices.
     pub weighting: Weighting,
-    /// Time in which half of the detail fades (s); none: it stays.
+    /// Time in which half of the detail fades (s); `None`: it stays.
     pub half_life: Option<f64>,
     /// How much detail fades where the mesh is strained.
     pub fade: f64,
-    /// What is written.
+    /// Which files are written.
     pub output: Files,
 }
 
-/// What is written of the mesh.
+/// Which files and arrays of the mesh are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Files {
     /// `surface/surface.%04d.ply`.
@@ -82,12 +82,12 @@ pub struct Files {
     pub delta: bool,
     /// Whether a vertex is flagged.
     pub flagged: bool,
-    /// Whether a face was made, and its texture torn.
+    /// Whether a face was created, and whether its texture is torn.
     pub rebuilt: bool,
 }
 
 impl Surface {
-    /// That of a scene; none where it has no such table.
+    /// The mesh of a scene; `None` if it has no such table.
     pub(super) fn of(values: &Values) -> Option<Self> {
         let value = |name: &str| values.get(&format!("surface.{name}"));
         let number = |name: &str| value(name).and_then(Value::number);
@@ -133,7 +133,7 @@ impl Surface {
     pub(super) fn time(&self, shot: Frames, frame: i32) -> f64 {
         let passed = f64::from(frame) - f64::from(shot.first);
         let time = f64::from(shot.first) - self.offset + self.speed * passed;
-        // What rounding leaves would read one file more.
+        // A rounding error would read one more file.
         let whole = time.round();
         if (time - whole).abs() < 1e-6 { whole } else { time }
     }
@@ -144,7 +144,7 @@ impl Surface {
         self.files(time, time)
     }
 
-    /// The files from a time to another, in frames of the sequence.
+    /// The files between two times, in frames of the sequence.
     pub(super) fn files(&self, from: f64, to: f64) -> Vec<PathBuf> {
         match Pattern::parse(&self.particles) {
             None => vec![self.particles.clone()],

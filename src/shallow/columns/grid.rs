@@ -2,11 +2,11 @@
 
 use crate::error::{Error, Result};
 
-/// The highest integer height; heights lie from 0 to this, so that sums of two of them fit 32 bits.
+/// The maximum integer height; heights lie from 0 to this, so that sums of two of them fit 32 bits.
 pub const TOP: i32 = 1 << 30;
-/// The bottom of a solid that reaches down for ever.
+/// The bottom of a solid that has no lower end.
 pub const BOTTOMLESS: i32 = i32::MIN;
-/// Most cells along an axis.
+/// Maximum number of cells along an axis.
 pub const MOST_CELLS: usize = 1 << 16;
 
 /// Square cells on the ground: x to the east, z to the south.
@@ -14,7 +14,7 @@ pub const MOST_CELLS: usize = 1 << 16;
 pub struct Grid {
     /// Edge of a cell (m), 1e-9 to 1e9.
     pub cell: f64,
-    /// The corner of cell (0, 0) with the least x and z (m).
+    /// The corner of cell (0, 0) with the minimum x and z (m).
     pub origin: [f64; 2],
     /// Count of cells along x and along z.
     pub size: [usize; 2],
@@ -28,7 +28,7 @@ impl Grid {
     pub fn validate(&self) -> Result<()> {
         let [nx, nz] = self.size;
         let [x, z] = self.origin;
-        // Beyond, single precision would not hold what flows.
+        // Beyond these, single precision would not hold the fluxes.
         if !(1e-9..=1e9).contains(&self.cell) {
             return Err(Error::argument(format!("a cell of {} m is not within 1e-9 to 1e9 m", self.cell)));
         }
@@ -48,7 +48,7 @@ impl Grid {
         self.size[0] * self.size[1]
     }
 
-    /// Index of a cell: rows along x, from the least z.
+    /// Index of a cell: rows along x, from the minimum z.
     pub fn index(&self, [x, z]: [usize; 2]) -> usize {
         z * self.size[0] + x
     }
@@ -63,7 +63,7 @@ impl Grid {
         [self.origin[0] + (x as f64 + 0.5) * self.cell, self.origin[1] + (z as f64 + 0.5) * self.cell]
     }
 
-    /// The cell at a position (m), if it is within.
+    /// The cell at a position (m), if it is inside the grid.
     pub fn cell_at(&self, [x, z]: [f64; 2]) -> Option<[usize; 2]> {
         let at = [(x - self.origin[0]) / self.cell, (z - self.origin[1]) / self.cell].map(f64::floor);
         let within =
@@ -94,7 +94,7 @@ impl Heights {
         Ok(Self { low, unit })
     }
 
-    /// The nearest integer height; those outside of the range become its ends.
+    /// The nearest integer height, clamped to the range.
     pub fn round(&self, height: f64) -> i32 {
         ((height - self.low) / self.unit).round().clamp(0.0, f64::from(TOP)) as i32
     }

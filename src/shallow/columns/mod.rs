@@ -1,7 +1,7 @@
 //! Columns: the room for liquid above each solid of a cell, stored in strips (thesis 4.1.1, Fig. 4.2).
 //!
-//! A strip is 16 cells along x of one layer; a column's layer is its position from the bottom of its cell. Strips exist only where they have
-//! a column, and are sorted by row, then layer, then x, so that a run of them is one array, and whatever a row needs lies together.
+//! A strip is 16 cells along x on one layer; a column's layer is its position from the bottom of its cell. Strips exist only where they
+//! have a column, and are sorted by row, then layer, then x: a run of them is one array, and everything that a row needs is contiguous.
 
 pub mod grid;
 pub(in crate::shallow) mod per_column;
@@ -29,7 +29,7 @@ pub struct Strip {
     pub at: u32,
 }
 
-/// The columns of a terrain, by index: strip x 16 + position in the strip. Indices without a column have a ceiling on their base, which is 0.
+/// The columns of a terrain, by index: strip x 16 + position in the strip. An index without a column has its base and ceiling at 0.
 #[derive(Debug, PartialEq)]
 pub struct Columns {
     /// Cells.
@@ -39,12 +39,12 @@ pub struct Columns {
     strips: Vec<Strip>,
     /// First strip of each row, and the end of the last.
     rows: Vec<u32>,
-    /// The strips of the same layer and x in the rows before and behind, or [`NONE`].
+    /// The strips at the same layer and x in the previous and next rows, or [`NONE`].
     north: Vec<u32>,
     south: Vec<u32>,
-    /// Bit of each position that has a column.
+    /// For each strip, a bit for each position that has a column.
     present: Vec<u16>,
-    /// b (units): where the liquid stands.
+    /// b (units): the ground below the liquid.
     base: PerColumn<i32>,
     /// max (units): the underside of the next solid, or [`TOP`].
     ceiling: PerColumn<i32>,
@@ -52,7 +52,7 @@ pub struct Columns {
     under: PerColumn<i32>,
 }
 
-/// A strip that is set anew.
+/// A strip that is being rewritten.
 pub(super) struct StripMut<'a> {
     /// b.
     pub base: &'a mut [i32; STRIP],
@@ -87,7 +87,7 @@ impl Clone for Columns {
 }
 
 impl Columns {
-    /// The columns above the solids of each cell. A cell without a solid has none: what gets there falls out of the domain.
+    /// The columns above the solids of each cell. A cell without a solid has none: liquid that gets there falls out of the domain.
     pub fn new(solids: &Solids) -> Self {
         let mut columns = Self {
             grid: solids.grid,
@@ -107,7 +107,7 @@ impl Columns {
         }
         for numbers in [&mut columns.base, &mut columns.ceiling, &mut columns.under] {
             numbers.resize(columns.strips.len() * STRIP + STRIP, 0);
-            // Without the room that it grew by.
+            // Without excess capacity.
             *numbers = numbers.clone();
         }
         let count = columns.strips.len();
@@ -146,7 +146,7 @@ impl Columns {
         self.rows.push(self.strips.len() as u32);
     }
 
-    /// Finds the strips beside each other in some rows, and in these and the rows around them.
+    /// Finds the neighbouring strips, both within the rows given and between these and the rows around them.
     pub(super) fn connect(&mut self, rows: Range<usize>) {
         self.north[self.rows[rows.start] as usize..self.rows[rows.end] as usize].fill(NONE);
         self.south[self.rows[rows.start] as usize..self.rows[rows.end] as usize].fill(NONE);
@@ -171,7 +171,7 @@ impl Columns {
         }
     }
 
-    /// Gives rows other counts of strips: those of the rows behind move. Each strip of the rows is then placed and set, and
+    /// Changes the counts of strips of some rows; the strips of later rows move. Each strip of the changed rows is then placed and set, and
     /// the rows are connected.
     pub(super) fn resize_rows(&mut self, rows: Range<usize>, counts: impl Iterator<Item = u32>) {
         let old = self.rows[rows.start] as usize..self.rows[rows.end] as usize;
@@ -204,7 +204,7 @@ impl Columns {
         self.strips[strip] = position;
     }
 
-    /// Sets which positions of a strip have a column; the caller writes its numbers, which are 0 for the others.
+    /// Sets which positions of a strip have a column; the caller writes its numbers, which are 0 elsewhere.
     pub(super) fn set_strip(&mut self, strip: usize, present: u16) -> StripMut<'_> {
         self.present[strip] = present;
         StripMut {
@@ -248,28 +248,28 @@ impl Columns {
         self.rows[row] as usize..self.rows[row + 1] as usize
     }
 
-    /// The strip at the same position of the row before, or [`NONE`].
+    /// The strip at the same position of the previous row, or [`NONE`].
     pub fn north(&self, strip: usize) -> u32 {
         self.north[strip]
     }
 
-    /// The strip at the same position of the row behind, or [`NONE`].
+    /// The strip at the same position of the next row, or [`NONE`].
     pub fn south(&self, strip: usize) -> u32 {
         self.south[strip]
     }
 
-    /// The strip behind along x, if it is there: it has the next index.
+    /// The next strip along x, if it exists: it has the next index.
     pub fn east(&self, strip: usize) -> Option<usize> {
         let (own, next) = (self.strips[strip], self.strips.get(strip + 1)?);
         (*next == Strip { at: own.at + 1, ..own }).then_some(strip + 1)
     }
 
-    /// The strip before along x, if it is there: it has the index before.
+    /// The previous strip along x, if it exists: it has the index before.
     pub fn west(&self, strip: usize) -> Option<usize> {
         strip.checked_sub(1).filter(|&before| self.east(before) == Some(strip))
     }
 
-    /// Bit of each position of a strip that has a column.
+    /// A bit for each position of a strip that has a column.
     pub fn present(&self, strip: usize) -> u16 {
         self.present[strip]
     }
@@ -303,7 +303,7 @@ impl Columns {
         }
         let wanted = Strip { row: z as u32, layer: layer as u32, at: (x / STRIP) as u32 };
         let row = self.row(z);
-        // Where all of the layers below are there along the whole row, and the layer itself up to here.
+        // Right if all lower layers exist along the whole row, and the layer itself up to here.
         let guess = row.start + layer * nx.div_ceil(STRIP) + x / STRIP;
         let strip = match self.strips[row.clone()].last() {
             Some(last) if wanted <= *last => match self.strips.get(guess) {
@@ -320,7 +320,7 @@ impl Columns {
         (0..).map_while(move |layer| self.column(cell, layer))
     }
 
-    /// b of every index (units), and 16 more numbers: whoever reads an index may read its next one.
+    /// b of every index (units), padded by 16 more numbers, so that SIMD loads may read past the last index.
     pub fn bases(&self) -> &[i32] {
         &self.base
     }
@@ -340,7 +340,7 @@ impl Columns {
         self.base[i].max(self.base[j]) < self.ceiling[i].min(self.ceiling[j])
     }
 
-    /// Whether the solid below a column reaches down for ever.
+    /// Whether the solid below a column has no lower end.
     pub fn is_bottomless(&self, index: usize) -> bool {
         self.under[index] == BOTTOMLESS
     }
@@ -364,7 +364,7 @@ pub(super) fn strip_mut<T>(numbers: &mut [T], strip: usize) -> &mut [T; STRIP] {
     &mut numbers.as_chunks_mut().0[strip]
 }
 
-/// Gives a part of a list another length; what it then holds is left over from before.
+/// Changes the length of a part of a list; the part then holds leftover values.
 pub(super) fn resize_part<T: Copy>(list: &mut Vec<T>, part: Range<usize>, len: usize, fill: T) {
     let (count, end) = (list.len(), part.start + len);
     if end > part.end {

@@ -1,16 +1,17 @@
-//! Numbers by column index, placed in memory so that those of one column do not get into each other's way.
+//! Numbers by column index, with arrays offset in memory so that those of one column do not collide in the cache.
 //!
-//! A step reads and writes a dozen arrays at once. Where these begin at about the same position of a page, as large ones do that come from the system, they
-//! compete for a few sets of the first cache, and a read is taken for one of what has just been written elsewhere: a step then takes up to a quarter longer.
+//! A step reads and writes a dozen arrays at once. Large allocations from the system begin at about the same offset in a page; the arrays
+//! then compete for a few sets of the L1 cache, and a read is mistaken for one of data just written to another array: a step takes up to a
+//! quarter longer.
 
 use std::ops::{Deref, DerefMut, Range};
 
-/// Bytes after which positions in the first cache, and in the tests for reads of what has just been written, come again.
+/// Period (bytes) after which addresses share a set of the L1 cache and alias in the check of reads against recent writes.
 const PAGE: usize = 4096;
-/// Bytes of a line of the cache.
+/// Bytes of a cache line.
 const LINE: usize = 64;
 
-/// What the numbers are: each array begins at a position of a page of its own.
+/// What the numbers are: each array begins at its own offset in a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Array {
     /// b.
@@ -23,7 +24,7 @@ pub enum Array {
     /// Fluxes.
     FluxEast,
     FluxSouth,
-    /// What transfers left.
+    /// Rounding remainders of transfers.
     LeftEast,
     LeftSouth,
     /// How much less inertia counts.
@@ -37,39 +38,39 @@ pub enum Array {
 }
 
 impl Array {
-    /// Where in a page it begins (bytes).
+    /// Offset in a page at which it begins (bytes).
     const fn position(self) -> usize {
         let count = Self::Under as usize + 1;
         self as usize * (PAGE / count / LINE * LINE)
     }
 }
 
-/// One number for each column index; a slice of them.
+/// One number for each column index; dereferences to a slice.
 #[derive(Debug)]
 pub struct PerColumn<T> {
     array: Array,
-    /// Others before the first, so that this one is at its position.
+    /// Unused numbers before the first one, which give the array its offset.
     before: usize,
-    /// How many there is room for: arrays of one liquid grow in the same frame, and not again for long.
+    /// Capacity: arrays of one liquid grow in the same frame, and then not again for long.
     room: usize,
     list: Vec<T>,
 }
 
 impl<T: Copy> PerColumn<T> {
-    /// So many of the same.
+    /// `len` copies of `fill`.
     pub fn new(array: Array, len: usize, fill: T) -> Self {
         let mut new = Self { array, before: 0, room: 0, list: Vec::new() };
         new.resize(len, fill);
         new
     }
 
-    /// Changes their count.
+    /// Changes the length.
     pub fn resize(&mut self, len: usize, fill: T) {
         self.make_room(len, fill);
         self.list.resize(self.before + len, fill);
     }
 
-    /// Gives a part of them another length; what it then holds is left over from before.
+    /// Changes the length of a part; the part then holds leftover values.
     pub fn resize_part(&mut self, part: Range<usize>, len: usize, fill: T) {
         let (count, end) = (self.len(), part.start + len);
         if end > part.end {
@@ -84,12 +85,12 @@ impl<T: Copy> PerColumn<T> {
         self.list.capacity() * size_of::<T>()
     }
 
-    /// Moves them where there is room for so many, at the right place.
+    /// Reallocates if the capacity is less than `len`, with the right offset.
     fn make_room(&mut self, len: usize, fill: T) {
         if len <= self.room {
             return;
         }
-        // Twice as much as before, as a list would.
+        // At least doubled, as a list does.
         self.room = len.max(2 * self.room);
         let mut list = Vec::with_capacity(self.room + PAGE / size_of::<T>());
         let at = <*const T>::addr(list.as_ptr());

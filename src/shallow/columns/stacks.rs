@@ -1,24 +1,24 @@
-//! The strips of a row that lie above each other.
+//! The vertically stacked strips of a row.
 
 use std::ops::Range;
 
 use super::grid::BOTTOMLESS;
 use super::{Columns, NONE, STRIP, Strip, strip_of};
 
-/// The strips of a row by block: 16 cells along x, where the strips of all layers lie above each other.
+/// The strips of a row by block: 16 cells along x, with the strips of all layers above each other.
 #[derive(Debug, Clone, Default)]
 pub(in crate::shallow) struct Stacks {
-    /// Most layers of a block.
+    /// Maximum number of layers in a block.
     layers: usize,
     /// Layers of each block.
     counts: Vec<u32>,
     /// Strips, by block x layers + layer.
     strips: Vec<u32>,
-    /// Of each of these strips the lowest base and the highest ceiling.
+    /// For each of these strips, the lowest base and the highest ceiling.
     extents: Vec<[i32; 2]>,
-    /// Whether all cells of the row have ground that reaches down for ever.
+    /// Whether all cells of the row have ground without a lower end.
     pub is_grounded: bool,
-    /// If not: for each cell the height below which it is void: `i32::MIN` where there is none, `i32::MAX` where all is.
+    /// If not, for each cell the height below which it is void: `i32::MIN` if none is, `i32::MAX` if all is.
     pub sills: Vec<i32>,
 }
 
@@ -37,7 +37,7 @@ impl Stacks {
         }
     }
 
-    /// The stacks of a row of columns, and where it has no ground.
+    /// Finds the stacks of a row of columns, and where it has no ground.
     pub fn find_row(&mut self, columns: &Columns, row: usize) {
         let nx = columns.grid.size[0];
         self.find(columns.strips(), columns.row(row), nx.div_ceil(STRIP));

@@ -1,4 +1,4 @@
-//! Packets from the lip to the ground, step by step: all that is in the air.
+//! Packets from the overflow edge to the ground, step by step: all liquid in the air.
 
 use std::ops::Range;
 
@@ -17,55 +17,55 @@ use crate::shallow::solver::Flow;
 use crate::shallow::solver::overflow_edges::Over;
 use crate::shallow::system::Shallow;
 
-/// Bytes of a lip in a saved state.
+/// Bytes of an overflow edge in a saved state.
 pub(in crate::shallow) const LIP: usize = 40;
-/// What is less than a drop waits for so many intervals.
+/// Intervals after which liquid of less than a drop is released anyway.
 const PATIENCE: u32 = 60;
-/// Room for what lands: so many columns for each packet.
+/// Capacity for landings: columns for each packet.
 const SPLASHES: usize = 4;
-/// A lip drips if a drop takes longer than so many intervals; else it pours, in a packet each interval.
+/// An overflow edge drips if a drop takes longer than this many intervals; otherwise it pours, in a packet each interval.
 const DRIPS: i64 = 8;
-/// Depth at the brink of a free overfall, of the critical depth (Rouse 1936).
+/// Depth at the brink of a free overfall, relative to the critical depth (Rouse 1936).
 const BRINK: f64 = 0.715;
 
-/// What went over a link and is no packet yet.
+/// Liquid that went over a link and is not a packet yet.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::shallow) struct Waiting {
-    /// How much it is (units), 0 and up, and what it carries of each scalar, which saved states have apart.
+    /// Volume (units), 0 and up, and amount of each scalar; saved states store the amounts separately.
     pub units: i64,
     pub amounts: [i64; MOST],
-    /// Its speed outward (cells/s), times units.
+    /// Outward speed (cells/s), times units.
     pub impulse: f64,
-    /// Which way it fell last: from the link's second column.
+    /// Direction of the last fall: from the link's second column.
     pub is_back: bool,
-    /// Intervals that it waits for.
+    /// Intervals that it has waited.
     pub waits: u32,
-    /// What came in an interval of late (units), and how much was there when the last one ended.
+    /// Smoothed inflow of an interval (units), and the volume at the end of the last interval.
     pub steady: i64,
     pub before: i64,
-    /// How far its packets are ahead of the others', in 2^31ths of an interval: it follows from what came while the flow grew.
+    /// Lead of its packets within the interval, in 2^-31 of it: scattered by the inflow at the time the flow grew.
     pub phase: u32,
-    /// Impulse that others have given; 0 between intervals.
+    /// Impulse received from other overflow edges; 0 between intervals.
     pub gathered: i64,
 }
 
-/// All that is in the air.
+/// All liquid in the air.
 #[derive(Debug, Clone, Default)]
 pub(in crate::shallow) struct Falling {
-    /// In the order in which they were made.
+    /// In the order of their creation.
     packets: Vec<Packet>,
-    /// By link; none without falls.
+    /// By link; empty without falls.
     pub(super) waiting: Vec<Waiting>,
-    /// What lands in a step; kept, so that nothing is allocated again.
+    /// Landings of a step; kept to avoid repeated allocation.
     landed: Vec<Landing>,
     pub(super) threads: Threads,
-    /// Seconds since packets were made last, and how often they were.
+    /// Seconds since packets were last created, and how many times they were.
     pub since: f64,
     pub tick: u64,
 }
 
 impl Falling {
-    /// Nothing in the air yet, and room for what may be.
+    /// Nothing in the air, with capacity for what may come.
     pub fn new(falls: Option<&Falls>, links: usize) -> Self {
         let Some(falls) = falls else { return Self::default() };
         Self {
@@ -89,12 +89,12 @@ impl Falling {
         &self.packets
     }
 
-    /// What waits at each link.
+    /// The liquid that waits at each link.
     pub fn waiting(&self) -> &[Waiting] {
         &self.waiting
     }
 
-    /// Puts back what [`Falling::packets`] and [`Falling::waiting`] were, as many as there are links.
+    /// Restores what [`Falling::packets`] and [`Falling::waiting`] returned; the links must be as many.
     pub fn set(&mut self, packets: impl Iterator<Item = Packet>, waiting: impl Iterator<Item = Waiting>) {
         self.packets.clear();
         self.packets.extend(packets);
@@ -107,24 +107,24 @@ impl Falling {
         packets + self.waiting.iter().map(|waiting| waiting.units).sum::<i64>()
     }
 
-    /// What is in the air of a scalar.
+    /// Amount of a scalar in the air.
     pub fn amount(&self, scalar: usize) -> i128 {
         let packets: i128 = self.packets.iter().map(|packet| i128::from(packet.amounts[scalar])).sum();
         packets + self.waiting.iter().map(|waiting| i128::from(waiting.amounts[scalar])).sum::<i128>()
     }
 
-    /// Other scalars are carried: what is in the air has nothing of them.
+    /// Clears all amounts, because the scalars have changed.
     pub fn forget_amounts(&mut self) {
         self.loads().for_each(|(_, amounts)| *amounts = [0; MOST]);
     }
 
-    /// Units of each packet and of what waits at each link, and what they carry.
+    /// Units and amounts of each packet, and of the liquid that waits at each link.
     fn loads(&mut self) -> impl Iterator<Item = (i64, &mut [i64; MOST])> {
         let packets = self.packets.iter_mut().map(|packet| (packet.units, &mut packet.amounts));
         packets.chain(self.waiting.iter_mut().map(|waiting| (waiting.units, &mut waiting.amounts)))
     }
 
-    /// Gives some links another count, at which nothing waits.
+    /// Changes the count of a range of links; nothing waits at the new ones.
     pub fn replace(&mut self, links: Range<usize>, count: usize) {
         let new = links.start..links.start + count;
         resize_part(&mut self.waiting, links, count, Waiting::default());
@@ -133,7 +133,7 @@ impl Falling {
 }
 
 impl Waiting {
-    /// Its numbers, for a saved state.
+    /// Its serialised form, for a saved state.
     pub fn to_bytes(self) -> [u8; LIP] {
         let last = u64::from(self.waits) | u64::from(self.is_back) << 32 | u64::from(self.phase) << 33;
         let mut bytes = [0; LIP];
@@ -143,7 +143,7 @@ impl Waiting {
         bytes
     }
 
-    /// As [`Waiting::to_bytes`] has written it; it carries nothing.
+    /// Reads what [`Waiting::to_bytes`] wrote; amounts are 0.
     pub fn from_bytes(bytes: &[u8; LIP]) -> Self {
         let [units, impulse, last, steady, before] =
             std::array::from_fn(|at| u64::from_le_bytes(bytes.as_chunks().0[at]));
@@ -160,7 +160,7 @@ impl Waiting {
         }
     }
 
-    /// Whether it is such as may wait at a link.
+    /// Whether it is valid for a link.
     pub fn is_of(&self, columns: &Columns, links: &Links, link: usize) -> bool {
         let is_void = links.to[link] == NONE;
         let is_lip = !is_void
@@ -178,7 +178,7 @@ impl Waiting {
 }
 
 impl Shallow {
-    /// Finds the links that liquid falls freely from in the next step.
+    /// Finds the overflow edges of the next step.
     pub(in crate::shallow) fn find_lips(&mut self) {
         if self.params.falls.is_some() {
             let cliffs = Falls::cliffs(self.params.falls.as_ref(), &self.columns);
@@ -186,14 +186,14 @@ impl Shallow {
         }
     }
 
-    /// What falls, in a step of `dt` (s) that the flow has made.
+    /// Advances the falling liquid, in a step of `dt` (s) that the flow has made.
     pub(in crate::shallow) fn fall(&mut self, dt: f64) {
         let Some(falls) = self.params.falls else { return };
         self.obey_in_the_air();
         self.fly(dt);
         self.gather(dt);
         self.falls.since += dt;
-        // Steps that add up to an interval but for rounding make one.
+        // Tolerates rounding where steps add up to an interval.
         if self.falls.since >= falls.interval * (1.0 - 1e-9) {
             self.falls.since = 0.0;
             self.falls.tick += 1;
@@ -202,7 +202,7 @@ impl Shallow {
         }
     }
 
-    /// Scalars follow their laws in the air, too.
+    /// Applies the laws of scalars to liquid in the air.
     fn obey_in_the_air(&mut self) {
         for (scalar, act) in self.flow.amounts.acts().iter().enumerate() {
             if *act != Act::default() {
@@ -213,7 +213,7 @@ impl Shallow {
         }
     }
 
-    /// Moves all packets, and lands those that meet something. All fly over the same surfaces, so that nothing depends on their order.
+    /// Moves all packets, and lands those that hit something. All fly over the same surfaces, so that nothing depends on their order.
     fn fly(&mut self, dt: f64) {
         let mut packets = std::mem::take(&mut self.falls.packets);
         let mut landed = std::mem::take(&mut self.falls.landed);
@@ -236,8 +236,8 @@ impl Shallow {
         self.land_all(landed);
     }
 
-    /// Adds what has landed to its columns, all of a column at once, so that it does not depend on their order, and gives what finds no room there to
-    /// those around; returns what falls from there into the void.
+    /// Adds landed liquid to its columns, all of a column at once, so that the result does not depend on an order, and spreads what finds
+    /// no room there to adjacent columns; returns what falls from there into the void.
     fn land_all(&mut self, mut landed: Vec<Landing>) -> i64 {
         merge(&mut landed);
         let most = self.params.falls.map_or(0, |falls| SPLASHES * falls.most);
@@ -262,7 +262,7 @@ impl Shallow {
         }
     }
 
-    /// Adds liquid to a column; whether some finds no room there and waits.
+    /// Adds liquid to a column; returns whether some finds no room there and waits.
     fn land(&mut self, Landing { column, units, mut amounts }: Landing) -> bool {
         let (columns, flow, column) = (&self.columns, &mut self.flow, column as usize);
         let added = flow.change_depth(columns, column, units);
@@ -274,16 +274,17 @@ impl Shallow {
         added < units
     }
 
-    /// Takes what went over the lips in a step of `dt` (s).
+    /// Collects what went over the overflow edges in a step of `dt` (s).
     fn gather(&mut self, dt: f64) {
         let Self { columns, pipes, flow, falls, params, .. } = self;
         let width = columns.heights.unit * columns.grid.cell / dt;
         for over in flow.lips.over(&pipes.links, &flow.links) {
             let is_back = over.from != pipes.links.from[over.link];
             let side = outward(&pipes.links, over.link, is_back);
-            // Flux over section, in cells: the part of its column that went in a step. Thin liquid is gone before it is as fast as that.
+            // Flux over section, in cells: the part of the column's depth that left in a step. Thin liquid has run out before it is as fast
+            // as that.
             let flux = over.units as f64 / (f64::from(over.depth.max(1)) * dt);
-            // It leaves no faster than its depth at the brink allows, unless it has arrived faster; for thin liquid neither is computed.
+            // At most the speed at its depth at the brink, unless it arrived faster; for thin liquid neither is computed.
             let (most, scale) = (-params.gravity[1] * over.units as f64 * width, BRINK * columns.grid.cell);
             let scaled = flux * scale;
             let speed = if scaled * scaled * scaled <= most {
@@ -302,8 +303,8 @@ impl Shallow {
         }
     }
 
-    /// Makes packets of what waits at some links, if it is enough or `all` is wanted. Where there would be too many packets, it lands at once: all of it,
-    /// so that it does not depend on the links' order.
+    /// Turns waiting liquid at some links into packets, if it is enough or `all` is set. If there would be too many packets, all of it
+    /// lands at once, so that the result does not depend on the links' order.
     fn let_go(&mut self, falls: &Falls, links: Range<usize>, all: bool) {
         let (columns, waiting) = (&self.columns, &mut self.falls.waiting);
         let least = falls.drop / (columns.grid.cell * columns.grid.cell * columns.heights.unit);
@@ -328,7 +329,7 @@ impl Shallow {
             self.falls.waiting[link].clear();
             let end = if fits {
                 let mut packet = self.packet(link, &waiting);
-                // It has waited, and left before now: not all lips let go at the same time.
+                // It has waited, and left a little earlier: not all overflow edges release packets at the same time.
                 let ahead = if all { 0.0 } else { f64::from(waiting.phase) / f64::from(1u32 << 31) };
                 let end = self.air().fly(&mut packet, ahead * falls.interval);
                 if end == End::Flies {
@@ -387,7 +388,7 @@ impl Shallow {
         }
     }
 
-    /// Makes packets of all that waits at the links of rows, before these change.
+    /// Turns all liquid that waits at the links of rows into packets, before the rows change.
     pub(in crate::shallow) fn let_go_of(&mut self, rows: Range<usize>) {
         if let Some(falls) = self.params.falls {
             let links = &self.pipes.links;
@@ -396,8 +397,8 @@ impl Shallow {
         }
     }
 
-    /// Lands the packets that are in solid now, on the column above it, after the terrain has moved; returns what falls from
-    /// there into the void (units).
+    /// Lands the packets that the moved terrain has buried, on the column above the solid; returns what falls from there into the void
+    /// (units).
     pub(in crate::shallow) fn land_buried(&mut self) -> i64 {
         let mut packets = std::mem::take(&mut self.falls.packets);
         let mut landed = std::mem::take(&mut self.falls.landed);
@@ -413,7 +414,7 @@ impl Shallow {
 }
 
 impl Packet {
-    /// It lands on a column.
+    /// Its landing on a column.
     fn landing(&self, column: usize) -> Landing {
         Landing { column: column as u32, units: self.units, amounts: self.amounts }
     }
@@ -430,24 +431,24 @@ impl Waiting {
         all || most as f64 >= least || self.waits >= PATIENCE
     }
 
-    /// Whether liquid is there, or was of late.
+    /// Whether liquid waits there, or arrived recently.
     pub(super) fn is_awake(&self) -> bool {
         self.units > 0 || self.steady > 0
     }
 
-    /// What is there has gone.
+    /// Resets it after its liquid has left.
     pub(super) fn clear(&mut self) {
         let Self { is_back, steady, phase, .. } = *self;
         *self = Self { is_back, steady, phase, ..Self::default() };
     }
 }
 
-/// The side that liquid falls over, seen from the column that it leaves.
+/// The side that liquid falls over, seen from the donor.
 fn outward(links: &Links, link: usize, is_back: bool) -> Side {
     if is_back { links.sides[link].opposite() } else { links.sides[link] }
 }
 
-/// The speed (cells/s) of what arrives at a lip from the column behind it, which gives over regular pipes: 0 where it does not.
+/// The speed (cells/s) at which liquid arrives at an overflow edge from the column behind it, through a regular pipe; 0 if none does.
 fn arriving(columns: &Columns, flow: &Flow, over: &Over, side: Side) -> f64 {
     let from = over.from as usize;
     let Some(behind) = beside(columns, from, side.opposite()) else { return 0.0 };

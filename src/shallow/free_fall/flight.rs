@@ -1,14 +1,14 @@
-//! The flight of packets: ballistics without drag, in closed form from cell to cell, and what a packet meets.
+//! The flight of packets: ballistics without drag, in closed form from cell to cell, with collisions.
 //!
-//! Positions are those of a cell and offsets from its centre, heights those of the lattice: a scene that is turned or mirrored has the same flights, bit
-//! for bit. A packet is followed from one side of a cell to the next, and meets the surface of the column that it is over wherever it passes
-//! it: no step is so long that it goes through one.
+//! Positions are a cell and an offset from its centre, heights are in lattice units: a scene that is turned or mirrored has the same
+//! flights, bit for bit. A packet is followed from one side of a cell to the next, and hits the surface of the column below it wherever it
+//! crosses that surface: no step is so long that it passes through one.
 
 use super::packet::Packet;
 use crate::shallow::columns::Columns;
 use crate::shallow::pipes::Border;
 
-/// What packets fly through.
+/// The surroundings of packets.
 pub(super) struct Air<'a> {
     pub columns: &'a Columns,
     /// H of every column index (units).
@@ -22,18 +22,18 @@ pub(super) struct Air<'a> {
 /// How a flight ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum End {
-    /// It goes on.
+    /// It continues.
     Flies,
-    /// On a column.
+    /// It lands on a column.
     Lands(usize),
-    /// Outside of the domain.
+    /// It leaves the domain.
     Leaves,
 }
 
-/// What is at a height of a cell.
+/// What is at a height in a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Place {
-    /// The room of a column, wet or not.
+    /// The space of a column, wet or not.
     In(usize),
     /// The solid below a column.
     Solid(usize),
@@ -77,7 +77,7 @@ impl Air<'_> {
         }
     }
 
-    /// What a packet is in, if that is solid: the column above it.
+    /// The column above the solid that a packet is in; None if it is not in a solid.
     pub fn above_solid(&self, packet: &Packet) -> Option<usize> {
         match self.position(packet.cell, packet.height) {
             Place::Solid(above) => Some(above),
@@ -94,7 +94,7 @@ impl Air<'_> {
         for column in self.columns.of_cell(cell.map(|at| at as usize)) {
             if height < f64::from(self.columns.bases()[column]) {
                 let is_below = height < f64::from(self.columns.unders()[column]);
-                // Below the ceiling of the column before it was found there.
+                // It is not below the ceiling of the column before.
                 return if is_below { Place::Void } else { Place::Solid(column) };
             }
             position = Place::In(column);
@@ -111,7 +111,7 @@ impl Air<'_> {
         reach(0.5 - at, speed, pull).min(reach(0.5 + at, -speed, -pull))
     }
 
-    /// The time (s) until a packet is so much lower (units).
+    /// The time (s) until a packet is `drop` lower (units).
     fn down(&self, packet: &Packet, drop: f64) -> f64 {
         let speed = packet.down;
         2.0 * drop / (speed + (speed * speed + 2.0 * self.pull * drop).sqrt())
@@ -127,13 +127,13 @@ impl Air<'_> {
         packet.down += self.pull * time;
     }
 
-    /// Takes a packet over the sides of its cell that it has reached. Where there is a wall it stops, and falls down along it.
+    /// Takes a packet over the sides of its cell that it has reached. At a wall it stops, and falls down along it.
     fn cross(&self, packet: &mut Packet, crossed: [bool; 2]) -> Crossed {
         let size = self.columns.grid.size;
         let (mut cell, mut is_out) = (packet.cell, [false; 2]);
         let mut offset = packet.offset;
         for axis in (0..2).filter(|&axis| crossed[axis]) {
-            // The side that is nearer: it is at one of them, but for rounding.
+            // The nearer side: the packet is at one of them, up to rounding.
             let ahead = packet.offset[axis] > 0.0;
             packet.offset[axis] = if ahead { 0.5 } else { -0.5 };
             offset[axis] = -packet.offset[axis];
@@ -167,7 +167,7 @@ enum Crossed {
     Out,
 }
 
-/// The time (s) until something at rest or moving has gone a distance of 0 or more outward, with an acceleration; infinite if it never does.
+/// The time (s) in which a body with a speed and an acceleration moves a distance of 0 or more outward; infinite if it never does.
 fn reach(distance: f64, speed: f64, pull: f64) -> f64 {
     let square = speed * speed + 2.0 * pull * distance;
     if speed > 0.0 && square >= 0.0 {
@@ -187,7 +187,7 @@ mod tests {
     use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
     use crate::shallow::terrain::Solids;
 
-    /// Cells of a millimetre; so many units in a metre.
+    /// Cells of a millimetre; units in a metre.
     const CELL: f64 = 0.001;
     const METRE: f64 = (1 << 30) as f64 / 8.0;
 
@@ -202,7 +202,8 @@ mod tests {
         Columns::new(&Solids::new(Grid { cell: CELL, origin: [0.0; 2], size }, heights, cells))
     }
 
-    /// How a flight ends that begins in the middle of a cell at a height (m), with a velocity (m/s), after steps of `dt` (s); and the packet.
+    /// The end of a flight that begins in the middle of a cell at a height (m), with a velocity (m/s), in steps of `dt` (s); and the
+    /// packet.
     fn end(
         columns: &Columns,
         border: Border,
@@ -280,7 +281,7 @@ mod tests {
         assert!(over == End::Leaves && packet.age < 0.03, "over the border: {packet:?}");
         let (below, packet) = end(&void, Border::Closed, at, [1.0, 0.0, 0.0], 0.01);
         assert!(below == End::Leaves && packet.age > 0.3 && packet.cell[0] == 29, "{packet:?}");
-        // From the void below a slab it does not come up through it.
+        // From the void below a slab it does not rise through the slab.
         let back = end(&void, Border::Closed, ([12, 1], 0.55), [-1.0, 0.0, 0.0], 0.01);
         assert!(back.0 == End::Leaves && back.1.cell[0] == 11 && back.1.along[0] == 0.0, "{back:?}");
     }

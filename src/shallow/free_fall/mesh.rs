@@ -1,8 +1,9 @@
-//! A triangle mesh of the liquid in the air, written into the caller's buffers: a ball for each drop, and strands between drops that follow each
-//! other from one lip, and from the lip to the newest of them.
+//! A triangle mesh of the liquid in the air, written into the caller's buffers: a ball for each drop, and strands between consecutive drops
+//! of an overflow edge, and from the edge to the newest drop.
 //!
-//! A strand has the section that its drops' volume has over their distance. From 9.02 of its radii on, the wavelength that grows fastest in a jet of
-//! little viscosity (Rayleigh 1878), its liquid runs into its drops, and at twice that length it has broken. Drops in a strand are as thick as it.
+//! The section of a strand is the volume of its drops over their distance. From a length of 9.02 radii, the fastest-growing wavelength in a
+//! jet of low viscosity (Rayleigh 1878), its liquid drains into its drops, and at twice that length it has broken. Drops in a strand are as
+//! thick as it.
 
 use super::Droplet;
 use crate::error::{Error, Result};
@@ -10,18 +11,18 @@ use crate::shallow::surface::{Counts, Indices, Layout, Up};
 
 /// Vertices and triangles of a ball: an icosahedron whose edges are halved.
 const BALL: [usize; 2] = [42, 80];
-/// Sides of a strand, and rings of corners: at its ends and in its middle.
+/// Sides of a strand, and its rings of vertices: at the ends and in the middle.
 const SIDES: usize = 6;
 const RINGS: usize = 3;
-/// Radius of the circle around a hexagon with the area of a circle of 1: sqrt(pi / (1.5 sqrt 3)).
+/// Circumradius of a hexagon with the area of a unit circle: sqrt(pi / (1.5 sqrt 3)).
 const AROUND: f64 = 1.099_636;
-/// Length from which a strand between two drops gets thinner, in its radii; it breaks at twice that.
+/// Length, in radii, from which on a strand between two drops gets thinner; it breaks at twice that.
 const LONGEST: f64 = 9.02;
-/// How much wider it is at its lip, where it is as thick as the film.
+/// How much wider it is at its overflow edge, where it is as thick as the film.
 const FLARE: f64 = 1.6;
 
-/// Buffers of the caller. They are written from their beginning, in order, and never read, and may be longer than the mesh; those that are
-/// absent are not wanted. The balls' vertices come first, in the order of their drops.
+/// Buffers of the caller. They are written sequentially from the beginning and never read, and may be longer than the mesh; leave out those
+/// that are not needed. The balls' vertices come first, in the order of their drops.
 #[derive(Debug, Default)]
 pub struct Target<'a> {
     /// Three numbers a vertex (m x scale).
@@ -30,49 +31,49 @@ pub struct Target<'a> {
     pub normals: Option<&'a mut [f32]>,
     /// Three numbers a vertex: velocity of its drop (m/s x scale).
     pub velocities: Option<&'a mut [f32]>,
-    /// One a vertex: the index of its drop in the list of them.
+    /// One a vertex: the index of its drop in the list of drops.
     pub drops: Option<&'a mut [u32]>,
     /// Three a triangle.
     pub indices: Indices<'a>,
 }
 
-/// The largest counts that the mesh of so many drops can have.
+/// Upper bounds of the counts of a mesh of so many drops.
 pub fn bound(drops: usize) -> Counts {
     of(drops, drops)
 }
 
-/// Counts of so many drops and strands; the strands' vertices are extras.
+/// Counts for so many drops and strands; the strands' vertices are extras.
 fn of(drops: usize, strands: usize) -> Counts {
     let extras = RINGS * SIDES * strands;
     let triangles = BALL[1] * drops + 2 * (RINGS - 1) * SIDES * strands;
     Counts { vertices: BALL[0] * drops + extras, extras, indices: 3 * triangles }
 }
 
-/// A strand from a drop to the one that follows it, or to their lip.
+/// A strand from a drop to the one that follows it, or to their overflow edge.
 #[derive(Debug, Clone, Copy)]
 struct Strand {
     drop: u32,
     next: Option<u32>,
-    /// Section of its liquid, as a radius (m).
+    /// Radius (m) of its liquid's section.
     radius: f64,
-    /// How much of it has not run into its drops yet, 0 to 1.
+    /// The part that has not drained into its drops yet, 0 to 1.
     whole: f64,
 }
 
-/// Makes meshes of drops; keeps its memory from one to the next.
+/// Builds meshes of drops; its buffers are reused.
 #[derive(Debug)]
 pub struct Balls {
     /// Directions of a ball's vertices, and its triangles, counter-clockwise from outside.
     vertices: Vec<[f64; 3]>,
     triangles: Vec<[u32; 3]>,
-    /// Radius of the ball's vertices, for a volume of that of a ball of radius 1.
+    /// Radius of the ball's vertices, for which its volume is that of a ball of radius 1.
     size: f64,
-    /// Drops by lip, as they followed each other.
+    /// Drops by overflow edge, in the order in which they left it.
     order: Vec<u32>,
     strands: Vec<Strand>,
     /// Radius of each drop (m).
     radii: Vec<f64>,
-    /// Of each drop: sums of its strands' radii (m) and of how whole they are, and their count.
+    /// For each drop: the sums of its strands' radii (m) and of their `whole`, and their count.
     sums: Vec<[f64; 3]>,
 }
 
@@ -94,7 +95,7 @@ impl Default for Balls {
 }
 
 impl Balls {
-    /// Makes room for so many drops: from then on [`Balls::build`] allocates nothing for as many.
+    /// Reserves capacity for so many drops: [`Balls::build`] then allocates nothing for as many.
     pub fn reserve(&mut self, drops: usize) {
         self.order.clear();
         self.order.reserve(drops);
@@ -131,7 +132,7 @@ impl Balls {
         }
         self.radii.clear();
         self.radii.extend(drops.iter().zip(&self.sums).map(|(drop, &[radius, whole, count])| {
-            // Those that are close together are no thicker than a drop of their volume.
+            // In drops that are close together, the strand is no thicker than the drop.
             let part = if count > 0.0 { whole / count } else { 0.0 };
             let strand = if count > 0.0 { (radius / count).min(drop.radius) } else { 0.0 };
             drop.radius + part * (strand - drop.radius)
@@ -139,11 +140,11 @@ impl Balls {
         of(drops.len(), self.strands.len())
     }
 
-    /// Writes the mesh of some drops and returns its size; [`bound`] is the most that it can be.
+    /// Writes the mesh of some drops and returns its size, which [`bound`] limits.
     ///
     /// # Errors
-    /// `Argument`, and nothing is written: a layout as in [`Surface::build`](crate::shallow::surface::Surface::build); a buffer that is too short;
-    /// over 65,536 vertices for indices of 16 bits.
+    /// `Argument`, and nothing is written: a layout as in [`Surface::build`](crate::shallow::surface::Surface::build); a buffer that is too
+    /// short; over 65,536 vertices for 16-bit indices.
     pub fn build(&mut self, drops: &[Droplet], layout: &Layout, target: &mut Target<'_>) -> Result<Counts> {
         layout.validate()?;
         let counts = self.count(drops);
@@ -189,7 +190,7 @@ impl Balls {
         Ok(counts)
     }
 
-    /// Writes a vector for each corner of the strands, of its normal, its position (m) and its drop.
+    /// Writes a vector for each vertex of the strands, from its normal, its position (m) and its drop.
     fn each_corner(
         &self,
         drops: &[Droplet],
@@ -209,7 +210,7 @@ impl Balls {
             };
             let way = between(first.position, position);
             let [aside, across] = edge.map_or_else(|| beside(way), |edge| beside_with(way, edge));
-            // What has run into the drops is missing in the middle.
+            // The middle lacks what has drained into the drops.
             let middle = [0, 1].map(|n| 0.5 * (own + axes[n]) * strand.whole);
             let halfway = along(first.position, way, 0.5);
             for (drop, position, axes) in
@@ -252,7 +253,7 @@ impl Balls {
 }
 
 impl Strand {
-    /// That from a drop to the next one, or to its lip; none where it has broken.
+    /// The strand from a drop to the next one, or to its overflow edge; None if it has broken.
     fn new(drops: &[Droplet], at: u32, next: Option<u32>) -> Option<Self> {
         let drop = &drops[at as usize];
         let (position, volume) = match next.map(|next| &drops[next as usize]) {
@@ -306,7 +307,7 @@ fn parts(to: &mut [f32], drops: usize) -> (std::slice::ChunksExactMut<'_, [f32; 
     (balls.as_chunks_mut().0.chunks_exact_mut(BALL[0]), strands)
 }
 
-/// How vectors lie for the caller.
+/// The caller's vector layout.
 struct Axes {
     z_up: bool,
     sign: f64,
@@ -350,20 +351,20 @@ fn cross([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
     [b * z - c * y, c * x - a * z, a * y - b * x]
 }
 
-/// Two unit vectors across a direction: the three are right-handed, in this order and the direction last.
+/// Two unit vectors perpendicular to a direction; right-handed, with the direction last.
 fn beside(direction: [f64; 3]) -> [[f64; 3]; 2] {
     let is_steep = direction[0].abs() < 0.7 * length(direction);
     beside_with(direction, if is_steep { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] })
 }
 
-/// As [`beside`]; the first is near another direction.
+/// As [`beside`]; the first is close to another direction.
 fn beside_with(direction: [f64; 3], other: [f64; 3]) -> [[f64; 3]; 2] {
     let direction = unit(direction);
     let across = unit(cross(direction, other));
     [cross(across, direction), across]
 }
 
-/// Six times the volume between a triangle and the origin, over six.
+/// Volume of the tetrahedron of a triangle and the origin.
 fn volume([a, b, c]: [[f64; 3]; 3]) -> f64 {
     let normal = cross(b, c);
     (0..3).map(|n| a[n] * normal[n]).sum::<f64>() / 6.0
@@ -394,7 +395,7 @@ fn ball() -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
         let middles: [u32; 3] = std::array::from_fn(|side| {
             let ends = [face[side], face[(side + 1) % 3]].map(|at| vertices[at]);
             let middle = unit(along(ends[0], ends[1], 1.0));
-            // An edge has two faces, whose sums are the same in either order.
+            // An edge has two faces, whose midpoint sums are the same in either order.
             let at = vertices.iter().position(|vertex| *vertex == middle).unwrap_or(vertices.len());
             if at == vertices.len() {
                 vertices.push(middle);

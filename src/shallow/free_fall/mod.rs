@@ -1,17 +1,18 @@
-//! Liquid that falls freely: over cliffs, through holes and into the void it flies, in packets, until it lands.
+//! Liquid that falls freely over cliffs, through holes and into the void: it flies, in packets, until it lands.
 //!
 //! | word | meaning |
 //! |---|---|
-//! | lip | a link that liquid falls freely from in a step: the void is beyond, or the surface there lies deeper than a given height (`solver/overflow_edges.rs`) |
-//! | thread | a lip that takes what goes over those near it (`free_fall/rivulets.rs`) |
-//! | packet | what went over a lip in some steps; whole units of volume, which fly together (`flight.rs`) and land together (`falling.rs`, `splash.rs`) |
+//! | overflow edge (`Lip`) | a link that liquid falls freely from in a step: the void is beyond, or the surface there is lower by more than a given height (`solver/overflow_edges.rs`) |
+//! | rivulet (`Threads`) | an overflow edge that takes what goes over those near it (`free_fall/rivulets.rs`) |
+//! | packet | what went over an overflow edge in some steps; whole units of volume, which fly together (`flight.rs`) and land together (`falling.rs`, `splash.rs`) |
 //! | drop | a packet, as a host sees it |
-//! | strand | a tube between packets that follow each other from the same lip, and from it to the last (`mesh.rs`) |
+//! | strand | a tube between consecutive packets of an overflow edge, and from the edge to the newest (`mesh.rs`) |
 //!
-//! A packet begins at the lip's base, with the velocity of what went over it, at most that at the brink of a free overfall, 1.4 times the critical
-//! one of its flow (Rouse, Civil Engineering 6, 1936), or of the liquid that arrives there, if that is faster. It flies without drag, and lands on the first
-//! surface that it meets and around: without room there, as liquid does where the terrain moves (`remap/held.rs`). At a wall it stops, and falls down along it. Where there
-//! is nothing it leaves the domain below its lowest height, or over an open border, and is lost.
+//! A packet begins at the base of the overflow edge, with the velocity of the liquid there. This is limited to the velocity at the brink of
+//! a free overfall, 1.4 times the critical velocity of its flow (Rouse, Civil Engineering 6, 1936), or to that of the liquid that arrives
+//! there, if it is faster. It flies without drag, and lands on and around the first surface that it hits; without room there, it is handled
+//! as where the terrain moves (`remap/held.rs`). At a wall it stops, and falls down along it. Where there is no ground it leaves the domain
+//! below its minimum height, or over an open border, and is lost.
 
 mod falling;
 mod flight;
@@ -29,19 +30,19 @@ use crate::error::{Error, Result};
 pub(super) use falling::{Falling, LIP, Waiting};
 pub(super) use packet::{PACKET, Packet};
 
-/// How liquid falls.
+/// Parameters of falling liquid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Falls {
-    /// Height (m) from which on liquid falls freely, from the base of the column that gives to the surface below; 0 and up; 0.01. Steps of less than a cell
-    /// are no falls.
+    /// Height (m) from which on liquid falls freely, from the base of the donor column to the surface below; 0 and up. Default: 0.01. Steps
+    /// of less than a cell are not falls.
     pub height: f64,
-    /// Time between packets of a lip (s), 0.0001 to 1, at least a step; 1/120.
+    /// Time between packets of an overflow edge (s), 0.0001 to 1, at least a step. Default: 1/120.
     pub interval: f64,
-    /// Volume of a drop (m3), 0 or more. If a lip takes longer than 8 intervals to deliver this volume, its liquid waits there until there is
-    /// enough for one drop, for 60 intervals at most. 6.5e-11, a ball half a millimetre across.
+    /// Volume of a drop (m3), 0 or more. If an overflow edge takes longer than 8 intervals to deliver this volume, its liquid waits there
+    /// until there is enough for one drop, for 60 intervals at most. Default: 6.5e-11, a ball half a millimetre across.
     pub drop: f64,
-    /// Most packets in the air, 1 to 1,048,576, for which there is room from the beginning; 8192. While there are so many, liquid that goes over a lip is
-    /// below at once.
+    /// Maximum count of packets in the air, 1 to 1,048,576; their memory is reserved from the beginning. Default: 8192. At the maximum,
+    /// liquid that goes over an overflow edge arrives below at once.
     pub most: usize,
 }
 
@@ -72,7 +73,7 @@ impl Falls {
         Ok(())
     }
 
-    /// Pipes that liquid may fall freely through.
+    /// The pipes through which liquid may fall freely.
     pub(super) fn cliffs(falls: Option<&Self>, columns: &Columns) -> Cliffs {
         let Some(falls) = falls else { return Cliffs::NONE };
         let height = falls.height.max(columns.grid.cell) / columns.heights.unit;
@@ -87,35 +88,35 @@ pub struct Droplet {
     pub position: [f64; 3],
     /// Its velocity (m/s).
     pub velocity: [f64; 3],
-    /// How much it is (m3).
+    /// Volume (m3).
     pub volume: f64,
     /// Radius of a ball of its volume (m).
     pub radius: f64,
-    /// Seconds since it left its lip.
+    /// Seconds since it left its overflow edge.
     pub age: f64,
-    /// Its lip: the same number for all that come from one side of one column.
+    /// Its overflow edge: the same number for all drops from one side of one column.
     pub source: u64,
-    /// Concentration of each scalar that it carries, in the scalar's own measure.
+    /// Concentration of each scalar, in the scalar's own measure.
     pub concentrations: [f32; MOST],
-    /// Where the liquid leaves the ground, if this drop is the last that has left it.
+    /// Where the liquid leaves the ground; only for the newest drop there.
     pub lip: Option<Lip>,
-    /// One more than that of the drop that left the same lip before it, if nothing interrupted the flow there.
+    /// One more than the number of the previous drop of the same overflow edge, unless the flow there was interrupted.
     pub number: u64,
 }
 
 /// Where liquid leaves the ground.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Lip {
-    /// The middle of the column that it comes from, half way up (m).
+    /// The middle of the column that it comes from, at half its depth (m).
     pub position: [f64; 3],
-    /// How deep it is there (m).
+    /// Depth there (m).
     pub depth: f64,
     /// A unit vector along the edge.
     pub edge: [f64; 3],
 }
 
 impl Shallow {
-    /// The liquid in the air, in the order in which it left its lips; at most [`Falls::most`].
+    /// The liquid in the air, in the order in which it left the overflow edges; at most [`Falls::most`].
     pub fn drops(&self) -> impl ExactSizeIterator<Item = Droplet> + '_ {
         let (grid, heights) = (self.columns.grid, self.columns.heights);
         let unit = grid.cell * grid.cell * heights.unit;
@@ -145,7 +146,7 @@ impl Shallow {
         })
     }
 
-    /// Where a packet's liquid comes from; none if the ground has moved since.
+    /// Where a packet's liquid comes from; None if the ground has moved since.
     fn lip_of(&self, packet: &Packet) -> Option<Lip> {
         let (columns, unit) = (&self.columns, self.columns.heights.unit);
         let (cell, layer) = ((packet.source >> 18) as usize, (packet.source & 0xffff) as usize);
@@ -153,7 +154,7 @@ impl Shallow {
         let column = columns.column(cell, layer)?;
         let ([x, z], base) = (columns.grid.centre(cell), f64::from(columns.bases()[column]) * unit);
         let depth = f64::from(self.flow.depth[column]) * unit;
-        // Sides to the east and to the west are even.
+        // Sides to the east and to the west have even numbers.
         let edge = if packet.source >> 16 & 1 == 0 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
         Some(Lip { position: [x, columns.heights.low + base + 0.5 * depth, z], depth, edge })
     }

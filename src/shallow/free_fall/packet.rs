@@ -6,33 +6,33 @@ use crate::shallow::scalars::MOST;
 
 /// Bytes of a packet in a saved state.
 pub(in crate::shallow) const PACKET: usize = 88;
-/// Beyond what a packet's speed can be (cells/s, units/s).
+/// Upper bound of a packet's speed (cells/s, units/s).
 const MOST_SPEED: f64 = 1e30;
 
 /// Liquid in the air.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::shallow) struct Packet {
-    /// Its cell (x, z), and where it is from the centre of it (cells): -0.5 to 0.5.
+    /// Its cell (x, z), and its position relative to the cell's centre (cells): -0.5 to 0.5.
     pub cell: [u32; 2],
     pub offset: [f64; 2],
-    /// Height, 0 and up, and the speed downward (units, units/s).
+    /// Height, 0 and up, and downward speed (units, units/s).
     pub height: f64,
     pub down: f64,
     /// Velocity along x and z (cells/s).
     pub along: [f64; 2],
-    /// Seconds since it left its lip.
+    /// Seconds since it left its overflow edge.
     pub age: f64,
-    /// How much it is (units), over 0, and what it carries of each scalar, which saved states have apart.
+    /// Volume (units), above 0, and amount of each scalar; saved states store the amounts separately.
     pub units: i64,
     pub amounts: [i64; MOST],
-    /// Where it came from: the cell (`Grid::index`), its side and its layer.
+    /// Its origin: the cell (`Grid::index`), its side and its layer.
     pub source: u64,
-    /// When it was made: the count of times at which packets were made since the start.
+    /// When it was created: how many times packets had been created since the start.
     pub tick: u64,
 }
 
 impl Packet {
-    /// Its numbers, for a saved state.
+    /// Its serialised form, for a saved state.
     pub fn to_bytes(self) -> [u8; PACKET] {
         let cell = u64::from(self.cell[0]) | u64::from(self.cell[1]) << 32;
         let [x, z] = self.offset;
@@ -45,7 +45,7 @@ impl Packet {
         bytes
     }
 
-    /// As [`Packet::to_bytes`] has written it; it carries nothing.
+    /// Reads what [`Packet::to_bytes`] wrote; amounts are 0.
     pub fn from_bytes(bytes: &[u8; PACKET]) -> Self {
         let all: [u64; PACKET / 8] = std::array::from_fn(|at| u64::from_le_bytes(bytes.as_chunks().0[at]));
         let [cell, units, source, tick, floats @ ..] = all;
@@ -65,7 +65,7 @@ impl Packet {
         }
     }
 
-    /// Whether it may be in the air over such columns.
+    /// Whether it is valid in the air over these columns.
     pub fn is_of(&self, columns: &Columns) -> bool {
         let [nx, nz] = columns.grid.size;
         (self.cell[0] as usize) < nx

@@ -1,21 +1,22 @@
-//! Threads: what goes over lips close to each other gathers into one fall, as surface tension makes it.
+//! Rivulets (`Threads`): liquid from nearby overflow edges gathers into one fall, because of surface tension.
 //!
-//! A thin sheet that leaves an edge contracts: from the edge of a table a film runs off in threads some millimetres apart. Of all lips the one with
-//! most liquid is the first thread, and takes what goes over those within [`REACH`]; of what is left the one with most is the next. What a
-//! thread has carried counts, so that it stays where it is. Everything is compared in integers, and among equals each is its own thread: a turned or
-//! mirrored scene has the same ones.
+//! A thin sheet that leaves an edge contracts: from the edge of a table a film runs off in rivulets some millimetres apart. Of all overflow
+//! edges, the one with most liquid is the first rivulet, and takes what goes over those within [`REACH`]; the one with most of the rest is
+//! the next. The recent flow of a rivulet counts, so that it stays where it is. All comparisons are in integers, and equal edges stay
+//! separate: a turned or mirrored scene has the same rivulets.
 
 use super::falling::{Falling, Waiting, add};
 use crate::shallow::columns::Columns;
 use crate::shallow::pipes::Links;
 use crate::shallow::pipes::joints::Side;
 
-/// A thread takes what goes over lips so far from its own (m); of the order of the capillary length, sqrt(sigma / (rho g)), 2.7 mm for water.
+/// A rivulet takes the liquid of overflow edges within this distance (m); of the order of the capillary length, sqrt(sigma / (rho g)), 2.7
+/// mm for water.
 const REACH: f64 = 0.004;
-/// Its own.
+/// Sentinel: not merged into another rivulet.
 const OWN: u32 = u32::MAX;
 
-/// A lip that liquid waits at.
+/// An overflow edge at which liquid waits.
 #[derive(Debug, Clone, Copy)]
 struct Lip {
     /// Index of the cell that it belongs to (`Grid::index`).
@@ -25,24 +26,24 @@ struct Lip {
     middle: [i32; 2],
     base: i32,
     side: Side,
-    /// What it carries in an interval (units); 0 where nothing came in the last.
+    /// Flow in an interval (units); 0 if nothing arrived in the last.
     strength: i64,
-    /// The lip, in this list, that takes its liquid, and how far away that is (square of half cells).
+    /// Index in this list of the edge that takes its liquid, and the distance to it (square of half cells).
     into: u32,
     away: i32,
 }
 
-/// What is found of the lips; kept, so that nothing is allocated again.
+/// Lists of overflow edges; kept to avoid repeated allocation.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Threads {
     /// By cell.
     lips: Vec<Lip>,
-    /// From the strongest on.
+    /// By decreasing strength.
     order: Vec<u32>,
 }
 
 impl Threads {
-    /// Nothing yet, and room for the lips of so many links.
+    /// Empty, with capacity for so many links.
     pub fn with_room(links: usize) -> Self {
         Self { lips: Vec::with_capacity(links), order: Vec::with_capacity(links) }
     }
@@ -52,11 +53,11 @@ impl Threads {
         self.lips.capacity() * size_of::<Lip>() + self.order.capacity() * size_of::<u32>()
     }
 
-    /// Finds which lips are threads, and what others give to them.
+    /// Finds which overflow edges are rivulets, and which of these takes the liquid of each other edge.
     fn find(&mut self, columns: &Columns, links: &Links, waiting: &[Waiting]) {
         let grid = columns.grid;
         let reach = 2.0 * REACH / grid.cell;
-        // Beside it the next lips are a cell, two halves, away; over a corner less.
+        // The next edge along a straight side is a cell (two halves) away; around a corner it is closer.
         let (reach, cells) = ((reach * reach).min(1e6) as i32, (0.5 * reach).min(500.0) as usize + 1);
         self.lips.clear();
         for (link, own) in waiting.iter().enumerate().filter(|(_, own)| own.is_awake()) {
@@ -84,7 +85,7 @@ impl Threads {
         let step = (grid.cell / columns.heights.unit).min(f64::from(i32::MAX / 2)) as i32;
         let mut first = 0;
         while first < self.order.len() {
-            // Those that are as strong do not take from each other.
+            // Edges of equal strength do not take from each other.
             let strength = self.lips[self.order[first] as usize].strength;
             let same =
                 self.order[first..].iter().take_while(|&&at| self.lips[at as usize].strength == strength);
@@ -101,7 +102,7 @@ impl Threads {
         }
     }
 
-    /// A thread takes what is weaker and near, if none stronger does; of two that are as strong the nearer.
+    /// A rivulet takes weaker edges nearby, unless a stronger one does; of two equally strong rivulets, the nearer one does.
     fn take_around(&mut self, at: u32, [reach, step]: [i32; 2], cells: usize, [nx, nz]: [usize; 2]) {
         let own = self.lips[at as usize];
         let [x, z] = [own.cell as usize % nx, own.cell as usize / nx];
@@ -130,7 +131,7 @@ impl Threads {
                 if is_free || is_equal && away < lip.away {
                     (lip.into, lip.away) = (at, away);
                 } else if is_equal && away == lip.away {
-                    // Between two of the same it goes to neither.
+                    // Equally far from two equal rivulets: neither takes it.
                     lip.into = OWN;
                 }
             }
@@ -139,7 +140,7 @@ impl Threads {
 }
 
 impl Falling {
-    /// Gives what waits at lips to the threads near them, and counts what came to each in this interval.
+    /// Gives what waits at overflow edges to the rivulets near them, and updates the inflow of each in this interval.
     pub(super) fn gather_threads(&mut self, columns: &Columns, links: &Links) {
         let Self { threads, waiting, .. } = self;
         threads.find(columns, links, waiting);
@@ -154,7 +155,7 @@ impl Falling {
         }
         for lip in &threads.lips {
             let own = &mut waiting[lip.link as usize];
-            // Whole numbers, so that it does not depend on the order.
+            // A sum of integers, so that it does not depend on an order.
             own.impulse += own.gathered as f64;
             own.gathered = 0;
             let came = (own.units - own.before).max(0);
@@ -166,7 +167,7 @@ impl Falling {
     }
 }
 
-/// Numbers that are scattered over all, for any that are close together (splitmix64, Steele et al. 2014).
+/// Hashes close numbers to ones scattered over the whole range (splitmix64, Steele et al. 2014).
 fn scatter(number: u64) -> u64 {
     let mixed = number.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mixed = (mixed ^ mixed >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,17 +1,18 @@
-//! Where drops land: not in one column only.
+//! Splashes: drops land on several columns.
 //!
-//! A drop that hits a surface spreads over about twice its own width. All of it in a column that is thinner than the drop would stand there as a spike, and
-//! leave ripples of a cell's size. Equal parts go to the columns around that lie as low as its own and are open above.
+//! A drop that hits a surface spreads over about twice its own width. If all of it went to one column, where the liquid is thinner than the
+//! drop, it would form a spike and leave ripples of a cell's size. Equal parts go to the surrounding columns at about the same height that
+//! are open towards its own.
 
 use super::falling::add;
 use crate::shallow::columns::Columns;
 use crate::shallow::scalars::MOST;
 use crate::shallow::scalars::shares::part;
 
-/// Furthest that it spreads (cells).
+/// Maximum radius of the spread (cells).
 const FURTHEST: i32 = 3;
 
-/// What lands on a column: units, and what they carry.
+/// Liquid that lands on a column: units and amounts.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Landing {
     pub column: u32,
@@ -19,7 +20,7 @@ pub(super) struct Landing {
     pub amounts: [i64; MOST],
 }
 
-/// Adds up what lands on the same column, so that it does not depend on the order; by column.
+/// Adds up the landings on each column, so that the result does not depend on an order; sorts by column.
 pub(super) fn merge(landed: &mut Vec<Landing>) {
     landed.sort_unstable_by_key(|landing| landing.column);
     landed.dedup_by(|next, first| {
@@ -32,7 +33,7 @@ pub(super) fn merge(landed: &mut Vec<Landing>) {
     });
 }
 
-/// Gives equal parts to the columns around, if the list then has `most` at most, else to none.
+/// Gives equal parts to the surrounding columns, if the list then has at most `most` entries; otherwise does nothing.
 pub(super) fn spread(columns: &Columns, landed: &mut Vec<Landing>, most: usize) {
     let mut count = 0;
     for landing in &*landed {
@@ -60,7 +61,7 @@ pub(super) fn spread(columns: &Columns, landed: &mut Vec<Landing>, most: usize) 
 fn around(columns: &Columns, landing: &Landing, mut with: impl FnMut(u32)) {
     let (own, grid) = (landing.column as usize, columns.grid);
     let depth = landing.units as f64 * columns.heights.unit / grid.cell;
-    // A ball of its volume has this radius, in cells; twice that is squared here.
+    // Squared diameter (cells) of a ball of its volume.
     let radius = libm::cbrt(0.75 / std::f64::consts::PI * depth);
     let square = (4.0 * radius * radius).min(f64::from(FURTHEST * FURTHEST)) as i32;
     if square < 1 {
@@ -78,7 +79,7 @@ fn around(columns: &Columns, landing: &Landing, mut with: impl FnMut(u32)) {
             if cell[0] >= grid.size[0] || cell[1] >= grid.size[1] {
                 continue;
             }
-            // No further up or down than a slope of 45 degrees, and of those there may be one only.
+            // At most one column a cell, no further up or down than a slope of 45 degrees.
             let most = step * f64::from(away).sqrt();
             let joins = |&column: &usize| {
                 f64::from((columns.bases()[column] - base).abs()) <= most && columns.overlap(own, column)
@@ -118,7 +119,7 @@ mod tests {
         // Balls of 0.2 mm, 0.5 mm, and many cells, in the open and beside the edge.
         assert_eq!([3.4e-11, 5.3e-10, 1e-6].map(|volume| spread_at(5, volume)), [1, 5, 29]);
         assert_eq!([5.3e-10, 1e-6].map(|volume| spread_at(9, volume)), [4, 18]);
-        // Without room for all it lands whole.
+        // Without capacity for all parts it lands in one.
         let mut landed = Vec::with_capacity(4);
         landed.push(Landing {
             column: columns.column([5, 5], 0).unwrap() as u32,

@@ -1,14 +1,14 @@
-//! Cliffs: where liquid may fall freely, pipes between columns of one layer are links too.
+//! Cliffs: where liquid may fall freely, even pipes between columns of one layer are links.
 
 use super::joints::Side;
 use crate::shallow::columns::{Columns, NONE, STRIP};
 
-/// Pipes between bases that differ by more than so many units may be free falls.
+/// Pipes between bases that differ by more than this (units) may be free falls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::shallow) struct Cliffs(pub i32);
 
 impl Cliffs {
-    /// No pipe is one.
+    /// No pipe is a cliff.
     pub const NONE: Self = Self(i32::MAX);
 
     /// Whether the pipe between two columns may be a free fall.
@@ -33,7 +33,8 @@ impl Cliffs {
         }
     }
 
-    /// Bits of the columns of a strip whose regular pipe over a side, to the east or to the south, is a link.
+    /// Bits of the columns of a strip whose pipe over a side, to the east or to the south, is a link although it joins columns of one
+    /// layer.
     pub fn of_strip(self, columns: &Columns, strip: usize, side: Side) -> u16 {
         let mut bits = 0;
         if self == Self::NONE {

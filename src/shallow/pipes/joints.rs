@@ -1,6 +1,6 @@
-//! Finds the pipes of rows of columns: openness of regular ones, and the links.
+//! Finds the pipes of rows of columns: the openness of regular pipes, and the links.
 //!
-//! Few cells have links. Those that may are found first, 16 at a time.
+//! Few cells have links. Candidates are found first, 16 cells at a time.
 
 use std::ops::Range;
 
@@ -36,7 +36,7 @@ impl Side {
         }
     }
 
-    /// Which way it faces, along x and z.
+    /// Outward direction, along x and z.
     pub fn outward(self) -> [i32; 2] {
         match self {
             Self::East => [1, 0],
@@ -57,12 +57,12 @@ impl Side {
     }
 }
 
-/// What is known of the rows around the one whose pipes are found; kept, so that nothing is allocated again.
+/// Data of the rows around the one whose pipes are found; kept to avoid repeated allocation.
 #[derive(Debug, Clone, Default)]
 pub(in crate::shallow) struct Finder {
-    /// Of the row and the next one, by row modulo 2.
+    /// For the row and the next one, by row modulo 2.
     rises: [Rises; 2],
-    /// Of the row and those beside it, by row modulo 3.
+    /// For the row and those beside it, by row modulo 3.
     stacks: [Stacks; 3],
 }
 
@@ -100,7 +100,7 @@ struct Joiner<'a> {
     columns: &'a Columns,
     row: usize,
     rules: &'a Rules,
-    /// Of the row and the next one.
+    /// For the row and the next one.
     rises: [&'a Rises; 2],
     own: &'a Stacks,
     /// None at the edge of the domain.
@@ -155,7 +155,7 @@ impl<'a> Joiner<'a> {
         }
     }
 
-    /// Bits of the cells of a block with columns that may be linked to such of other layers to the east or south.
+    /// Bits of the cells of a block whose columns may be linked to columns of other layers to the east or south.
     fn across_layers(&self, block: usize) -> u16 {
         let is_last = (block + 1) * STRIP >= self.columns.grid.size[0];
         let own = (self.own.of(block), self.own.extents(block));
@@ -167,7 +167,7 @@ impl<'a> Joiner<'a> {
         }
         let mut cells = 0;
         for (layer, (&strip, extent)) in own.0.iter().zip(own.1).enumerate() {
-            // Strips of other layers that have a column which meets one of this strip, unless their positions are apart.
+            // Strips of other layers that may have a column that meets one of this strip: their height ranges overlap.
             let others = |(strips, extents): (&'a [u32], &'a [[i32; 2]])| {
                 let all = strips.iter().zip(extents).enumerate();
                 all.filter(move |(other, (_, range))| {
@@ -186,7 +186,7 @@ impl<'a> Joiner<'a> {
         cells
     }
 
-    /// Bits of the cells of a block with columns beside a cliff to the east or south.
+    /// Bits of the cells of a block with a column beside a cliff to the east or south.
     fn over_cliffs(&self, block: usize) -> u16 {
         let all = self.own.of(block).iter().flat_map(|&strip| {
             [Side::East, Side::South]
@@ -195,7 +195,7 @@ impl<'a> Joiner<'a> {
         all.fold(0, |cells, more| cells | more)
     }
 
-    /// Bits of the columns of a strip that liquid can pass from to those of another strip, so many positions behind theirs.
+    /// Bits of the columns of a strip from which liquid can pass to those of another strip, `positions` further on.
     fn meeting(&self, strip: usize, other: usize, positions: usize) -> u16 {
         let (bases, ceilings) = (self.columns.bases(), self.columns.ceilings());
         let (base, ceiling) = (strip_of(bases, strip), strip_of(ceilings, strip));
@@ -212,7 +212,7 @@ impl<'a> Joiner<'a> {
         open.iter().enumerate().fold(0, |bits, (x, open)| bits | (*open as u16) << x)
     }
 
-    /// Bits of the cells of a block with columns beside a void.
+    /// Bits of the cells of a block with a column beside a void.
     fn over_void(&self, block: usize) -> u16 {
         let nx = self.columns.grid.size[0];
         let mut cells = 0;
@@ -242,14 +242,14 @@ impl<'a> Joiner<'a> {
         }
     }
 
-    /// Whether a cell beyond a side has no ground at a height, or it hangs over it.
+    /// Whether the cell beyond a side is void at a height: it has no ground, or only ground that hangs above.
     fn is_void(&self, side: Side, cell: [usize; 2], height: i32) -> bool {
         self.beyond(side).is_some_and(|stacks| !stacks.is_grounded && height < stacks.sills[cell[0]])
             && !self.rules.apart.as_ref().is_some_and(|apart| apart.has(cell))
     }
 
-    /// Adds the links of a column over a side: those to columns of other layers or over cliffs, which the cell to the west or north owns, and
-    /// the one to the outside.
+    /// Adds the links of a column over a side: those to columns of other layers or over cliffs, which the cell to the west or north owns,
+    /// and the one to the outside.
     fn join(&self, links: &mut Links, at: [usize; 2], layer: usize, i: usize, side: Side) {
         let columns = self.columns;
         let cell = side.cell(at, columns.grid.size);
@@ -270,7 +270,7 @@ impl<'a> Joiner<'a> {
             let fall = if falls {
                 (columns.grid.cell / columns.heights.unit).min(f64::from(i32::MAX / 2)) as i64
             } else {
-                // The ground goes on as it comes, but never rises.
+                // The slope of the ground continues outside, but never rises.
                 let inner = beside(columns, i, side.opposite()).filter(|&j| columns.overlap(i, j));
                 inner.map_or(0, |j| (i64::from(columns.bases()[j]) - base).max(0))
             };
@@ -283,7 +283,7 @@ impl<'a> Joiner<'a> {
         slopes::openness(along as f64, across as f64, self.scale)
     }
 
-    /// The rise at a column of this row or the next one, across a side's axis.
+    /// The rise across a side's axis, at a column of this row or the next one.
     fn across(&self, i: usize, side: Side) -> i64 {
         let row = usize::from(i >= self.starts[1]);
         let rises = if side.is_along_x() { &self.rises[row].z } else { &self.rises[row].x };

@@ -1,4 +1,4 @@
-//! Pipes between columns (thesis 4.1.1): where they are open, how steep the ground below them is, and those that leave the domain.
+//! Pipes between columns (thesis 4.1.1): their openness, the slope of the ground below them, and the pipes that leave the domain.
 //!
 //! A pipe joins two columns of adjacent cells whose [b, max] overlap. Those between columns of one layer are *regular*: each column owns
 //! the one to its east and the one to its south, so that they are arrays beside the columns. All others are *links*, in a list: between
@@ -22,21 +22,21 @@ pub enum Border {
     /// A wall.
     #[default]
     Closed,
-    /// Nothing: liquid flows off as the ground near the border leads it, and is counted as lost.
+    /// Nothing: liquid flows off along the slope of the ground near the border, and is counted as lost.
     Open,
-    /// Liquid at rest, as high as the domain was filled last: waves leave, and do not come back. What goes out and in is counted. Before
-    /// it is filled the border is open, and where the ground is higher.
+    /// Liquid at rest, at the height to which the domain was last filled: waves leave and are not reflected. Outflow and inflow are
+    /// counted. The border is open before the first filling, and where the ground is higher.
     Absorbing,
 }
 
-/// The pipes that are not regular, by owner's row.
+/// The pipes that are not regular, by the row of their owner.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Links {
     /// The column that gives where the flux is positive.
     pub from: Vec<u32>,
     /// The other column, or [`NONE`]: the outside.
     pub to: Vec<u32>,
-    /// The side of the first column that each leads over.
+    /// The side of the first column that each link crosses.
     pub(super) sides: Vec<Side>,
     /// As [`Pipes::east`].
     pub open: Vec<f32>,
@@ -48,18 +48,18 @@ pub struct Links {
     pub columns: Vec<u32>,
     /// First of those columns of each row, and the end of the last.
     pub column_rows: Vec<u32>,
-    /// Most pipes that a column has.
+    /// Maximum count of pipes of a column.
     pub most: usize,
 }
 
 /// All pipes of a terrain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pipes {
-    /// Openness of the pipe from each index to the next along x: 0 where there is none.
+    /// Openness of the pipe from each index to the next along x; 0: none.
     pub east: PerColumn<f32>,
-    /// Openness of the pipe from each index to the one behind it along z.
+    /// Openness of the pipe from each index to its southern neighbour along z.
     pub south: PerColumn<f32>,
-    /// All others.
+    /// All other pipes.
     pub links: Links,
 }
 
@@ -93,19 +93,19 @@ impl Pipes {
     }
 }
 
-/// The ends of links by column; kept, so that nothing is allocated again.
+/// Ends of links by column; kept to avoid repeated allocation.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Ends {
-    /// Bits of the positions of each strip that have links.
+    /// Bits of the positions in each strip that have links.
     marks: Vec<u16>,
-    /// Where the columns of each strip begin among those that have links.
+    /// Rank of the first column of each strip among those that have links.
     firsts: Vec<u32>,
-    /// Links of each of these columns.
+    /// Count of links of each of these columns.
     counts: Vec<u32>,
 }
 
 impl Ends {
-    /// The rank of a column with links among all of them.
+    /// The rank of a column among all columns with links.
     fn rank(&self, column: u32) -> usize {
         let (strip, position) = (column as usize / STRIP, column as usize % STRIP);
         let before = self.marks[strip] & ((1 << position) - 1);
@@ -152,7 +152,7 @@ impl Links {
         self.most = 4 + ends.counts.iter().copied().max().unwrap_or(0) as usize;
     }
 
-    /// Puts the links of other rows in place of those of some rows. The indices of the rows behind grow by `shift`, modulo 2^32.
+    /// Replaces the links of some rows. Column indices in the rows behind grow by `shift`, modulo 2^32.
     pub(super) fn replace_rows(&mut self, rows: Range<usize>, new: &Self, shift: u32) {
         let old = self.rows[rows.start] as usize..self.rows[rows.end] as usize;
         let (first, len) = (old.start, new.len());
@@ -195,12 +195,12 @@ impl Links {
         self.from.len()
     }
 
-    /// Whether there is none.
+    /// Whether there is no link.
     pub fn is_empty(&self) -> bool {
         self.from.is_empty()
     }
 
-    /// The surface outside of a link that leads there (units), and whether it is that of liquid at rest, `still`, beyond the border.
+    /// The outside surface (units) of a link that leads there, and whether it is that of the liquid at rest beyond the border, `still`.
     #[inline]
     pub fn outside(&self, columns: &Columns, link: usize, still: i32) -> (i32, bool) {
         let from = self.from[link] as usize;
@@ -209,7 +209,7 @@ impl Links {
         if is_still { (still, true) } else { (self.level[link], false) }
     }
 
-    /// The links that a row owns: from its columns to others of the row, of the next one, or outside.
+    /// The links that a row owns: from its columns to others of the row, to the next row, or to the outside.
     pub fn row(&self, row: usize) -> Range<usize> {
         self.rows[row] as usize..self.rows[row + 1] as usize
     }
@@ -279,7 +279,7 @@ mod tests {
         let at = |x: usize, z: usize, layer: usize| columns.column([x, z], layer).unwrap();
         assert!(pipes.south[at(1, 0, 0)] > 0.0 && pipes.south[at(1, 1, 0)] > 0.0);
         assert_eq!(pipes.south[at(2, 1, 0)], 0.0, "the pillar closes the passage");
-        // From the bridge to both sides, ten in all; the bridge is passed below and above, the pillar's top lies open to the bridge.
+        // From the bridge to both sides, ten in all; liquid passes below and above the bridge, and the pillar's top is open towards it.
         let joins = |i: usize, j: usize| {
             (0..pipes.links.len())
                 .any(|link| (pipes.links.from[link], pipes.links.to[link]) == (i as u32, j as u32))

@@ -1,4 +1,4 @@
-//! What pipes follow from besides the columns.
+//! Settings that pipes depend on besides the columns.
 
 use std::ops::Range;
 
@@ -8,22 +8,22 @@ use crate::shallow::columns::Columns;
 use crate::shallow::free_fall::Falls;
 use crate::shallow::params::{Friction, Params};
 
-/// What pipes follow from besides the columns.
+/// Settings that pipes depend on besides the columns.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::shallow) struct Rules {
     pub border: Border,
     pub cliffs: Cliffs,
-    /// Ground that rises by more than so many units over a cell, on one side of a column only, is a wall and no slope.
+    /// A rise of more than this over a cell (units), on only one side of a column, is a wall and not a slope.
     pub steepest: i32,
     pub apart: Option<Apart>,
 }
 
-/// Cells that are another liquid's. Without columns, they are no void but a wall.
+/// Cells that belong to another liquid. Where they have no columns, they are a wall and not a void.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::shallow) struct Apart {
     /// A box of cells: ranges of x and of z.
     pub cells: [Range<usize>; 2],
-    /// Whether it is those in the box; else it is all others.
+    /// Whether the cells are those in the box; otherwise they are all others.
     pub is_inside: bool,
 }
 
@@ -35,7 +35,7 @@ impl Apart {
 }
 
 impl Rules {
-    /// Of a liquid.
+    /// The rules for a liquid.
     pub fn of(params: &Params, columns: &Columns, apart: Option<&Apart>) -> Self {
         let steepest = match params.friction {
             Friction::Ground => i32::MAX,
@@ -45,7 +45,7 @@ impl Rules {
         Self { border: params.border, cliffs, steepest, apart: apart.cloned() }
     }
 
-    /// With neither cliffs nor walls.
+    /// Rules with neither cliffs nor walls.
     pub fn bordered(border: Border) -> Self {
         Self { border, cliffs: Cliffs::NONE, steepest: i32::MAX, apart: None }
     }

@@ -1,23 +1,25 @@
-//! How open regular pipes are (thesis 4.1.1), strip by strip.
+//! Openness of regular pipes (thesis 4.1.1), strip by strip.
 //!
-//! The thesis derives viscosity for level ground. On ground of slope S a film of vertical depth H is thinner by cos, and driven along the slope: its
-//! discharge is that of level ground over (1 + S^2)^2. Rises are differences of integers, so that nothing depends on the side from which
-//! they are seen.
+//! The thesis derives viscosity for level ground. On ground of slope S a film of vertical depth H is thinner by cos, and driven along the
+//! slope: its discharge is that on level ground divided by (1 + S^2)^2. Rises are differences of integers, so that results are the same
+//! from either side.
 
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
 
-/// Slopes are taken as at most this steep (60 degrees): a step of the ground is no slope, and liquid falls over its edge.
+/// Slopes are clamped to this (60 degrees): a step of the ground is not a slope, and liquid falls over its edge.
 const STEEPEST: f64 = 3.0;
 
-/// Numbers of the columns of a strip.
+/// A quantity of the columns of a strip.
 type Lanes = [i32; STRIP];
-/// Of a strip that is not there.
+/// Stands in for an absent strip.
 const ABSENT: Lanes = [0; STRIP];
 
-/// Twice the rises of the ground (units) over a cell at the columns of a row, along x and along z: by index from the row's first, and one strip more.
+/// Twice the rises of the ground (units) over a cell at the columns of a row, along x and along z: indexed from the row's first column,
+/// padded by one strip.
 ///
-/// The difference of the bases beyond both sides of a column over regular pipes; twice that over one side where the other has none.
+/// Each is the difference of the bases on both sides of a column, over regular pipes; if only one side has such a pipe, twice the
+/// difference over it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rises {
     pub x: Vec<i32>,
@@ -25,7 +27,7 @@ pub(super) struct Rises {
 }
 
 impl Rises {
-    /// Finds the rises of a row; those over more than `steepest` units on one side only are walls.
+    /// Finds the rises of a row; a rise of more than `steepest` units on only one side is a wall.
     pub fn find(&mut self, columns: &Columns, row: usize, steepest: i32) {
         let len = (columns.row(row).len() + 1) * STRIP;
         self.x.resize(len, 0);
@@ -39,13 +41,13 @@ impl Rises {
     }
 }
 
-/// What turns rises, four times as great, into slopes.
+/// Factor from rises, multiplied by four, to slopes.
 pub(super) fn scale(columns: &Columns) -> f64 {
     columns.heights.unit / (4.0 * columns.grid.cell)
 }
 
-/// 1 / (1 + slope^2)^2 of the ground between two columns, of four times its rise along their pipe and across: the discharge of a film on it
-/// over that of a film of the same vertical depth and fall on level ground.
+/// 1 / (1 + slope^2)^2 of the ground between two columns, from four times its rise along their pipe and across: the discharge of a film on
+/// it relative to that of a film of the same vertical depth and drop on level ground.
 #[inline(always)]
 pub(super) fn openness(along: f64, across: f64, scale: f64) -> f32 {
     let (along, across) = (along * scale, across * scale);
@@ -65,7 +67,7 @@ pub(super) fn open_row(
     dispatch!(at most avx2: open_strips(columns: &Columns, row: usize, rises: [&Rises; 2], east: &mut [f32], south: &mut [f32]));
 }
 
-/// The numbers of a strip between the last one to the west and the first one to the east; 0 where there is none.
+/// The numbers of a strip, with the adjacent one to the west and to the east; 0 where there is none.
 #[inline(always)]
 fn window(numbers: &[i32], strip: usize, [west, east]: [bool; 2]) -> [i32; STRIP + 2] {
     let mut window = [0; STRIP + 2];
@@ -84,19 +86,21 @@ fn beyond(numbers: &[i32], strip: u32) -> &Lanes {
     if strip == NONE { &ABSENT } else { strip_of(numbers, strip as usize) }
 }
 
-/// All bits where liquid can pass between columns, of their bases and ceilings. Where there is no column the ceiling is on the lowest base.
+/// All bits set where liquid can pass between columns with these bases and ceilings. An absent column has its ceiling at the lowest base.
 #[inline(always)]
 fn passes(base: [i32; 2], ceiling: [i32; 2]) -> i32 {
     -i32::from(base[0].max(base[1]) < ceiling[0].min(ceiling[1]))
 }
 
-/// Twice the rise, of those over both sides and whether there are such. Bases where liquid passes are within 0 to 2^30 - 1: it fits.
+/// Twice the rise, from the rises over both sides and masks of those that exist. Where liquid passes, bases are within 0 to 2^30 - 1: it
+/// fits.
 #[inline(always)]
 fn twice([before, behind]: [i32; 2], [has_before, has_behind]: [i32; 2]) -> i32 {
     (behind | (before & !has_behind)) + (before | (behind & !has_before))
 }
 
-/// All bits of the sides that are walls: where the ground rises or falls by over `steepest`, unless it goes on so beyond the column.
+/// All bits set for the sides that are walls: the ground there rises or falls by over `steepest`, and does not continue so on the other
+/// side.
 #[inline(always)]
 fn walls([before, behind]: [i32; 2], steepest: i32) -> [i32; 2] {
     let is_steep = [before, behind].map(|step| -i32::from(step.abs() > steepest));
@@ -114,7 +118,7 @@ fn rise_row_between_walls(columns: &Columns, row: usize, rises: &mut Rises, stee
     rise::<true>(columns, row, rises, steepest);
 }
 
-/// Twice the rise over open sides, of the steps over both and whether they are open.
+/// Twice the rise over open sides, from the steps over both and masks of those that are open.
 #[inline(always)]
 fn rise_of<const WALLED: bool>(steps: [i32; 2], open: [i32; 2], steepest: i32) -> i32 {
     let steps = [steps[0] & open[0], steps[1] & open[1]];

@@ -1,9 +1,10 @@
-//! What the liquid does to the bodies in it: pressure and drag, for tools that a hand feels, and how much they displace.
+//! Forces of the liquid on the bodies in it, pressure and drag, for haptic tools; and the volume that the bodies displace.
 //!
-//! A body is a pillar in each cell that it covers (`terrain/shapes.rs`). Its faces are where liquid touches pillars: below, above, and beside, where the pillar of one
-//! cell and the liquid of the next are at the same height. On a face acts the weight of the liquid above it, rho g (eta - y), with the head of a
-//! flooded column in place of eta, to the pillar's exact integral; a ball that is all under has the buoyancy of its pillars. Against a face that
-//! the liquid runs into acts the pressure of a stagnant jet, rho w^2 / 2, and along each face the shear of a film, of a flooded gap, or of a wall half a cell away.
+//! A body is a pillar in each cell that it covers (`terrain/shapes.rs`). Its faces are where liquid touches pillars: below, above, and at
+//! the sides, where the pillar of one cell and the liquid of the next are at the same height. On a face acts the weight of the liquid above
+//! it, rho g (eta - y), integrated exactly over the pillar, with the head of a flooded column in place of eta; a submerged ball has the
+//! buoyancy of its pillars. On a face that the liquid runs into acts the stagnation pressure, rho w^2 / 2, and along each face the shear of
+//! a film, of a flooded gap, or of a wall half a cell away.
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
@@ -14,25 +15,26 @@ use crate::shallow::solver::SLACK;
 use crate::shallow::system::Shallow;
 use crate::shallow::terrain::shapes::Shape;
 
-/// Least height of a flooded gap in which a body is held back (cells): of the pillars of a round one some come as close to the ground as they like.
+/// Minimum height, for drag, of a flooded gap (cells): some pillars of a round body come arbitrarily close to the ground.
 const LEAST_GAP: f64 = 0.05;
 
-/// What acts on a body.
+/// The load on a body.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Load {
-    /// Force of the liquid's weight (N): buoyancy, and what deeper liquid on one side does.
+    /// Force of the liquid's weight (N): buoyancy, and the push of deeper liquid on one side.
     pub pressure: [f64; 3],
-    /// Force of its motion over the body (N).
+    /// Force of the liquid's motion relative to the body (N).
     pub drag: [f64; 3],
     /// Torque of both about the body's middle (N m).
     pub torque: [f64; 3],
-    /// Volume of the body below the surface of the liquid (m3): that of a flooded column below, else the mean of what is beside it.
+    /// Volume of the body below the liquid's surface (m3), which is that of a flooded column below, else the mean of the surface at its
+    /// sides.
     pub displaced: f64,
-    /// Area of its faces that touch liquid (m2), of pillars.
+    /// Area of the faces of its pillars that touch liquid (m2).
     pub wetted: f64,
 }
 
-/// What is known of a body while its faces are looked at.
+/// Sums for a body while its faces are processed.
 struct Feeling<'a> {
     liquid: &'a Shallow,
     density: f64,
@@ -42,13 +44,13 @@ struct Feeling<'a> {
     drag: DVec3,
     torque: DVec3,
     wetted: f64,
-    /// Units beside it: of contact, and times its surface and its base.
+    /// Units at its sides: of contact, and of contact times the surface and times the base.
     contact: f64,
     levels: f64,
     bases: f64,
 }
 
-/// A face: its middle, how far below that the weight of the liquid acts (m), which way the liquid pushes it, and how large it is.
+/// A face: its middle, how far below that the weight of the liquid acts (m), the direction in which the liquid pushes it, and its area.
 struct Face {
     at: DVec3,
     lower: f64,
@@ -57,11 +59,11 @@ struct Face {
 }
 
 impl Shallow {
-    /// What the liquid does to each of [`Shallow::bodies`] now; `velocities` are theirs (m/s), `density` is the liquid's (kg/m3; blood 1,060, water 1,000). What stands
-    /// below a body is as the last step has found it: after [`Shallow::set_bodies`] a step comes first. Allocates nothing.
+    /// Current load on each of [`Shallow::bodies`]; `velocities` are theirs (m/s), `density` is the liquid's (kg/m3; blood 1,060, water
+    /// 1,000). The liquid below a body is as the last step left it: after [`Shallow::set_bodies`], step first. Allocates nothing.
     ///
     /// # Errors
-    /// `Argument`: a density that is not positive and finite, not one velocity and one position for each body, a velocity that is not finite.
+    /// `Argument`: a density that is not positive and finite, not one velocity and one output for each body, a velocity that is not finite.
     pub fn loads(&self, density: f64, velocities: &[[f64; 3]], out: &mut [Load]) -> Result<()> {
         if !(density > 0.0 && density.is_finite()) {
             return Err(Error::argument(format!("density = {density} kg/m3 is not positive and finite")));
@@ -112,7 +114,7 @@ impl Shallow {
         }
     }
 
-    /// The columns below and above a pillar, where these are of it.
+    /// The columns directly below and above a pillar, if they end at it.
     fn ends(&self, cell: [usize; 2], [bottom, top]: [i32; 2]) -> [Option<usize>; 2] {
         let columns = &self.columns;
         let mut ends = [None; 2];
@@ -127,14 +129,14 @@ impl Shallow {
         ends
     }
 
-    /// The height (units) that the liquid of a column stands at, or would without a ceiling; none where it is dry.
+    /// The height (units) at which the liquid of a column stands, or would without a ceiling; none if it is dry.
     fn stands(&self, column: usize) -> Option<f64> {
         let depth = self.flow.depth[column];
         let eta = f64::from(self.columns.bases()[column]) + f64::from(depth);
         (depth > 0).then(|| eta + f64::from(self.flow.heads()[column].max(0.0)))
     }
 
-    /// Whether a column is flooded up to its ceiling, but for as little as the flow takes for full.
+    /// Whether a column is flooded up to its ceiling, within the tolerance of the solver.
     fn is_full(&self, column: usize) -> bool {
         let room = self.columns.ceilings()[column] - self.columns.bases()[column];
         self.flow.depth[column] > 0 && room - self.flow.depth[column] <= room / SLACK
@@ -146,25 +148,25 @@ impl Shallow {
         DVec3::new(u, 0.0, w)
     }
 
-    /// How much of a pillar is below the surface (units of height); the surface beside the body, and the ground there, are at `around`.
+    /// Height of a pillar below the surface (units); `level` and `ground` are the surface and the ground at the sides of the body.
     fn under(&self, cell: [usize; 2], [bottom, top]: [i32; 2], [level, ground]: [f64; 2]) -> f64 {
         let [below, above] = self.ends(cell, [bottom, top]);
         let (bottom, top) = (f64::from(bottom), f64::from(top));
         let is_covered = above.is_some_and(|above| self.flow.depth[above] > 0);
         let level = match below {
-            // What was pushed up onto a body that stands out of the liquid does not say that it is under.
+            // Liquid that was pushed up onto a body that stands out of the liquid does not mean that the body is submerged.
             _ if is_covered => level,
             Some(below) => self.stands(below).filter(|_| self.is_full(below)).unwrap_or(f64::NAN),
             None => level,
         };
         let bottom = if below.is_some() { bottom } else { bottom.max(ground) };
-        // Where nothing says how high liquid stands there is none.
+        // No known level means no liquid.
         if level.is_nan() { 0.0 } else { (level.min(top) - bottom).max(0.0) }
     }
 }
 
 impl Feeling<'_> {
-    /// Adds what acts on the faces of a pillar.
+    /// Adds the loads on the faces of a pillar.
     fn pillar(&mut self, cell: [usize; 2], [bottom, top]: [i32; 2]) {
         let Columns { grid, heights, .. } = &self.liquid.columns;
         let (area, [x, z]) = (grid.cell * grid.cell, grid.centre(cell));
@@ -176,15 +178,15 @@ impl Feeling<'_> {
             push: DVec3::new(0.0, push, 0.0),
             area,
         };
-        // Between a film and the body above it is air.
+        // Between a film and the body above it there is air.
         if let Some((column, level)) = self.stands(below.filter(|&below| self.liquid.is_full(below))) {
-            // A flooded gap: what flows through it, and what the body drags along.
+            // A flooded gap: the flow through it, and what the body drags along.
             let sheared = 6.0 * self.liquid.stream(column) - self.velocity;
             let shear = 1.0 / depth(column).max(LEAST_GAP * grid.cell);
             self.face(&face(bottom, 1.0), level - f64::from(bottom), column, sheared * shear);
         }
         if let Some((column, level)) = self.stands(above) {
-            // A film; one that is thinner than a cell goes with the body, the more so the thinner it is.
+            // A film. If thinner than a cell it moves with the body, more so the thinner it is.
             let sheared = 3.0 * (self.liquid.stream(column) - self.velocity);
             let thick = depth(column);
             let shear = if thick < grid.cell { thick / (grid.cell * grid.cell) } else { 1.0 / thick };
@@ -197,13 +199,13 @@ impl Feeling<'_> {
         }
     }
 
-    /// A column with liquid, and where it stands (units).
+    /// A column with liquid, and the height at which it stands (units).
     fn stands(&self, column: Option<usize>) -> Option<(usize, f64)> {
         let column = column?;
         Some((column, self.liquid.stands(column)?))
     }
 
-    /// Adds what the liquid of an adjacent cell does.
+    /// Adds the load of the liquid in an adjacent cell.
     fn side(&mut self, grid: &Grid, cell: [usize; 2], beside: [usize; 2], solid: [i32; 2]) {
         let columns = &self.liquid.columns;
         let out = [0, 1].map(|axis| beside[axis] as f64 - cell[axis] as f64);
@@ -224,7 +226,7 @@ impl Feeling<'_> {
             let half = 0.5 * grid.cell;
             let face = Face {
                 at: DVec3::new(x + half * out[0], height, z + half * out[1]),
-                // The moment of what grows downward.
+                // The moment of a pressure that grows downward.
                 lower: columns.heights.length(contact * contact / (12.0 * (level - middle))),
                 push: DVec3::new(-out[0], 0.0, -out[1]),
                 area: columns.heights.length(contact) * grid.cell,
@@ -234,8 +236,8 @@ impl Feeling<'_> {
         }
     }
 
-    /// Adds what a column does to a face that lies so far (units) below where it stands;  `sheared` is the shear rate along
-    /// it (1/s).
+    /// Adds the load of a column on a face that lies `head` (units) below the height at which the column stands; `sheared` is the shear
+    /// rate along it (1/s).
     fn face(&mut self, face: &Face, head: f64, column: usize, sheared: DVec3) {
         let liquid = self.liquid;
         let weight = -liquid.params.gravity[1] * liquid.columns.heights.length(head);

@@ -1,4 +1,4 @@
-//! What hosts read of a liquid: snapshots, probes, loads on bodies.
+//! What hosts read from a liquid: snapshots, probes, loads on bodies.
 
 pub mod body_loads;
 pub mod probe;

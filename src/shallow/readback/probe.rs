@@ -9,7 +9,7 @@ use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::scalars::check_scalar;
 use crate::shallow::system::Shallow;
 
-/// The liquid as it is read: of a [`Shallow`] or a [`Snapshot`]. Nothing here allocates.
+/// Read access to the liquid of a [`Shallow`] or a [`Snapshot`]. Nothing here allocates.
 #[derive(Clone, Copy)]
 pub struct View<'a> {
     columns: &'a Columns,
@@ -18,7 +18,7 @@ pub struct View<'a> {
     source: Source<'a>,
 }
 
-/// Where velocities and concentrations are from.
+/// Where velocities and concentrations come from.
 #[derive(Clone, Copy)]
 enum Source<'a> {
     Taken(&'a Snapshot),
@@ -34,7 +34,7 @@ pub struct Reading {
     pub layer: usize,
     /// Depth (m); 0 where it is dry.
     pub depth: f64,
-    /// Height of the surface (m); of the ground, where it is dry.
+    /// Height of the surface (m); where it is dry, of the ground.
     pub height: f64,
     /// Mean velocity over the depth (m/s), along x and z.
     pub velocity: [f32; 2],
@@ -43,7 +43,7 @@ pub struct Reading {
 }
 
 impl Shallow {
-    /// The liquid as it is now, to be read.
+    /// The current liquid, for reading.
     pub fn view(&self) -> View<'_> {
         let (columns, depth, active) = (&self.columns, self.flow.depths(), self.flow.active());
         View { columns, depth, active, source: Source::Now(self) }
@@ -51,7 +51,7 @@ impl Shallow {
 }
 
 impl Snapshot {
-    /// The liquid as it was taken, to be read.
+    /// The liquid of the snapshot, for reading.
     pub fn view(&self) -> View<'_> {
         let source = Source::Taken(self);
         View { columns: self.columns(), depth: self.depths(), active: self.active(), source }
@@ -59,20 +59,20 @@ impl Snapshot {
 }
 
 impl View<'_> {
-    /// Liquid (m3; 1 ml is 1e-6) in the box between two corners (m), the low one and the high one: of the columns of cells whose centres lie
-    /// within, or on its sides, what is between both heights. They may be infinite.
+    /// Volume of liquid (m3; 1 ml is 1e-6) in the box between two corners (m), low and high: in columns of cells whose centres lie inside
+    /// or on its sides, the liquid between both heights. Corners may be infinite.
     ///
     /// # Errors
-    /// `Argument`: a number is none, or a low one is above a high one.
+    /// `Argument`: a number is NaN, or a low one is above a high one.
     pub fn volume(&self, low: [f64; 3], high: [f64; 3]) -> Result<f64> {
         check_box(low, high)?;
         Ok(self.cubic_metres(self.units_within(low, high)))
     }
 
-    /// As [`View::volume`], of boxes of two corners each.
+    /// As [`View::volume`], for boxes of two corners each.
     ///
     /// # Errors
-    /// As [`View::volume`], naming the box; `Argument` also where there is not one position for each. Nothing is written.
+    /// As [`View::volume`], naming the box; `Argument` also if there is not one output for each. Nothing is written.
     pub fn volumes(&self, boxes: &[[[f64; 3]; 2]], out: &mut [f64]) -> Result<()> {
         check_room("volumes", out.len(), "boxes", boxes.len())?;
         for (at, [low, high]) in boxes.iter().enumerate() {
@@ -84,11 +84,11 @@ impl View<'_> {
         Ok(())
     }
 
-    /// The mean concentration of a scalar over the liquid in a box, as of [`View::volume`], in its own measure: each column counts by its liquid in
-    /// the box. 0 where there is none.
+    /// The mean concentration of a scalar over the liquid in a box, as in [`View::volume`], in its own unit: each column is weighted by its
+    /// liquid in the box. 0 if there is none.
     ///
     /// # Errors
-    /// As [`View::volume`]; `Argument` also where there is no such scalar.
+    /// As [`View::volume`]; `Argument` also if there is no such scalar.
     pub fn mean_concentration(&self, scalar: usize, low: [f64; 3], high: [f64; 3]) -> Result<f64> {
         check_scalar(scalar, self.scalars())?;
         check_box(low, high)?;
@@ -100,20 +100,20 @@ impl View<'_> {
         Ok(if units > 0 { sum / units as f64 } else { 0.0 })
     }
 
-    /// Liquid on a layer (m3).
+    /// Volume of liquid on a layer (m3).
     pub fn layer_volume(&self, layer: usize) -> f64 {
         let strips = self.columns.strips().iter().zip(self.active).zip(self.depth.as_chunks::<STRIP>().0);
         let own = strips.filter(|((strip, active), _)| **active && strip.layer as usize == layer);
         self.cubic_metres(own.map(|(_, depth)| sum(depth)).sum())
     }
 
-    /// Count of layers: most columns that a cell has.
+    /// Count of layers: the maximum number of columns in a cell.
     pub fn layers(&self) -> usize {
         self.columns.strips().iter().map(|strip| strip.layer as usize + 1).max().unwrap_or(0)
     }
 
-    /// The column at a point (m): of its cell that from whose ground to whose ceiling the point lies, else the nearest one, of two the
-    /// lower. None outside of the domain, and where the ground has a hole.
+    /// The column at a point (m): in its cell, the column that contains the point between ground and ceiling, else the nearest one, or the
+    /// lower of two equally near. None outside the domain, and where the ground has a hole.
     pub fn at(&self, point: [f64; 3]) -> Option<Reading> {
         let [x, y, z] = point;
         let heights = &self.columns.heights;
@@ -136,10 +136,10 @@ impl View<'_> {
         })
     }
 
-    /// As [`View::at`], of each point.
+    /// As [`View::at`], for each point.
     ///
     /// # Errors
-    /// `Argument`: there is not one position for each; nothing is written.
+    /// `Argument`: there is not one output for each; nothing is written.
     pub fn read(&self, points: &[[f64; 3]], out: &mut [Option<Reading>]) -> Result<()> {
         check_room("readings", out.len(), "points", points.len())?;
         out.iter_mut().zip(points).for_each(|(out, point)| *out = self.at(*point));
@@ -162,7 +162,7 @@ impl View<'_> {
         }
     }
 
-    /// The concentration of a scalar that there is, in a column.
+    /// The concentration of an existing scalar in a column.
     fn concentration(&self, scalar: usize, column: usize) -> f32 {
         match self.source {
             Source::Taken(snapshot) => snapshot.concentrations(scalar)[column],
@@ -175,14 +175,15 @@ impl View<'_> {
         units as f64 * (cell * cell * self.columns.heights.unit)
     }
 
-    /// Units of liquid in a box: integers have the same sum in any order.
+    /// Units of liquid in a box: integers, whose sum does not depend on the order.
     fn units_within(&self, low: [f64; 3], high: [f64; 3]) -> i64 {
         let mut units = 0;
         self.each_within(low, high, |_, overlap| units += overlap);
         units
     }
 
-    /// Calls `see` with the columns of a box whose strips are active, and the units of each that lie in it. Heights of the box are rounded to units.
+    /// Calls `see` with the columns of a box in active strips, and the units of each that lie in it. Heights of the box are rounded to
+    /// units.
     #[inline(always)]
     fn each_within(&self, low: [f64; 3], high: [f64; 3], mut see: impl FnMut(usize, i64)) {
         let columns = self.columns;
@@ -200,7 +201,7 @@ impl View<'_> {
     }
 }
 
-/// The cells along an axis (0: x, 1: z) whose centres lie within two positions (m).
+/// The cells along an axis (0: x, 1: z) whose centres lie between two positions (m).
 fn cells(grid: &Grid, axis: usize, low: f64, high: f64) -> Range<usize> {
     let first = |is_before: &dyn Fn(f64) -> bool| {
         let (mut start, mut end) = (0, grid.size[axis]);

@@ -1,4 +1,4 @@
-//! What a renderer reads of the liquid, copied: another thread may look at it while the next frame is computed.
+//! A copy of the liquid for a renderer: another thread may read it while the next frame is computed.
 
 use std::ops::Range;
 
@@ -13,23 +13,23 @@ use crate::shallow::system::Shallow;
 
 /// The liquid after a frame.
 ///
-/// A host that draws in another thread has two: the one that is taken after a frame becomes the one that is drawn, and the other way round.
+/// A host that draws in another thread has two of them: after each frame, the one just taken and the one being drawn are swapped.
 #[derive(Debug)]
 pub struct Snapshot {
-    /// Number of the columns' identity.
+    /// Identity number of the columns.
     terrain: u64,
     columns: Columns,
     depth: Vec<i32>,
     velocity: Vec<[f32; 2]>,
     active: Vec<bool>,
     drops: Vec<Droplet>,
-    /// Of each scalar; empty for those that are not there.
+    /// One per scalar; empty for those that do not exist.
     concentrations: [Vec<f32>; MOST],
     time: f64,
 }
 
 impl Snapshot {
-    /// The liquid as it is now.
+    /// A copy of the current liquid.
     pub fn new(shallow: &Shallow) -> Self {
         let (columns, len) = (shallow.columns.clone(), shallow.columns.len());
         let mut snapshot = Self {
@@ -46,8 +46,8 @@ impl Snapshot {
         snapshot
     }
 
-    /// Takes the liquid as it is now, in place of what was there: the strips that have liquid or had it, and the columns where the terrain has
-    /// changed. Nothing is allocated, unless these are more than there ever were; any liquid will do.
+    /// Takes the current liquid, in place of the previous one: the strips that have or had liquid, and the columns where the terrain has
+    /// changed. Allocates nothing, unless these are more than ever before; it may be another liquid.
     pub fn take(&mut self, shallow: &Shallow) {
         if self.terrain != shallow.identity.number() {
             self.terrain = shallow.identity.number();
@@ -84,7 +84,7 @@ impl Snapshot {
         self.time = shallow.time;
     }
 
-    /// Empties the active strips of a range.
+    /// Clears the active strips of a range.
     fn clear(&mut self, strips: Range<usize>) {
         let first = strips.start;
         for run in runs(&self.active[strips]) {
@@ -111,7 +111,7 @@ impl Snapshot {
         &self.velocity
     }
 
-    /// Concentrations of a scalar by column index, in its own measure, as [`Shallow::concentration`]; empty, if there is no such scalar.
+    /// Concentrations of a scalar by column index, in its own unit, as [`Shallow::concentration`]; empty if there is no such scalar.
     pub fn concentrations(&self, scalar: usize) -> &[f32] {
         self.concentrations.get(scalar).map_or(&[], |numbers| &numbers[..])
     }
@@ -141,7 +141,7 @@ impl Shallow {
     /// As [`Shallow::velocity`], of every column index: the mean velocity over its depth (m/s), along x and z.
     ///
     /// # Errors
-    /// `Argument`: there is not one position for each index.
+    /// `Argument`: there is not one output for each index.
     pub fn velocities(&self, out: &mut [[f32; 2]]) -> Result<()> {
         let len = self.columns.len();
         if out.len() != len {
@@ -183,7 +183,7 @@ fn find_velocities(shallow: &Shallow, run: Range<usize>, out: &mut [[f32; 2]]) {
             for position in 0..STRIP {
                 let depth = depth[strip][position];
                 let each = if depth > 0 { scale / depth as f32 } else { 0.0 };
-                // Without a sign at 0, so that it is the same seen from the other side.
+                // Adding 0 removes the sign of -0, so that the result is the same seen from the other side.
                 let mean = |before: f32, behind: f32| (behind + before) * each + 0.0;
                 out[position] = [
                     mean(west[position], east[strip][position]),

@@ -1,4 +1,4 @@
-//! The rows that change, as they were before.
+//! The rows that change, in their state before the change.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use crate::shallow::solver::Flow;
 pub(super) struct Band {
     /// The rows.
     pub rows: Range<usize>,
-    /// The first of their strips among all.
+    /// Number of their first strip among all.
     pub first: usize,
     pub strips: Vec<Strip>,
     /// First strip of each row, and the end of the last.
@@ -21,17 +21,17 @@ pub(super) struct Band {
     pub ceiling: Vec<i32>,
     pub under: Vec<i32>,
     pub depth: Vec<i32>,
-    /// Flux to the east and to the south, and what truncation left of both.
+    /// Flux to the east and to the south, and the remainders of transfers.
     pub flux: [Vec<f32>; 2],
     pub left: [Vec<f32>; 2],
-    /// Heads over the surface.
+    /// Heads above the surface.
     pub over: Vec<f32>,
     /// Amounts of scalars; empty without them.
     pub amounts: [Vec<f64>; MOST],
 }
 
 impl Band {
-    /// Keeps what some rows are.
+    /// Copies the present state of some rows.
     pub fn save(&mut self, columns: &Columns, flow: &Flow, rows: Range<usize>) {
         let strips = columns.row(rows.start).start..columns.row(rows.end - 1).end;
         self.first = strips.start;
@@ -63,7 +63,7 @@ impl Band {
         self.starts[at] as usize..self.starts[at + 1] as usize
     }
 
-    /// All strips among those of all rows, before.
+    /// The range of its strips among those of all rows, before the change.
     pub fn range(&self) -> Range<usize> {
         self.first..self.first + self.strips.len()
     }

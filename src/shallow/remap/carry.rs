@@ -1,4 +1,4 @@
-//! Fluxes, and what truncation left, of pipes whose columns are those of before. Others begin at 0.
+//! Fluxes and remainders of pipes between columns that existed before. Other pipes start at 0.
 
 use std::ops::Range;
 
@@ -9,10 +9,10 @@ use crate::shallow::pipes::joints::Side;
 use crate::shallow::pipes::{Links, Pipes};
 use crate::shallow::solver::Flow;
 
-/// Flux and what truncation left.
+/// Flux and remainder.
 type Carried = [f32; 2];
 
-/// A link as it was.
+/// A link before the change.
 #[derive(Debug, Clone, Copy)]
 struct OldLink {
     /// Its cell along x.
@@ -26,16 +26,16 @@ struct OldLink {
 /// Buffers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Carry {
-    /// The links of some rows before, and where those of each begin, and the end of the last.
+    /// The former links of some rows; the start of each row's, and the end of the last.
     old: Vec<OldLink>,
     starts: Vec<u32>,
     rows: Range<usize>,
-    /// Of the links of these rows now.
+    /// Of the present links of these rows.
     pub flux: Vec<f32>,
     pub left: Vec<f32>,
 }
 
-/// What is carried from before to now.
+/// The columns before and after the change.
 pub(super) struct Change<'a> {
     pub columns: &'a Columns,
     pub band: &'a Band,
@@ -43,7 +43,7 @@ pub(super) struct Change<'a> {
 }
 
 impl Carry {
-    /// Keeps the links of some rows.
+    /// Saves the links of some rows.
     pub fn save(&mut self, columns: &Columns, links: &Links, flow: &Flow, rows: Range<usize>) {
         self.old.clear();
         self.starts.clear();
@@ -61,14 +61,14 @@ impl Carry {
         self.rows = rows;
     }
 
-    /// Whether the links of these rows now join the columns that they did.
+    /// Whether the links of these rows still join the same columns.
     pub fn is_same(&self, links: &Links) -> bool {
         let ends = links.from.iter().zip(&links.to);
         links.len() == self.old.len()
             && ends.zip(&self.old).all(|((from, to), old)| (*from, *to) == (old.from, old.to))
     }
 
-    /// Finds what the new links of these rows carry.
+    /// Finds the fluxes and remainders of the new links of these rows.
     pub fn links(&mut self, change: &Change, flow: &Flow, links: &Links) {
         self.flux.clear();
         self.left.clear();
@@ -80,7 +80,7 @@ impl Carry {
         }
     }
 
-    /// What a pipe over a side carries between two columns, of which the second is the outside for [`NONE`].
+    /// The former flux and remainder of a pipe over a side between two columns; the second is [`NONE`] for the outside.
     fn of(&self, change: &Change, flow: &Flow, [from, to]: [u32; 2], side: Side) -> Carried {
         let Some(old_from) = change.origins.column(from) else { return [0.0; 2] };
         let old_to = if to == NONE { Some(NONE) } else { change.origins.column(to) };
@@ -101,7 +101,7 @@ impl Carry {
         }
     }
 
-    /// Carries the regular pipes of the band's rows, and those to the south of the row before, which are in place.
+    /// Restores the regular pipes of the band's rows, and those to the south of the row before it, which are still in place.
     pub fn regular(&self, change: &Change, pipes: &Pipes, flow: &mut Flow) {
         let Change { columns, band, origins } = change;
         let rows = band.rows.clone();
@@ -124,8 +124,8 @@ impl Carry {
         }
     }
 
-    /// Carries the pipes of a strip over a side: `kept` are the bits of those between columns that stayed in their strips, of which
-    /// that of the band, if it is in it, is `old`.
+    /// Restores the pipes of a strip over a side. `kept` are the bits of those between columns that stayed in their strips; `old` is the
+    /// former strip, if it is in the band.
     #[expect(clippy::too_many_arguments)]
     fn strip(
         &self,
@@ -171,7 +171,7 @@ impl Carry {
         }
     }
 
-    /// Carries the heads of the band's columns.
+    /// Restores the heads of the band's columns.
     pub fn heads(change: &Change, flow: &mut Flow) {
         let Change { columns, band, origins } = change;
         let over = flow.network.over_mut();
@@ -195,7 +195,7 @@ impl Carry {
 }
 
 impl Change<'_> {
-    /// Where the strip of an index was.
+    /// The former strip of an index.
     fn old_strip(&self, index: u32) -> Strip {
         let (strip, range) = (index as usize / STRIP, self.band.range());
         if range.contains(&strip) {
@@ -206,7 +206,7 @@ impl Change<'_> {
         self.columns.strips()[(strip as u32).wrapping_add(shift) as usize]
     }
 
-    /// What the regular pipe of an old index carried over a side. Those behind the band stay regular.
+    /// The former flux and remainder of the regular pipe of an old index over a side. Pipes behind the band stay regular.
     fn regular(&self, flow: &Flow, index: u32, side: Side) -> Carried {
         let axis = usize::from(side == Side::South);
         let (strip, range) = (index as usize / STRIP, self.band.range());

@@ -1,7 +1,8 @@
-//! What becomes of the liquid of one cell when its columns change.
+//! Moves the liquid of one cell to its new columns.
 //!
-//! A column that was there before keeps its liquid, on its base that rises or sinks. What has no room there is pushed up, into the next
-//! column with room; so is the liquid of a column that is gone, from where it stood. What finds no room above goes down.
+//! A column that existed before keeps its liquid, on its base, which may rise or sink. Liquid without room there is pushed up, into the
+//! next column with room; the same happens to the liquid of a column that has vanished, from the height where it stood. Liquid that finds
+//! no room above goes down.
 
 use crate::shallow::columns::grid::BOTTOMLESS;
 use crate::shallow::scalars::MOST;
@@ -9,10 +10,10 @@ use crate::shallow::scalars::shares::take;
 
 /// No column.
 const NO: u32 = u32::MAX;
-/// Layers for which there is room from the start.
+/// Layers for which capacity is reserved from the start.
 const LAYERS: usize = 16;
 
-/// A column before.
+/// A column before the change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Old {
     pub index: u32,
@@ -21,26 +22,26 @@ pub(super) struct Old {
     pub amounts: [i64; MOST],
 }
 
-/// A column now.
+/// A column after the change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct New {
     pub index: u32,
     pub base: i32,
     pub ceiling: i32,
-    /// The liquid that it gets.
+    /// Depth of the liquid that it receives.
     pub depth: i32,
     /// Index of the column that it was before, or `u32::MAX`.
     pub from: u32,
-    /// Amounts of scalars that it gets.
+    /// Amounts of scalars that it receives.
     pub amounts: [i64; MOST],
 }
 
-/// Liquid that has to find a position.
+/// Liquid that must find a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Parcel {
-    /// It goes to the first column whose ceiling is over this.
+    /// It goes to the first column whose ceiling is above this.
     above: i32,
-    /// Where it stood.
+    /// The height at which it stood.
     height: i32,
     units: i64,
     amounts: [i64; MOST],
@@ -51,21 +52,21 @@ struct Parcel {
 pub(super) struct Cell {
     pub old: Vec<Old>,
     pub new: Vec<New>,
-    /// Underside of the lowest solid now.
+    /// Underside of the lowest solid after the change.
     pub under: i32,
-    /// Bases of several columns that move by more than this are not those of the same column.
+    /// If there are several columns, bases further apart than this are not of the same column.
     pub reach: i64,
     parcels: Vec<Parcel>,
     costs: Vec<i64>,
 }
 
-/// What finds no position in its cell.
+/// Liquid that finds no column in its cell.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Rest {
     pub units: i64,
-    /// The lowest position where it stood.
+    /// The lowest height at which it stood.
     pub height: i32,
-    /// Units that did not stay in their columns, the others included.
+    /// Units that did not stay in their columns, including those that found another one.
     pub displaced: i64,
     /// Amounts of scalars of the units.
     pub amounts: [i64; MOST],
@@ -104,7 +105,7 @@ impl Cell {
         rest
     }
 
-    /// Finds for each new column the old one that it was.
+    /// Finds for each new column the old column that it was.
     fn find_same(&mut self) {
         let reach = self.reach;
         let is_near = |(old, new): (&Old, &New)| (i64::from(old.base) - i64::from(new.base)).abs() <= reach;
@@ -116,7 +117,7 @@ impl Cell {
         }
     }
 
-    /// Pairs columns in order so that the sum of the ways of their bases, and of the reach for each column without a pair, is least.
+    /// Pairs columns in order, minimising the sum of the displacements of their bases, plus the reach for each column without a pair.
     fn align(&mut self) {
         let (rows, width) = (self.old.len(), self.new.len() + 1);
         let way = |old: &Old, new: &New| 2 * (i64::from(old.base) - i64::from(new.base)).abs();
@@ -146,7 +147,7 @@ impl Cell {
         }
     }
 
-    /// Leaves liquid in its columns, and collects what has no room there, from the lowest up.
+    /// Leaves liquid in its columns, and collects what has no room there, from the lowest column up.
     fn keep(&mut self) {
         for old in self.old.iter().filter(|old| old.depth > 0) {
             let (units, amounts) = (i64::from(old.depth), old.amounts);
@@ -163,7 +164,7 @@ impl Cell {
         }
     }
 
-    /// Fills columns with a parcel, from where it goes first up, then from there down; leaves what finds no position.
+    /// Fills columns with a parcel, from its first candidate up, then from there down; the parcel keeps the rest.
     fn position(&mut self, parcel: &mut Parcel) {
         if self.under != BOTTOMLESS && parcel.above < self.under {
             return;
@@ -190,7 +191,7 @@ mod tests {
     use super::*;
     use crate::shallow::columns::grid::TOP;
 
-    /// Remaps columns of (base, depth) to such of [base, ceiling]; returns the depths and what is left.
+    /// Remaps columns of (base, depth) to columns of [base, ceiling]; returns the depths and the rest.
     fn remap(old: &[(i32, i32)], new: &[[i32; 2]]) -> (Vec<i32>, Rest) {
         let mut cell = Cell { under: BOTTOMLESS, reach: 100, ..Cell::default() };
         let column = |(index, &(base, depth)): (usize, &(i32, i32))| Old {
@@ -215,7 +216,7 @@ mod tests {
     fn a_body_in_a_pool_lifts_what_it_displaces() {
         assert_eq!(remap(&[(0, 100)], &[[0, 30], [60, TOP]]).0, [30, 70]);
         assert_eq!(remap(&[(0, 30), (60, 70)], &[[0, TOP]]).0, [100]);
-        // It sinks: what is below it is pushed up through it.
+        // Its base sinks: the liquid from below is pushed up into it.
         assert_eq!(remap(&[(0, 30), (60, 70)], &[[0, 10], [40, TOP]]).0, [10, 90]);
         assert_eq!(remap(&[(0, 30), (60, 70)], &[[40, TOP]]).0, [100]);
     }
@@ -246,7 +247,7 @@ mod tests {
             Old { index: 0, base: 0, depth: 100, amounts: [1000, -50, 7, 0] },
             Old { index: 1, base: 500, depth: 10, amounts: [10, 0, 0, 1 << 40] },
         ];
-        // Thirty units stay, seventy are pushed up into what was the upper column.
+        // Thirty units stay, seventy are pushed up into the former upper column.
         cell.new = vec![dry(0, 0, 30), dry(1, 500, TOP)];
         assert_eq!(cell.remap().amounts, [0; MOST]);
         assert_eq!(cell.new[0].amounts, [300, -15, 2, 0]);

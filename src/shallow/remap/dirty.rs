@@ -1,4 +1,4 @@
-//! Which cells are to be made anew.
+//! The cells that must be rebuilt.
 
 use std::ops::Range;
 
@@ -9,14 +9,14 @@ use crate::shallow::columns::STRIP;
 pub(super) struct Dirty {
     /// Blocks of 16 cells in a row.
     blocks: usize,
-    /// Bits of the cells of each block, row by row.
+    /// Bits of the dirty cells of each block, row by row.
     cells: Vec<u16>,
-    /// The rows with such cells.
+    /// The range of rows with dirty cells.
     rows: Range<usize>,
 }
 
 impl Dirty {
-    /// No cell, of a domain of this size.
+    /// Clears all, for a domain of this size.
     pub fn clear(&mut self, [nx, nz]: [usize; 2]) {
         self.blocks = nx.div_ceil(STRIP);
         self.cells.resize(self.blocks * nz, 0);
@@ -43,7 +43,7 @@ impl Dirty {
         }
     }
 
-    /// The rows between the first and the last such cell.
+    /// The rows from the first to the last dirty cell.
     pub fn rows(&self) -> Range<usize> {
         self.rows.clone()
     }
@@ -53,19 +53,19 @@ impl Dirty {
         self.blocks
     }
 
-    /// Bits of these cells in a block of a row.
+    /// Bits of the dirty cells in a block of a row.
     #[inline]
     pub fn of(&self, row: usize, block: usize) -> u16 {
         self.cells[row * self.blocks + block]
     }
 
-    /// Count of these cells.
+    /// Count of dirty cells.
     pub fn count(&self) -> usize {
         let rows = self.rows.start * self.blocks..self.rows.end * self.blocks;
         self.cells[rows].iter().map(|cells| cells.count_ones() as usize).sum()
     }
 
-    /// All these cells (x, z), row by row along x.
+    /// All dirty cells (x, z), row by row along x.
     pub fn iter(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
         let blocks = self.rows().flat_map(move |row| (0..self.blocks).map(move |block| [block, row]));
         blocks.flat_map(move |[block, row]| {

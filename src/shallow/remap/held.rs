@@ -1,6 +1,6 @@
-//! Liquid that found no room where the terrain moved: it goes to adjacent cells, and waits for what finds no room there either.
+//! Liquid that found no room when the terrain moved: it goes to adjacent cells, and waits if it finds no room there either.
 //!
-//! Shares are whole units that depend on no order, so that a mirrored scene gets the mirrored shares.
+//! Shares are whole units and do not depend on an order, so that a mirrored scene gets mirrored shares.
 
 use crate::shallow::columns::Columns;
 use crate::shallow::columns::grid::BOTTOMLESS;
@@ -12,18 +12,18 @@ use crate::shallow::solver::Flow;
 /// Liquid that waits for room.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Parcel {
-    /// The cell where it was (`Grid::index`).
+    /// The cell that it came from (`Grid::index`).
     pub cell: u32,
-    /// The height where it stood (units).
+    /// The height at which it stood (units).
     pub height: i32,
-    /// How much it is (units), over 0.
+    /// Volume (units), above 0.
     pub units: i64,
-    /// What it carries: an amount of each scalar.
+    /// Amount of each scalar.
     pub amounts: [i64; MOST],
 }
 
 impl Parcel {
-    /// Its cell, height and units, for a saved state, which has amounts apart.
+    /// Its cell, height and units, for a saved state, which stores amounts separately.
     pub(in crate::shallow) fn to_bytes(self) -> [u8; 16] {
         let mut bytes = [0; 16];
         bytes[..4].copy_from_slice(&self.cell.to_le_bytes());
@@ -32,14 +32,14 @@ impl Parcel {
         bytes
     }
 
-    /// As [`Parcel::to_bytes`] has written it; it carries nothing.
+    /// Reads what [`Parcel::to_bytes`] wrote; amounts are 0.
     pub(in crate::shallow) fn from_bytes(bytes: &[u8; 16]) -> Self {
         let all = i128::from_le_bytes(*bytes);
         let (cell, height, units) = (all as u32, (all >> 32) as i32, (all >> 64) as i64);
         Self { cell, height, units, amounts: [0; MOST] }
     }
 
-    /// Whether it may be over such columns.
+    /// Whether it is valid over these columns.
     pub(in crate::shallow) fn is_of(&self, columns: &Columns) -> bool {
         (self.cell as usize) < columns.grid.cells() && self.height >= 0 && self.units > 0
     }
@@ -55,10 +55,10 @@ struct Offer {
     parcel: u32,
 }
 
-/// All liquid that waits.
+/// All liquid that waits for room.
 #[derive(Debug, Clone)]
 pub struct Held {
-    /// At most one of each cell, in their order, after [`Held::settle`].
+    /// At most one of each cell, sorted by cell, after [`Held::settle`].
     parcels: Vec<Parcel>,
     offers: Vec<Offer>,
     /// Columns of a cell in the order in which they are filled.
@@ -73,7 +73,7 @@ impl Default for Held {
 }
 
 impl Held {
-    /// Makes room for so many more parcels.
+    /// Reserves capacity for so many more parcels.
     pub(super) fn reserve(&mut self, parcels: usize) {
         self.parcels.reserve(256 + parcels);
         self.offers.reserve(1024 + 4 * parcels);
@@ -86,7 +86,7 @@ impl Held {
         }
     }
 
-    /// Takes what waits in cells that `is_own` names.
+    /// Removes and returns the parcels in cells for which `is_own` is true.
     pub(in crate::shallow) fn take_out(
         &mut self,
         is_own: impl Fn(usize) -> bool,
@@ -101,7 +101,7 @@ impl Held {
         });
     }
 
-    /// Whether nothing waits.
+    /// Whether no liquid waits.
     pub fn is_empty(&self) -> bool {
         self.parcels.is_empty()
     }
@@ -111,29 +111,29 @@ impl Held {
         self.parcels.iter().map(|parcel| parcel.units).sum()
     }
 
-    /// How much of a scalar waits with it.
+    /// Amount of a scalar in the liquid that waits.
     pub fn amount(&self, scalar: usize) -> i128 {
         self.parcels.iter().map(|parcel| i128::from(parcel.amounts[scalar])).sum()
     }
 
-    /// Other scalars are carried: what waits has nothing of them.
+    /// Clears all amounts, because the scalars have changed.
     pub(in crate::shallow) fn forget_amounts(&mut self) {
         self.parcels.iter_mut().for_each(|parcel| parcel.amounts = [0; MOST]);
     }
 
-    /// What waits, by cell: part of the state.
+    /// The waiting liquid, by cell: part of the state.
     pub fn parcels(&self) -> &[Parcel] {
         &self.parcels
     }
 
-    /// Puts back what [`Held::parcels`] was.
+    /// Restores the parcels that [`Held::parcels`] returned.
     pub fn set(&mut self, parcels: impl Iterator<Item = Parcel>) {
         self.parcels.clear();
         self.parcels.extend(parcels);
     }
 
-    /// Gives what waits to columns with room: of its own cell, then of the four beside it in equal shares. What was in a cell without
-    /// ground and finds no room beside it falls: returns how much (units).
+    /// Gives waiting liquid to columns with room: first of its own cell, then of the four beside it in equal shares. Liquid from a cell
+    /// without ground that finds no room beside it falls: returns how much (units).
     pub(super) fn settle(&mut self, columns: &Columns, flow: &mut Flow) -> i64 {
         if self.parcels.is_empty() {
             return 0;
@@ -152,7 +152,7 @@ impl Held {
                 fallen += parcel.units;
                 flow.amounts.count_in(Account::Lost, &parcel.amounts);
             } else if parcel.units == 0 {
-                // What was cut off from the shares of adjacent cells.
+                // What rounding removed from the shares of adjacent cells.
                 flow.amounts.count_in(Account::Dried, &parcel.amounts);
             }
             parcel.units > 0 && !falls
@@ -160,7 +160,7 @@ impl Held {
         fallen
     }
 
-    /// Makes one parcel of those of a cell, and puts them in order.
+    /// Merges the parcels of each cell, and sorts them.
     pub(in crate::shallow) fn unite(&mut self) {
         self.parcels.sort_unstable();
         self.parcels.dedup_by(|next, first| {
@@ -173,7 +173,7 @@ impl Held {
         });
     }
 
-    /// Offers each parcel to the cells beside it that have room.
+    /// Offers each parcel to the adjacent cells that have room.
     fn offer(&mut self, columns: &Columns, flow: &Flow) {
         let [nx, nz] = columns.grid.size;
         self.offers.clear();
@@ -200,14 +200,14 @@ impl Held {
         }
     }
 
-    /// Fills cells with what they are offered; where that is more than they have room for, all offers shrink by the same share.
+    /// Fills cells with the parcels offered to them; if these exceed the cell's room, all are reduced by the same factor.
     fn take(&mut self, columns: &Columns, flow: &mut Flow) {
         self.offers.retain(|offer| offer.units > 0);
         self.offers.sort_unstable();
         let parcels = &mut self.parcels;
         for offers in self.offers.chunk_by(|a, b| a.cell == b.cell) {
             let offered: i64 = offers.iter().map(|offer| offer.units).sum();
-            // The least room that one of them finds: liquid from below a solid that hangs finds none above it.
+            // The minimum over all offers: liquid from below an overhanging solid finds no room above it.
             let rooms = offers.iter().map(|offer| room(columns, flow, offer.cell, offer.height));
             let room = rooms.min().unwrap_or(0);
             for offer in offers {
@@ -229,7 +229,7 @@ impl Held {
     }
 }
 
-/// Whether a cell has no ground at a height, or it hangs over it.
+/// Whether a cell is void at a height: it has no ground, or only ground that hangs above.
 fn is_void(columns: &Columns, cell: u32, height: i32) -> bool {
     let lowest = columns.of_cell(position(columns, cell)).next();
     lowest.is_none_or(|lowest| {
@@ -248,7 +248,7 @@ fn room_of(columns: &Columns, flow: &Flow, column: usize) -> i64 {
     i64::from(room.max(0))
 }
 
-/// The room of a cell for liquid of a height (units).
+/// The room of a cell for liquid at a height (units).
 fn room(columns: &Columns, flow: &Flow, cell: u32, height: i32) -> i64 {
     if is_void(columns, cell, height) {
         return 0;
@@ -256,7 +256,7 @@ fn room(columns: &Columns, flow: &Flow, cell: u32, height: i32) -> i64 {
     columns.of_cell(position(columns, cell)).map(|column| room_of(columns, flow, column)).sum()
 }
 
-/// Fills the columns of a cell, from that at the parcel's height up, then from there down; leaves what they do not take.
+/// Fills the columns of a cell, from the one at the parcel's height up, then from there down; the parcel keeps the rest.
 fn put(columns: &Columns, flow: &mut Flow, order: &mut Vec<u32>, parcel: &mut Parcel) {
     if is_void(columns, parcel.cell, parcel.height) {
         return;

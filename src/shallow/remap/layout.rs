@@ -11,23 +11,23 @@ use crate::shallow::columns::{Columns, NONE, STRIP, Strip, strip_mut, strip_of};
 use crate::shallow::scalars::MOST;
 use crate::shallow::terrain::solids::Solid;
 
-/// Several bases of a cell that move by more than so many cells are not those of the same column.
+/// If a cell has several columns, bases more than this many cells apart are not of the same column.
 const REACH: f64 = 4.0;
 
 /// Buffers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Layout {
-    /// New layers of each block, row by row.
+    /// Count of layers of each new block, row by row.
     layers: Vec<u32>,
-    /// Strips of each new row.
+    /// Count of strips of each new row.
     pub counts: Vec<u32>,
-    /// Strips of a row before and now.
+    /// Strips of a row before and after the change.
     old: Stacks,
     new: Stacks,
     cell: Cell,
 }
 
-/// What is made anew.
+/// The rows that are rebuilt.
 pub(super) struct Rows<'a, Cast> {
     pub dirty: &'a Dirty,
     pub band: &'a Band,
@@ -67,8 +67,8 @@ impl Layout {
         }
     }
 
-    /// Makes the new columns, for which there is room, and gives them the liquid that has a position in its cell; the rest goes to `held`. Returns how much
-    /// did not stay in its column (units).
+    /// Creates the new columns, for which there must be capacity, and gives them the liquid that finds room in its cell; the rest goes to
+    /// `held`. Returns how much did not stay in its column (units).
     pub fn lay<'s>(
         &mut self,
         rows: &Rows<impl Fn(usize) -> &'s [Solid]>,
@@ -118,7 +118,7 @@ impl Layout {
     }
 }
 
-/// Sets where the strips of a row lie, in order.
+/// Sets the positions of the strips of a row, in order.
 fn place_strips(columns: &mut Columns, row: usize, layers: &[u32]) {
     let mut strips = columns.row(row);
     let most = layers.iter().copied().max().unwrap_or(0);
@@ -135,7 +135,7 @@ fn bits(holds: impl Fn(usize) -> bool) -> u16 {
     (0..STRIP).fold(0, |bits, x| bits | u16::from(holds(x)) << x)
 }
 
-/// Leaves the numbers of a strip, which was another one, in the places that are kept, if any cell of it moves; else all.
+/// Copies the numbers of a strip from its former strip: only those in `kept` if any cell moves, otherwise all.
 #[inline(always)]
 fn keep_strip<T: Copy + Default>(
     now: &mut [T; STRIP],
@@ -151,20 +151,20 @@ fn keep_strip<T: Copy + Default>(
     }
 }
 
-/// The strips that lie above each other, before and now.
+/// The strips above each other, before and after the change.
 struct Block<'a> {
     /// Bits of the cells whose solids change.
     cells: u16,
     /// Strips of the band.
     old: &'a [u32],
-    /// Strips.
+    /// New strips.
     new: &'a [u32],
     band: &'a Band,
     origins: &'a mut Origins,
 }
 
 impl Block<'_> {
-    /// Leaves all as it was.
+    /// Copies everything unchanged.
     fn copy(&mut self, columns: &mut Columns, liquid: &mut Liquid) {
         for (&old, &new) in self.old.iter().zip(self.new) {
             let (old, new, band) = (old as usize, new as usize, self.band);
@@ -185,7 +185,7 @@ impl Block<'_> {
         }
     }
 
-    /// Makes the new columns; `cast` are the solids of the cells that change, by rank.
+    /// Creates the new columns; `cast` gives the solids of the cells that change, by rank.
     fn lay<'s>(&self, columns: &mut Columns, cast: impl Fn(usize) -> &'s [Solid]) {
         let mut solids = [&[][..]; STRIP];
         let mut rank = 0;
@@ -220,7 +220,7 @@ impl Block<'_> {
         }
     }
 
-    /// Leaves liquid where it is in the cells whose columns are the same and have room for it. Returns the bits of all others.
+    /// Leaves liquid where it is in the cells whose columns are the same and have room for it. Returns the bits of all other cells.
     fn keep(&mut self, columns: &Columns, liquid: &mut Liquid, reach: i32) -> u16 {
         let band = self.band;
         let (mut moves, mut any) = (0, 0);
@@ -263,11 +263,11 @@ impl Block<'_> {
                 None => self.origins.keep(new, NONE, 0),
             }
         }
-        // Where there was no column there is nothing to remap.
+        // Cells that had no column have nothing to remap.
         moves & any
     }
 
-    /// Gives the liquid of a cell to its new columns; `see` receives the cell and what finds no position.
+    /// Moves the liquid of a cell to its new columns; `see` receives the cell and the liquid that finds no column.
     fn remap(
         &mut self,
         columns: &Columns,

@@ -1,8 +1,8 @@
-//! Terrain that moves: columns are made anew where it does, and take their liquid along.
+//! Terrain that moves: columns are rebuilt where it does, and keep their liquid.
 //!
-//! Of each cell that changes, columns before and now are matched, and liquid that has no room where it was is pushed up, to other columns of
+//! In each cell that changes, columns before and after are matched. Liquid that has no room where it was is pushed up, to other columns of
 //! the cell, to those beside it, or waits until there is room again (`held.rs`): the total never changes. Only the rows with such cells and
-//! those beside them are touched; when the count of columns changes, those behind move along.
+//! those beside them are touched; if the count of columns changes, the data of the rows behind is shifted.
 
 mod band;
 mod carry;
@@ -35,16 +35,16 @@ pub use held::{Held, Parcel};
 use layout::{Layout, Liquid, Rows};
 use origins::Origins;
 
-/// What a change of the terrain did.
+/// Results of a change of the terrain.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Moved {
-    /// Cells made anew.
+    /// Count of rebuilt cells.
     pub cells: usize,
     /// Liquid that could not stay in its column (m3).
     pub displaced: f64,
-    /// Liquid that waits for room now, in all (m3).
+    /// All liquid that now waits for room (m3).
     pub held: f64,
-    /// Liquid that fell where there is no ground any more (m3); it counts as lost.
+    /// Liquid that fell where there is no longer any ground (m3); it counts as lost.
     pub fallen: f64,
 }
 
@@ -66,7 +66,7 @@ pub struct Remap {
 }
 
 impl Remap {
-    /// With room for so many parcels of liquid that waits, beside those of a terrain that moves.
+    /// With capacity for so many parcels of waiting liquid, besides those of a moving terrain.
     pub(super) fn new(parcels: usize) -> Self {
         let mut remap = Self::default();
         remap.held.reserve(parcels);
@@ -92,8 +92,8 @@ impl Shallow {
         self.update_cells([0..nx, 0..nz], |cell| solids.cell(cell))
     }
 
-    /// Changes the terrain in a box of cells: ranges of x and of z. `solids` are those of its cells, row by row along x, as
-    /// [`Caster::at`](super::terrain::triangles::Caster::at) has them: of each from the lowest up, apart from each other. It is called more than once.
+    /// Changes the terrain in a box of cells: ranges of x and of z. `solids` gives the solids of its cells, row by row along x, as
+    /// [`Caster::at`](super::terrain::triangles::Caster::at) does: for each cell from the lowest up, disjoint. It is called more than once.
     ///
     /// Nothing is allocated while there are no more columns and links than ever before, and no larger box.
     ///
@@ -121,10 +121,10 @@ impl Shallow {
         Ok(self.rebuild_over_bodies())
     }
 
-    /// Sets the solid shapes that move over the terrain, in place of those before.
+    /// Replaces the solid shapes that move over the terrain.
     ///
-    /// Only the cells of those that differ from the shape of the same index before are made anew, and no triangle is cast. Nothing is allocated as for
-    /// [`Shallow::update_cells`], while there are no more shapes.
+    /// Only the cells of shapes that differ from the previous shape of the same index are rebuilt, and no triangle is cast. As for
+    /// [`Shallow::update_cells`], nothing is allocated, provided there are no more shapes than before.
     ///
     /// # Errors
     /// As [`Shape::validate`].
@@ -161,7 +161,7 @@ impl Shallow {
         moved
     }
 
-    /// Makes the dirty cells anew, of solids by their rank among them.
+    /// Rebuilds the dirty cells, from solids by their rank among them.
     fn rebuild<'a>(&mut self, cast: impl Fn(usize) -> &'a [Solid]) -> Moved {
         let rows = self.remap.dirty.rows();
         let volume = self.columns.grid.cell * self.columns.grid.cell * self.columns.heights.unit;
@@ -184,7 +184,7 @@ impl Shallow {
         }
     }
 
-    /// Makes the columns of rows anew and gives them their liquid; returns how much did not stay in its column (units).
+    /// Rebuilds the columns of rows and gives them their liquid; returns how much did not stay in its column (units).
     fn relay<'a>(
         &mut self,
         cast: impl Fn(usize) -> &'a [Solid],
@@ -213,7 +213,7 @@ impl Shallow {
         displaced
     }
 
-    /// Finds the pipes of rows anew, and what they carry; whether the links join the columns that they did.
+    /// Rebuilds the pipes of rows, with their fluxes; returns whether the links still join the same columns.
     fn join(&mut self, rows: Range<usize>) -> bool {
         let Self { columns, pipes, flow, remap, params, falls, apart, .. } = self;
         let Remap { band, origins, carry, finder, ends, links, .. } = remap;
@@ -238,7 +238,7 @@ impl Shallow {
         is_same
     }
 
-    /// Gives liquid that waits for room what there is now; returns what fell into the void (units).
+    /// Gives waiting liquid the room that there is now; returns what fell into the void (units).
     pub(super) fn release(&mut self) -> i64 {
         let fallen = self.remap.held.settle(&self.columns, &mut self.flow);
         self.flow.links.lost += fallen;

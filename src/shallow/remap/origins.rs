@@ -1,17 +1,18 @@
-//! Which column each one was before.
+//! Which former column each column was.
 
 use super::band::Band;
 use crate::shallow::columns::{NONE, STRIP};
 
-/// The columns of a band, and those around it whose indices move with it.
+/// The columns of a band, and those around it whose indices shift.
 #[derive(Debug, Clone)]
 pub(super) struct Origins {
-    /// First strip of the band, and their counts before and now.
+    /// First strip of the band, and its counts of strips before and now.
     first: usize,
     counts: [usize; 2],
-    /// The strip of each strip's layer before, in the band, or [`NONE`], and the bits of its columns that were columns there.
+    /// For each strip, the strip of the same layer before, within the band, or [`NONE`]; and the bits of its columns that were columns
+    /// there.
     strips: Vec<(u32, u16)>,
-    /// Columns that were in other layers: their indices, and those before, in the band.
+    /// Columns that were in other layers: their indices, and the former ones, within the band.
     odd: Vec<[u32; 2]>,
 }
 
@@ -22,7 +23,7 @@ impl Default for Origins {
 }
 
 impl Origins {
-    /// Of a band that gets so many strips.
+    /// Begins a band that will have so many strips.
     pub fn begin(&mut self, band: &Band, count: usize) {
         self.first = band.first;
         self.counts = [band.strips.len(), count];
@@ -31,12 +32,12 @@ impl Origins {
         self.odd.clear();
     }
 
-    /// Says that some columns of a strip were in a strip of the band.
+    /// Records that some columns of a strip were in a strip of the band.
     pub fn keep(&mut self, strip: usize, old: u32, positions: u16) {
         self.strips[strip - self.first] = (old, positions);
     }
 
-    /// Says which column of the band one was, or [`NONE`].
+    /// Records which column of the band a column was, or [`NONE`].
     pub fn set(&mut self, index: u32, old: u32) {
         let (strip, position) = (index as usize / STRIP, index as usize % STRIP);
         let (from, positions) = &mut self.strips[strip - self.first];
@@ -50,22 +51,22 @@ impl Origins {
         }
     }
 
-    /// Ends a band.
+    /// Finishes a band.
     pub fn finish(&mut self) {
         self.odd.sort_unstable();
     }
 
-    /// Columns that were in other layers: their indices, and those before, in the band.
+    /// Columns that were in other layers: their indices, and the former ones, within the band.
     pub fn odd(&self) -> &[[u32; 2]] {
         &self.odd
     }
 
-    /// By how much the numbers of strips behind the band grow, modulo 2^32.
+    /// How much the numbers of strips behind the band grow, modulo 2^32.
     pub fn shift(&self) -> u32 {
         self.counts[1].wrapping_sub(self.counts[0]) as u32
     }
 
-    /// The strip that a strip was, among all, and the bits of its columns that were columns there.
+    /// The former strip of a strip, among all, and the bits of its columns that were columns there.
     #[inline]
     pub fn strip(&self, strip: usize) -> (usize, u16) {
         if strip < self.first {
@@ -78,7 +79,7 @@ impl Origins {
         }
     }
 
-    /// The index that a column had, among all.
+    /// The former index of a column, among all.
     pub fn column(&self, index: u32) -> Option<u32> {
         let position = index as usize % STRIP;
         let (strip, positions) = self.strip(index as usize / STRIP);

@@ -1,4 +1,4 @@
-//! What a changed terrain leaves behind is what a new one would have.
+//! After a change the terrain must be in the same state as a newly created one.
 
 use super::*;
 use crate::context::{Context, Pool};
@@ -31,7 +31,7 @@ fn heights() -> Heights {
     Heights::between(0.0, 1024.0).unwrap()
 }
 
-/// Ground of a few metres, with up to `layers` slabs above; sometimes none.
+/// Ground a few metres high, with up to `layers` slabs above; sometimes none.
 fn cell(dice: &mut Dice, layers: usize) -> Vec<Solid> {
     let mut solids = vec![[BOTTOMLESS, dice.height([0, 4 * METRE])]];
     for layer in 1..=dice.below(layers + 1) as i32 {
@@ -55,7 +55,7 @@ fn params(border: Border) -> Params {
     Params { border, pace: Pace::Realtime(0.01), ..Params::default() }
 }
 
-/// The state of every pipe by its ends, as cells and layers, and side: flux and what truncation left, in order.
+/// The state of every pipe, sorted by its ends (as cells and layers) and side: flux and remainder.
 fn carried(shallow: &Shallow) -> Vec<([usize; 7], [u32; 2])> {
     let (columns, flow, links) = (&shallow.columns, &shallow.flow, &shallow.pipes.links);
     let position = |index: usize| {
@@ -86,7 +86,7 @@ fn carried(shallow: &Shallow) -> Vec<([usize; 7], [u32; 2])> {
     all
 }
 
-/// A liquid on the same terrain with the same state.
+/// A new liquid on the same terrain with the same state.
 fn made_anew(ctx: &Context, shallow: &Shallow, solids: &Solids) -> Shallow {
     let mut new = Shallow::new(ctx, solids, shallow.params.clone()).unwrap();
     assert!(new.columns == shallow.columns, "other columns");
@@ -154,7 +154,7 @@ fn a_changed_terrain_flows_on_like_one_made_anew() {
             shallow
                 .update_cells(area, |at| solids.cell(grid.index([x + at % width, z + at / width])))
                 .unwrap();
-            // The first cell may lie outside of the box.
+            // The first cell may lie outside the box.
             shallow.update_cells([0..1, 0..1], |_| solids.cell(0)).unwrap();
             assert_eq!(shallow.balance().error, 0, "{what}");
             let mut new = made_anew(&ctx, &shallow, &solids);
@@ -197,7 +197,7 @@ fn pipes_of_cells_that_stay_keep_what_they_carry() {
             if both_stay && before[at].1 == *carried {
                 moved[usize::from(ends[2] != ends[5])] += usize::from(carried[0] << 1 != 0);
             } else if both_stay {
-                // What sleeps is still.
+                // Sleeping liquid does not move.
                 let wet = |end: &[usize]| {
                     let column = shallow.columns.column([end[0], end[1]], end[2]);
                     column.is_some_and(|column| shallow.flow.depth[column] > 0)
@@ -236,7 +236,7 @@ fn flux_follows_a_column_into_another_layer() {
     shallow.update_terrain(&solids(grid, &cells)).unwrap();
     assert_eq!(shallow.pipes.links.len(), 4);
     assert!(sum(&shallow) == expected);
-    // Below its neighbour, too: their pipe is regular again.
+    // Another cellar, in the adjacent cell: their pipe is regular again.
     cells[5] = cellar;
     shallow.update_terrain(&solids(grid, &cells)).unwrap();
     assert_eq!(shallow.pipes.links.len(), 5);

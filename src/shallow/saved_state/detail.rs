@@ -1,12 +1,13 @@
-//! The state of a liquid in cells of two sizes: those of both, what flows across the edge between them, and what makes no coarse unit.
+//! The state of a liquid with cells of two sizes: both liquids, the flow across the edge between them, and rests smaller than a coarse
+//! unit.
 //!
 //! | part | bytes |
 //! |---|---|
-//! | header: magic, version, count of scalars, length of all, the near cells, counts of pipes and of cells with a rest, lengths of both states, length of the last step | [`HEADER`] |
-//! | cells with a rest: the cell, nothing, fine units, then an amount of each scalar | 16 each, and 8 |
-//! | pipes along the edge: flux, what truncation left | 8 each |
-//! | states of the fine and of the coarse liquid, as [`super`] has them | |
-//! | hash of all this | [`SEAL`] |
+//! | header: magic, version, count of scalars, total length, the near cells, counts of pipes and of cells with a rest, lengths of both states, length of the last step | [`HEADER`] |
+//! | cells with a rest: the cell, 0, fine units, then an amount of each scalar | 16 each, and 8 |
+//! | pipes along the edge: flux, remainder | 8 each |
+//! | states of the fine and of the coarse liquid, as in [`super`] | |
+//! | hash of everything above | [`SEAL`] |
 
 use xxhash_rust::xxh3::xxh3_128;
 
@@ -24,18 +25,18 @@ const VERSION: u32 = 1;
 const HEADER: usize = 72;
 
 impl Detail {
-    /// The state between two frames: all but the terrain, the parameters, the flow points and the bodies, which the host has. The near cells are part of it. The same
-    /// bytes on any number of threads.
+    /// The state between two frames: everything except the terrain, the parameters, the flow points and the bodies, which the host has. It
+    /// includes the near cells. The same bytes on any number of threads.
     pub fn save(&self) -> Vec<u8> {
         let mut out = vec![0; self.save_size()];
         self.write(&mut out);
         out
     }
 
-    /// As [`Detail::save`], to the beginning of a slice; returns how many bytes. Nothing is allocated.
+    /// As [`Detail::save`], into the beginning of a slice; returns the count of bytes. Nothing is allocated.
     ///
     /// # Errors
-    /// `Argument`: it is shorter than [`Detail::save_size`]; nothing is written.
+    /// `Argument`: the slice is shorter than [`Detail::save_size`]; nothing is written.
     pub fn save_to(&self, out: &mut [u8]) -> Result<usize> {
         let (size, room) = (self.save_size(), out.len());
         let Some(out) = out.get_mut(..size) else {
@@ -53,13 +54,13 @@ impl Detail {
         own + self.fine.save_size() + self.coarse.save_size() + SEAL
     }
 
-    /// Puts a saved state in place of the liquid's, and its near cells: from here it flows as the saved one did, to the same bytes, with the same
-    /// parameters, flow points and bodies, which are set first ([`crate::shallow::Shallow::restore`]). Nothing is allocated where the near cells are those of the
-    /// state.
+    /// Replaces the liquid's state, and its near cells, by a saved one: it continues as the saved liquid did, to the same bytes, with the
+    /// same parameters, flow points and bodies, which must be set first ([`crate::shallow::Shallow::restore`]). Nothing is allocated if the
+    /// near cells are already those of the state.
     ///
     /// # Errors
-    /// `Bytes`, and the liquid is as it was: a state that is not of a liquid in cells of two sizes, of another version, cut short or damaged; else
-    /// as [`crate::shallow::Shallow::restore`].
+    /// `Bytes`, and the liquid is as it was: not a state of a liquid with cells of two sizes; another version; truncated or damaged;
+    /// otherwise as [`crate::shallow::Shallow::restore`].
     pub fn restore(&mut self, bytes: &[u8]) -> Result<()> {
         let saved = Both::read(bytes)?;
         if check_near(&saved.near, self.fine.columns.grid.size).is_err() {
@@ -70,7 +71,7 @@ impl Detail {
             saved.apply(self);
             return Ok(());
         }
-        // Only with these cells its states are of the same columns.
+        // Its states fit the columns only with these near cells.
         let own = self.save();
         self.set_near(saved.near.clone())?;
         let result = saved.check(self);
@@ -84,7 +85,7 @@ impl Detail {
         result
     }
 
-    /// Saves the state into a vector, which is given room for the largest that this liquid can have.
+    /// Saves the state into a vector, with capacity for the largest state that this liquid can have.
     pub(in crate::shallow) fn keep(&self, out: &mut Vec<u8>) {
         let most = [&self.fine, &self.coarse].map(Shallow::most_save_size);
         let rests = rest_bytes(self.scalars().len()) * self.rest.len();
@@ -94,7 +95,7 @@ impl Detail {
         self.write(out);
     }
 
-    /// Puts a state in place that was saved of this liquid, with the same near cells.
+    /// Restores a state that was saved from this liquid, with the same near cells.
     pub(in crate::shallow) fn put_back(&mut self, bytes: &[u8]) {
         let saved = Both::read(bytes);
         debug_assert!(saved.is_ok());
@@ -129,19 +130,19 @@ impl Detail {
     }
 }
 
-/// Bytes of a cell's rest with so many scalars.
+/// Bytes of a cell's rest, with so many scalars.
 fn rest_bytes(scalars: usize) -> usize {
     16 + 8 * scalars
 }
 
-/// A state that is whole, in its parts.
+/// A complete state, in its parts.
 struct Both<'a> {
     near: Cells,
     last: f64,
-    /// Of as many bytes as a cell's rest has.
+    /// In elements of the bytes of a cell's rest.
     rests: &'a [u8],
     scalars: usize,
-    /// Flux, and what truncation left.
+    /// Flux and remainder.
     pipes: &'a [[u8; 4]],
     liquids: [Saved<'a>; 2],
 }
@@ -191,7 +192,7 @@ impl<'a> Both<'a> {
         Ok(Self { near, last, rests, scalars, pipes, liquids })
     }
 
-    /// Whether it is of this liquid, whose near cells are its own.
+    /// Checks that it belongs to this liquid, whose near cells are the same.
     fn check(&self, detail: &Detail) -> Result<()> {
         let [fine, coarse] = &self.liquids;
         fine.check(&detail.fine)?;
@@ -226,7 +227,7 @@ impl<'a> Both<'a> {
         })
     }
 
-    /// Puts the state in place.
+    /// Applies the state.
     fn apply(&self, detail: &mut Detail) {
         let [fine, coarse] = &self.liquids;
         fine.apply(&mut detail.fine);

@@ -1,4 +1,4 @@
-//! What a state begins with, and how much of each part there is.
+//! The header of a state, and the sizes of its parts.
 
 use std::ops::Range;
 
@@ -19,10 +19,10 @@ pub(super) const HEADER: usize = 168;
 pub(super) const SEAL: usize = 16;
 /// Bytes of a strip's share of an array.
 pub(super) const SHARE: usize = 4 * STRIP;
-/// Arrays by column index: depths, two of fluxes, two of what truncation left.
+/// Arrays by column index: depths, two of fluxes, two of remainders.
 pub(super) const ARRAYS: usize = 5;
 
-/// How many of each a state holds.
+/// Counts of the elements in a state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Counts {
     pub(super) runs: usize,
@@ -35,10 +35,10 @@ pub(super) struct Counts {
     pub(super) heads: usize,
     /// Parcels of liquid that waits for room.
     pub(super) parcels: usize,
-    /// Packets in the air, and links that liquid may fall from.
+    /// Packets in the air, and links at which liquid may wait to fall.
     pub(super) packets: usize,
     pub(super) lips: usize,
-    /// What the liquid carries.
+    /// Scalars of the liquid.
     pub(super) scalars: usize,
 }
 
@@ -61,7 +61,7 @@ impl Counts {
         }
     }
 
-    /// As [`Counts::of`], if all columns were wet and full.
+    /// As [`Counts::of`], but as if all columns were wet and full.
     pub(super) fn most_of(shallow: &Shallow) -> Self {
         let strips = shallow.columns.strips().len();
         Self { runs: strips.div_ceil(2), strips, heads: strips, ..Self::of(shallow) }
@@ -85,8 +85,7 @@ impl Counts {
     }
 }
 
-/// What comes first: magic, version, border, hash of the terrain, length of all, counts, times, level outside, sums, when
-/// packets were made last.
+/// First comes: magic, version, border, hash of the terrain, total length, counts, times, level outside, sums, time of the last packets.
 pub(super) struct Header {
     pub(super) border: u32,
     pub(super) terrain: [u8; 16],
@@ -97,12 +96,12 @@ pub(super) struct Header {
     pub(super) still: i32,
     /// Units poured, sourced, drained, absorbed, lost and gained.
     pub(super) sums: [i64; 6],
-    /// Seconds since packets were made, and how often they were.
+    /// Seconds since packets were last created, and how many times they were.
     pub(super) since: f64,
     pub(super) tick: u64,
 }
 
-/// Bytes of a scalar's part without those of columns and parcels.
+/// Bytes of a scalar's part, except those of columns and parcels.
 pub(super) const SCALAR: usize = 32 + 16 * ACCOUNTS;
 
 impl Header {

@@ -1,22 +1,22 @@
-//! The state of the liquid as bytes, and back; from there it flows on to the same bytes.
+//! Saves the state of the liquid as bytes and restores it; a restored liquid continues with the same bytes.
 //!
-//! Numbers are little-endian and are not packed: a game that saves every second has a fraction of a millisecond for it. Of the columns only
-//! those of active strips are there, so that a puddle in a large domain is small.
+//! Numbers are little-endian and uncompressed: a game that saves every second has a fraction of a millisecond for it. Only the columns of
+//! active strips are stored, so that a puddle in a large domain is small.
 //!
 //! | part | bytes |
 //! |---|---|
 //! | header: [`Header`] | [`HEADER`] |
 //! | runs of active strips: the first, and how many | 8 each |
-//! | at least the greatest depth of each row | 4 each |
+//! | upper bound of the depth of each row | 4 each |
 //! | liquid that waits for room: its cell, its height, units | 16 each |
 //! | packets in the air | [`PACKET`] each |
-//! | what waits at links to fall, if the liquid has falls | [`LIP`] each |
-//! | flow points: what it does, nothing, units it waits for, units it has moved | 24 each |
-//! | fluxes of links, then what truncation left of them | 4 each |
+//! | liquid that waits at links to fall, if the liquid has falls | [`LIP`] each |
+//! | flow points: kind, 0, units pending, units moved | 24 each |
+//! | fluxes of links, then remainders of their transfers | 4 each |
 //! | strips of full columns with heads, then their heads | 4 each, then 64 each |
-//! | of each run: depths; fluxes to the east and to the south; what truncation left of both | 5 x 64 a strip |
+//! | of each run: depths; fluxes to the east and to the south; remainders of both | 5 x 64 a strip |
 //! | of each scalar: its part ([`scalars`]) | |
-//! | hash of all this | [`SEAL`] |
+//! | hash of everything above | [`SEAL`] |
 
 mod detail;
 mod header;
@@ -40,16 +40,16 @@ use crate::numeric::cpu::dispatch;
 use header::{ARRAYS, Counts, HEADER, Header, MAGIC, SEAL, SHARE, VERSION};
 use scalars::Scalars;
 
-/// Beyond what a flux can be (units a step): K keeps transfers within the depth of what gives.
+/// Upper bound of a flux (units a step): K limits transfers to the donor's depth.
 const MOST_FLUX: f32 = 2.0 * TOP as f32;
-/// Length of the last step (s), such that the next one's share of a flux is finite.
+/// Valid length of the last step (s): the next one's share of a flux must be finite.
 const LAST: RangeInclusive<f64> = 1e-20..=1e6;
-/// Sums of units, such that three of them fit 64 bits; and units that a flow point waits for.
+/// Valid sums of units, three of which fit 64 bits; and units that a flow point has pending.
 const SUMS: RangeInclusive<i64> = -(1 << 61)..=1 << 61;
 const WAITING: RangeInclusive<f64> = -1e18..=1e18;
 
 impl Shallow {
-    /// The state between two frames: all but the terrain, the parameters and the flow points, which the host has, and
+    /// The state between two frames: everything except the terrain, the parameters and the flow points, which the host has, and
     /// [`Shallow::last_steps`]. The same bytes on any number of threads.
     pub fn save(&self) -> Vec<u8> {
         let counts = Counts::of(self);
@@ -58,17 +58,17 @@ impl Shallow {
         out
     }
 
-    /// As [`Shallow::save`], in place of what a vector holds; nothing is allocated where it has the capacity.
+    /// As [`Shallow::save`], replacing the contents of a vector; nothing is allocated if its capacity suffices.
     pub fn save_into(&self, out: &mut Vec<u8>) {
         let counts = Counts::of(self);
         out.resize(counts.size(), 0);
         self.write(&counts, out);
     }
 
-    /// As [`Shallow::save`], to the beginning of a slice; returns how many bytes.
+    /// As [`Shallow::save`], into the beginning of a slice; returns the count of bytes.
     ///
     /// # Errors
-    /// `Argument`: it is shorter than [`Shallow::save_size`]; nothing is written.
+    /// `Argument`: the slice is shorter than [`Shallow::save_size`]; nothing is written.
     pub fn save_to(&self, out: &mut [u8]) -> Result<usize> {
         let counts = Counts::of(self);
         let (size, room) = (counts.size(), out.len());
@@ -84,16 +84,16 @@ impl Shallow {
         Counts::of(self).size()
     }
 
-    /// Puts a saved state in place of the liquid's: from here it flows as the saved one did, to the same bytes, with the same parameters.
+    /// Replaces the liquid's state by a saved one: with the same parameters it continues as the saved liquid did, to the same bytes.
     ///
-    /// Where the saved liquid had flow points, the same ones are set first ([`Shallow::set_flows`]): what each of them waits for and has
-    /// moved is restored in their order. Their positions and rates are not compared; the terrain is, by a hash, and the border.
-    /// The same scalars are set first, too; what sources and pours carry is not restored. [`Shallow::last_steps`] is empty behind it. Nothing is
-    /// allocated.
+    /// If the saved liquid had flow points, set the same ones first ([`Shallow::set_flows`]): the units that each has pending and has moved
+    /// are restored in order. Positions and rates of flow points are not compared; the border and a hash of the terrain are. Set the same
+    /// scalars first, too; the concentrations of sources and pours are not restored. [`Shallow::last_steps`] is empty afterwards. Nothing
+    /// is allocated.
     ///
     /// # Errors
-    /// `Bytes`, and the liquid is as it was: a state that is not of a shallow liquid, of another version, cut short or damaged; of another
-    /// terrain or border, or with other falls; with another count of flow points, or with other kinds; with other scalars, but for their names.
+    /// `Bytes`, and the liquid is as it was: not a state of a shallow liquid; another version; truncated or damaged; another terrain or
+    /// border, or other falls; another count of flow points, or other kinds; other scalars (names are not compared).
     pub fn restore(&mut self, bytes: &[u8]) -> Result<()> {
         let saved = Saved::read(bytes)?;
         saved.check(self)?;
@@ -101,12 +101,12 @@ impl Shallow {
         Ok(())
     }
 
-    /// Count of bytes that [`Shallow::save`] could return at most, however the liquid flowed from here in a frame.
+    /// Upper bound of the bytes that [`Shallow::save`] could return within the next frame.
     pub(super) fn most_save_size(&self) -> usize {
         Counts::most_of(self).size()
     }
 
-    /// Puts a state in place that was saved of this liquid, on the same columns.
+    /// Restores a state that was saved from this liquid, on the same columns.
     pub(super) fn put_back(&mut self, bytes: &[u8]) {
         let saved = Saved::read(bytes);
         debug_assert!(saved.is_ok());
@@ -161,14 +161,14 @@ impl Shallow {
     }
 }
 
-/// Active strips that have a head of a full column.
+/// Active strips that have the head of a full column.
 fn heads(shallow: &Shallow) -> impl Iterator<Item = (usize, &[f32; STRIP])> {
     let all = shallow.flow.heads().as_chunks::<STRIP>().0;
     let strips = runs(shallow.flow.active()).flatten().map(move |strip| (strip, &all[strip]));
     strips.filter(|(_, heads)| heads.iter().fold(0, |any, head| any | head.to_bits()) != 0)
 }
 
-/// A state that is whole, in its parts.
+/// A complete state, in its parts.
 struct Saved<'a> {
     header: Header,
     runs: &'a [[u8; 8]],
@@ -177,7 +177,7 @@ struct Saved<'a> {
     packets: &'a [[u8; PACKET]],
     lips: &'a [[u8; LIP]],
     points: &'a [[u8; 24]],
-    /// Fluxes, then what truncation left.
+    /// Fluxes, then remainders.
     links: &'a [[u8; 4]],
     head_strips: &'a [[u8; 4]],
     heads: &'a [[u8; SHARE]],
@@ -227,7 +227,7 @@ impl<'a> Saved<'a> {
         })
     }
 
-    /// Whether it is of this liquid, and all numbers are such as a liquid may have.
+    /// Whether it belongs to this liquid, and all numbers are valid.
     fn check(&self, shallow: &Shallow) -> Result<()> {
         let (header, counts) = (&self.header, &self.header.counts);
         if header.terrain != shallow.identity.hash(&shallow.columns) {
@@ -236,7 +236,7 @@ impl<'a> Saved<'a> {
         if header.border != code_of_border(shallow.params.border) {
             return Err(refused("belongs to a liquid with another border"));
         }
-        // On the same terrain only cliffs make other links.
+        // On the same terrain, links differ only because of cliffs.
         let (links, most) =
             (shallow.flow.links.flux.len(), shallow.params.falls.map_or(0, |falls| falls.most));
         if (counts.links, counts.lips) != (links, shallow.falls.waiting().len()) || counts.packets > most {
@@ -336,7 +336,7 @@ impl<'a> Saved<'a> {
         })
     }
 
-    /// Puts the state in place.
+    /// Applies the state.
     fn apply(&self, shallow: &mut Shallow) {
         let Shallow { flow, flows, columns, remap, falls, .. } = &mut *shallow;
         remap.held.set(self.parcels().enumerate().map(|(at, parcel)| self.scalars.with_amounts(at, parcel)));
@@ -377,7 +377,7 @@ impl<'a> Saved<'a> {
     }
 }
 
-/// Whether a number of an array by column index is none that a liquid may have. All are looked at, without branches.
+/// Whether a number in an array by column index is invalid. Tests all, without branches.
 #[inline(always)]
 fn has_bad_columns(saved: &Saved<'_>, columns: &Columns) -> bool {
     let [bases, ceilings] =
@@ -400,7 +400,7 @@ fn has_bad_columns(saved: &Saved<'_>, columns: &Columns) -> bool {
     bad < 0 || is_over_any
 }
 
-/// Whether a float is beyond a bound, or none at all.
+/// Whether a float exceeds a bound or is NaN.
 #[inline(always)]
 fn is_over(numbers: &[[u8; 4]], most: f32) -> bool {
     let most = most.to_bits() as i32;
@@ -408,7 +408,7 @@ fn is_over(numbers: &[[u8; 4]], most: f32) -> bool {
     numbers.iter().fold(0, |bad, number| bad | (most - size(number))) < 0
 }
 
-/// Whether ranges are not empty, in order, apart, and end in time.
+/// Whether ranges are non-empty, in order, disjoint, and end by `count`.
 fn is_in_order(mut ranges: impl Iterator<Item = Range<usize>>, count: usize) -> bool {
     let mut end = 0;
     ranges.all(|range| {
@@ -418,7 +418,7 @@ fn is_in_order(mut ranges: impl Iterator<Item = Range<usize>>, count: usize) -> 
     })
 }
 
-/// What is left to write.
+/// The bytes still to be written.
 struct Put<'a>(&'a mut [u8]);
 
 impl Put<'_> {

@@ -1,10 +1,10 @@
-//! What a state says of scalars, one after another:
+//! The scalars of a saved state, one after another:
 //!
 //! | part | bytes |
 //! |---|---|
-//! | its law, nothing, its range, its half-life, what is due | 4, 4, 8, 8, 8 |
+//! | its law, 0, its range, its half-life, the pending change | 4, 4, 8, 8, 8 |
 //! | sums of amounts, by account | 16 each |
-//! | amounts of liquid that waits for room, of packets in the air, and of what waits at links to fall | 8 each |
+//! | amounts of liquid that waits for room, of packets in the air, and of liquid that waits at links to fall | 8 each |
 //! | of each run of active strips: amounts | 128 a strip |
 
 use std::ops::Range;
@@ -22,12 +22,12 @@ use crate::shallow::scalars::{Law, Scalar};
 use crate::shallow::solver::active::runs;
 use crate::shallow::system::Shallow;
 
-/// Sums of amounts, such that their sum fits 128 bits.
+/// Valid range of a sum of amounts: the total of all fits 128 bits.
 const SUMS: Range<i128> = -(1 << 120)..1 << 120;
-/// Amounts that wait, of units of [`super::SUMS`] at most.
+/// Valid range of amounts in waiting liquid, whose units are within [`super::SUMS`].
 const WAITING: Range<i64> = -(1 << 62)..1 << 62;
 
-/// Writes what a liquid carries.
+/// Writes the scalars of a liquid.
 pub(super) fn put(shallow: &Shallow, to: &mut Put<'_>) {
     let amounts = &shallow.flow.amounts;
     for (at, scalar) in amounts.scalars.iter().enumerate() {
@@ -46,7 +46,7 @@ pub(super) fn put(shallow: &Shallow, to: &mut Put<'_>) {
     }
 }
 
-/// The part of a scalar.
+/// The part of one scalar.
 #[derive(Clone, Copy)]
 struct Part<'a> {
     head: &'a [u8; SCALAR],
@@ -64,7 +64,7 @@ pub(super) struct Scalars<'a> {
 }
 
 impl<'a> Scalars<'a> {
-    /// Finds the parts; more scalars than a liquid may have are only counted.
+    /// Finds the parts; if there are more scalars than a liquid may have, they are only counted.
     pub(super) fn read(from: &mut Reader<'a>, counts: &Counts) -> Result<Self> {
         let mut all = [None; MOST];
         for own in all.iter_mut().take(counts.scalars) {
@@ -80,7 +80,7 @@ impl<'a> Scalars<'a> {
         self.parts.iter().flatten()
     }
 
-    /// Whether the liquid carries the same.
+    /// Checks that the liquid carries the same scalars.
     pub(super) fn check_laws(&self, shallow: &Shallow) -> Result<()> {
         let own = shallow.scalars();
         if self.count != own.len() {
@@ -102,7 +102,7 @@ impl<'a> Scalars<'a> {
         Ok(())
     }
 
-    /// Whether all numbers are such as a liquid may have.
+    /// Whether all numbers are valid for a liquid.
     pub(super) fn has_good_numbers(&self, saved: &Saved) -> bool {
         self.iter().all(|part| {
             let due = part.number(24);
@@ -117,17 +117,17 @@ impl<'a> Scalars<'a> {
         })
     }
 
-    /// A parcel with what it carries.
+    /// A parcel with its amounts.
     pub(super) fn with_amounts(&self, at: usize, parcel: Parcel) -> Parcel {
         Parcel { amounts: self.amounts(|part| part.parcels, at), ..parcel }
     }
 
-    /// A packet with what it carries.
+    /// A packet with its amounts.
     pub(super) fn in_packet(&self, at: usize, packet: Packet) -> Packet {
         Packet { amounts: self.amounts(|part| part.packets, at), ..packet }
     }
 
-    /// What waits at a link, with what it carries.
+    /// Waiting liquid at a link, with its amounts.
     pub(super) fn at_link(&self, at: usize, waiting: Waiting) -> Waiting {
         Waiting { amounts: self.amounts(|part| part.lips, at), ..waiting }
     }
@@ -140,7 +140,7 @@ impl<'a> Scalars<'a> {
         amounts
     }
 
-    /// Puts the amounts of runs in place, and sums.
+    /// Restores the amounts of runs, and the sums.
     pub(super) fn apply(&self, runs: impl Iterator<Item = Range<usize>> + Clone, amounts: &mut Amounts) {
         for (at, part) in self.iter().enumerate() {
             amounts.due[at] = part.number(24);
@@ -165,14 +165,14 @@ impl Part<'_> {
         std::array::from_fn(|account| i128::from_le_bytes(part(self.head, 32 + 16 * account)))
     }
 
-    /// Whether amounts are integers within the range of the depths that a state has, but for what rounding adds, and 0 without liquid.
+    /// Whether amounts are integers within the range that the saved depths allow, plus a tolerance for rounding, and 0 without liquid.
     fn has_good_amounts(&self, saved: &Saved) -> bool {
         let depths = saved.arrays().flat_map(|(_, [depth, ..])| depth.as_flattened().as_chunks::<4>().0);
         let amounts = self.shares.as_flattened().as_chunks::<8>().0;
         depths.zip(amounts).fold(true, |good, (depth, amount)| {
             let (depth, amount) = (i32::from_le_bytes(*depth), f64::from_le_bytes(*amount));
             let most = if depth > 0 { LEVELS * (f64::from(depth) + 1.0) } else { 0.0 };
-            // Also where it is no number.
+            // Also false for NaN.
             good & (amount.abs() <= most) & (nearest(amount) == amount)
         })
     }

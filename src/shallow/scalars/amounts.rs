@@ -1,4 +1,4 @@
-//! The amounts of a liquid's scalars, and where they came from and went.
+//! The amounts of a liquid's scalars, and their balance.
 
 use std::ops::Range;
 
@@ -6,43 +6,43 @@ use super::shares::{LEVELS, Levels, MOST, integer, level, share};
 use super::{Law, Scalar};
 use crate::shallow::columns::per_column::{Array, PerColumn};
 
-/// Decay is counted after so much of a half-life, or a step, if that is longer: in shorter steps thin films would lose less than half an amount, which is
-/// none.
+/// Decay is applied after this part of a half-life, or each step, if that is longer: in shorter intervals thin films would lose less than
+/// half an amount, which rounds to 0.
 const DECAY: f64 = 1.0 / 1024.0;
 
-/// Columns of a flooded network that there is room for from the beginning, and those beside them.
+/// Columns of a flooded network, and those beside them, for which capacity is reserved from the beginning.
 const PARTIES: usize = 2048;
 
-/// Where an amount came from or went.
+/// The origin or destination of an amount.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::shallow) enum Account {
-    /// Poured in, less what was taken.
+    /// Poured in, less what was removed.
     Poured,
-    /// Came through sources.
+    /// Added by sources.
     Sourced,
-    /// Went through drains, and into absorbers.
+    /// Removed by drains, and by absorbers.
     Drained,
     Absorbed,
-    /// Went out of the domain, and came in over its border.
+    /// Out of the domain, and in over its border.
     Lost,
     Gained,
-    /// What the law has added.
+    /// Added by the law.
     Grown,
-    /// What rounding left in columns that ran dry.
+    /// Rounding remainders in columns that ran dry.
     Dried,
 }
 
-/// Accounts of a scalar.
+/// Count of accounts of a scalar.
 pub(in crate::shallow) const ACCOUNTS: usize = Account::Dried as usize + 1;
 
 impl Account {
-    /// Those of flow points go out.
+    /// Accounts of outflow at flow points are negative.
     fn sign(self) -> i128 {
         if matches!(self, Self::Drained | Self::Absorbed) { -1 } else { 1 }
     }
 }
 
-/// What happened to a scalar in a step on some rows (amounts).
+/// Changes of a scalar in a step on some rows (amounts).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::shallow) struct Changes {
     pub lost: i128,
@@ -51,17 +51,17 @@ pub(in crate::shallow) struct Changes {
     pub dried: i128,
 }
 
-/// What a law does in a step.
+/// The effect of a law in a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::shallow) struct Act {
     /// Levels that each unit gains.
     pub grows: f64,
-    /// Part that it loses.
+    /// Part of the amount that is lost.
     pub loses: f64,
 }
 
 impl Act {
-    /// What it does to the amount of so many units, as `obey` in `solver/carry.rs` to that of a column; returns by how much it grows.
+    /// Applies it to the amount of so many units, as `obey` in `solver/transfers/scalars.rs` does to that of a column; returns the growth.
     pub fn change(&self, units: i64, amount: &mut i64) -> i128 {
         let (units, before) = (i128::from(units), i128::from(*amount));
         let kept = before - (*amount as f64 * self.loses).round_ties_even() as i128;
@@ -77,17 +77,17 @@ impl Act {
 #[derive(Debug, Clone)]
 pub(in crate::shallow) struct Amounts {
     pub scalars: Vec<Scalar>,
-    /// Of each scalar, by column index, and a strip more; empty for those that are not there. 0 where there is no liquid.
+    /// For each scalar, by column index, padded by a strip; empty for absent scalars. 0 where there is no liquid.
     pub amounts: [PerColumn<f64>; MOST],
     /// By scalar and account.
     pub sums: [[i128; ACCOUNTS]; MOST],
-    /// Of laws, what is less than they do at once: levels, or seconds.
+    /// Pending effect of each law, too small to be applied: levels, or seconds.
     pub due: [f64; MOST],
-    /// What the laws do in this step.
+    /// The effects of the laws in this step.
     acts: [Act; MOST],
-    /// Concentrations of what is poured.
+    /// Concentrations of poured liquid.
     pub poured: Levels,
-    /// Of the parties of a flooded network; kept, so that nothing is allocated again.
+    /// Levels of the parties of a flooded network; kept to avoid repeated allocation.
     pub party_levels: Vec<f64>,
 }
 
@@ -97,9 +97,9 @@ impl Amounts {
         Self::new(Vec::new(), 0)
     }
 
-    /// None of each scalar in so many indices.
+    /// Amounts 0 of each scalar, for so many indices.
     pub fn new(scalars: Vec<Scalar>, len: usize) -> Self {
-        // Where the arrays begin that a step does not need at the same time.
+        // Alignment offsets of arrays that a step does not use at the same time.
         let positions = [Array::Under, Array::Ceiling, Array::Head, Array::Light];
         let count = scalars.len();
         Self {
@@ -125,19 +125,19 @@ impl Amounts {
         self.amounts.iter().map(PerColumn::bytes).sum()
     }
 
-    /// Gives a part of the columns another count of indices; what they hold is then left over from before.
+    /// Changes the count of indices of a part of the columns; their contents are then unspecified.
     pub fn resize_part(&mut self, part: Range<usize>, len: usize) {
         for amounts in self.amounts.iter_mut().filter(|amounts| !amounts.is_empty()) {
             amounts.resize_part(part.clone(), len, 0.0);
         }
     }
 
-    /// Whether a scalar changes where nothing moves.
+    /// Whether any scalar changes even without motion.
     pub fn has_laws(&self) -> bool {
         self.scalars.iter().any(|scalar| scalar.law != Law::Dye)
     }
 
-    /// What the laws do in this step, by scalar.
+    /// The effects of the laws in this step, by scalar.
     pub fn acts(&self) -> [Act; MOST] {
         self.acts
     }
@@ -174,7 +174,7 @@ impl Amounts {
         }
     }
 
-    /// Liquid came into a column or went out: `before` units were there, `added` came (negative: went); what came has these concentrations.
+    /// Accounts for liquid added to a column (negative: removed): `before` units were there; added liquid has these concentrations.
     pub fn add(&mut self, index: usize, before: i64, added: i64, levels: &Levels, account: Account) {
         for (at, level_in) in levels.iter().enumerate().take(self.count()) {
             let amount = &mut self.amounts[at][index];
@@ -190,26 +190,26 @@ impl Amounts {
         }
     }
 
-    /// Puts amounts into a column, with liquid that was there before.
+    /// Adds amounts to a column, for liquid that has already been added.
     pub fn put(&mut self, index: usize, amounts: &[i64; MOST]) {
         for (at, amount) in amounts.iter().enumerate().take(self.count()) {
             self.amounts[at][index] += *amount as f64;
         }
     }
 
-    /// A law has added so much where no column is.
+    /// Accounts for growth by a law in liquid outside of columns.
     pub fn grow(&mut self, scalar: usize, grown: i128) {
         self.sums[scalar][Account::Grown as usize] += grown;
     }
 
-    /// Counts amounts.
+    /// Adds amounts to an account.
     pub fn count_in(&mut self, account: Account, amounts: &[i64; MOST]) {
         for (sums, amount) in self.sums.iter_mut().zip(amounts) {
             sums[account as usize] += i128::from(*amount);
         }
     }
 
-    /// The sum over all columns of a scalar.
+    /// The sum of a scalar over all columns.
     pub fn inside(&self, scalar: usize) -> i128 {
         let strips = self.amounts[scalar].chunks(1 << 10);
         strips.map(|amounts| i128::from(amounts.iter().map(|&amount| integer(amount)).sum::<i64>())).sum()

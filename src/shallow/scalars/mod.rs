@@ -1,8 +1,9 @@
 //! Scalars that the liquid carries: dye, concentrations, age, temperature.
 //!
-//! A column holds an *amount* of each, an integer: its concentration times its depth (`shares.rs`). Of what a pipe moves out of a column goes the same share
-//! of its amounts, of the concentration at the start of the step (upwind), so that amounts are neither lost nor made: [`Shallow::scalar_balance`]
-//! counts them. Concentrations stay between those that came in, to about a level of 2^20 in their range, and a uniform one stays uniform.
+//! A column holds an *amount* of each, an integer: its concentration times its depth (`shares.rs`). A transfer moves the same share of a
+//! column's amounts as of its liquid, at the concentration at the start of the step (upwind), so that amounts are neither lost nor created:
+//! [`Shallow::scalar_balance`] counts them. Concentrations stay between those of the inflows, to about a level, 2^-20 of their range, and a
+//! uniform one stays uniform.
 
 pub(super) mod amounts;
 pub(super) mod shares;
@@ -16,27 +17,27 @@ use amounts::{ACCOUNTS, Account, Amounts};
 pub use shares::MOST;
 use shares::{LEVELS, Levels};
 
-/// Something that the liquid carries along.
+/// A quantity that the liquid carries along.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scalar {
     /// Its name: not empty, and not that of another scalar.
     pub name: String,
-    /// What becomes of it.
+    /// How it changes.
     pub law: Law,
-    /// Concentrations are within -range to range, in the scalar's own measure, and are kept to a 2^20th of it; 1e-9 to 1e9. Of a dye 1, of a
-    /// temperature over that of the room 100 (K), of an age 3600 (s).
+    /// Concentrations are within -range to range, in the scalar's own measure, and are stored in steps of 2^-20 of it; 1e-9 to 1e9. For
+    /// example 1 for a dye, 100 (K) for a temperature above that of the room, 3600 (s) for an age.
     pub range: f64,
 }
 
-/// What becomes of a scalar but for being carried.
+/// How a scalar changes besides being carried.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Law {
-    /// Nothing: dye, salt, heat.
+    /// It does not: dye, salt, heat.
     Dye,
-    /// Half of it goes in each half-life (s), over 0: heat that a room takes.
+    /// Decays by half in each half-life (s), above 0: heat that is lost to a room.
     Decays(f64),
-    /// It is the time (s) since the liquid came in, in the mean over the liquid of a column, to `range` at most; liquid that comes in is as old as
-    /// its concentration says.
+    /// The time (s) since the liquid came in, averaged over the liquid of a column, clamped to `range`; the age of liquid that comes in is
+    /// its concentration.
     Ages,
 }
 
@@ -45,27 +46,27 @@ pub enum Law {
 pub struct ScalarBalance {
     /// In the columns.
     pub inside: f64,
-    /// Poured in so far, less what was taken.
+    /// Poured in so far, less what was removed.
     pub poured: f64,
-    /// Come in through sources.
+    /// Added by sources.
     pub sourced: f64,
-    /// Gone out through drains.
+    /// Removed by drains.
     pub drained: f64,
-    /// Gone into absorbers.
+    /// Removed by absorbers.
     pub absorbed: f64,
-    /// Gone over the border, or into the void.
+    /// Lost over the border, or into the void.
     pub lost: f64,
-    /// Come in over an absorbing border.
+    /// Entered over an absorbing border.
     pub gained: f64,
-    /// Waiting for room, where the terrain moved.
+    /// Waiting for room after the terrain moved.
     pub held: f64,
     /// In the air ([`Params::falls`](super::Params)).
     pub falling: f64,
-    /// Added by its law; negative: taken.
+    /// Added by its law; negative: removed.
     pub grown: f64,
     /// Left by rounding in columns that ran dry: a few of the smallest amounts for each.
     pub dried: f64,
-    /// What is missing (the smallest amounts): 0.
+    /// Unaccounted for (in smallest amounts): 0.
     pub error: i128,
 }
 
@@ -94,7 +95,7 @@ impl Scalar {
         }
     }
 
-    /// The level of a concentration.
+    /// A concentration in levels.
     fn level(&self, concentration: f64) -> Result<i32> {
         if concentration.abs() <= self.range {
             Ok((concentration / self.range * LEVELS).round() as i32)
@@ -109,11 +110,11 @@ impl Scalar {
 }
 
 impl Shallow {
-    /// Sets what the liquid carries, in place of what it carried before: of each scalar there is nothing yet, and what is poured and what comes through
-    /// sources has none until [`Shallow::set_poured`] and [`Shallow::set_sourced`]. Frames allocate nothing for scalars.
+    /// Sets the scalars that the liquid carries, replacing previous ones. All amounts are 0 at first, and so are the concentrations of
+    /// poured liquid and of sources, until [`Shallow::set_poured`] and [`Shallow::set_sourced`]. Frames allocate nothing for scalars.
     ///
     /// # Errors
-    /// `Argument`: more than [`MOST`] scalars, as [`Scalar::validate`], or two of the same name.
+    /// `Argument`: more than [`MOST`] scalars; one that [`Scalar::validate`] refuses; two of the same name.
     pub fn set_scalars(&mut self, scalars: &[Scalar]) -> Result<()> {
         if scalars.len() > MOST {
             return Err(Error::argument(format!("{} scalars are more than {MOST}", scalars.len())));
@@ -131,24 +132,25 @@ impl Shallow {
         Ok(())
     }
 
-    /// What the liquid carries.
+    /// The scalars that the liquid carries.
     pub fn scalars(&self) -> &[Scalar] {
         &self.flow.amounts.scalars
     }
 
-    /// Sets the concentration of each scalar in what [`Shallow::pour`], [`Shallow::pour_at`] and [`Shallow::fill`] pour from now on; 0 at first.
+    /// Sets the concentration of each scalar in what [`Shallow::pour`], [`Shallow::pour_at`] and [`Shallow::fill`] pour from now on;
+    /// initially 0.
     ///
     /// # Errors
-    /// `Argument`: not one for each scalar, or one beyond its range.
+    /// `Argument`: a count other than that of the scalars, or a concentration beyond its range.
     pub fn set_poured(&mut self, concentrations: &[f64]) -> Result<()> {
         self.flow.amounts.poured = self.levels(concentrations)?;
         Ok(())
     }
 
-    /// Sets the concentration of each scalar in what comes through a flow point that is a source; 0 after [`Shallow::set_flows`].
+    /// Sets the concentration of each scalar in the liquid of a flow point that is a source; 0 after [`Shallow::set_flows`].
     ///
     /// # Errors
-    /// `Argument`: there is no such point, not one concentration for each scalar, or one beyond its range.
+    /// `Argument`: no such point; a count other than that of the scalars; a concentration beyond its range.
     pub fn set_sourced(&mut self, point: usize, concentrations: &[f64]) -> Result<()> {
         let levels = self.levels(concentrations)?;
         self.flows.set_levels(point, levels)
@@ -172,15 +174,15 @@ impl Shallow {
     /// The concentration of a scalar in a column; 0 where it is dry.
     ///
     /// # Panics
-    /// When there is no such scalar or column.
+    /// If there is no such scalar or column.
     pub fn concentration(&self, scalar: usize, column: usize) -> f32 {
         self.flow.amounts.concentration(scalar, column, self.flow.depths()[column])
     }
 
-    /// As [`Shallow::concentration`], of every column index.
+    /// As [`Shallow::concentration`], for every column index.
     ///
     /// # Errors
-    /// `Argument`: there is no such scalar, or not one position for each index.
+    /// `Argument`: no such scalar, or `out` does not have one element for each index.
     pub fn concentrations(&self, scalar: usize, out: &mut [f32]) -> Result<()> {
         check_scalar(scalar, self.scalars().len())?;
         let len = self.columns.len();
@@ -210,7 +212,7 @@ impl Shallow {
     /// Where all of a scalar is.
     ///
     /// # Errors
-    /// `Argument`: there is no such scalar.
+    /// `Argument`: no such scalar.
     pub fn scalar_balance(&self, scalar: usize) -> Result<ScalarBalance> {
         Ok(self.scalar_sums(scalar)?.balance(self.amount_unit(scalar)))
     }
@@ -227,7 +229,7 @@ impl Shallow {
         })
     }
 
-    /// An amount of 1 of a scalar (its own measure x m3).
+    /// The value of an amount of 1 of a scalar (its own measure x m3).
     pub(super) fn amount_unit(&self, scalar: usize) -> f64 {
         let cell = self.columns.grid.cell;
         cell * cell * self.columns.heights.unit * (self.scalars()[scalar].range / LEVELS)
@@ -244,7 +246,7 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    /// Adds so many times another's.
+    /// Adds `times` times another's sums.
     pub fn add(&mut self, other: &Self, times: i128) {
         self.inside += times * other.inside;
         self.held += times * other.held;
@@ -252,7 +254,7 @@ impl Sums {
         self.accounts.iter_mut().zip(other.accounts).for_each(|(sum, other)| *sum += times * other);
     }
 
-    /// The balance, of a measure of an amount of 1.
+    /// The balance, given the value of an amount of 1.
     pub fn balance(&self, unit: f64) -> ScalarBalance {
         let Self { inside, held, falling, accounts } = *self;
         let of = |account: Account| accounts[account as usize];
@@ -284,7 +286,7 @@ pub(super) fn check_scalar(scalar: usize, count: usize) -> Result<()> {
     }
 }
 
-/// Concentrations of the columns from an index on that have these depths.
+/// Concentrations of columns from index `first` on, with these depths.
 pub(super) fn find_concentrations(
     amounts: &Amounts,
     scalar: usize,

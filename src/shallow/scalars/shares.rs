@@ -1,9 +1,9 @@
-//! Amounts: what a column holds of a scalar, as an integer, so that nothing of it is lost or made.
+//! Amounts: how much of a scalar a column holds, as an integer, so that none of it is lost or created.
 //!
-//! An amount is a concentration in *levels*, of which a scalar's range has [`LEVELS`], times a depth in units: at most 2^50. It is kept as an f64, which
-//! is exact for integers up to 2^53, and for which all processors have vector instructions.
+//! An amount is a concentration in *levels* ([`LEVELS`] of which are a scalar's range), times a depth in units: at most 2^50. It is stored
+//! as an f64, which is exact for integers up to 2^53, and for which all processors have vector instructions.
 
-/// The most scalars that a liquid carries.
+/// Maximum count of scalars that a liquid carries.
 pub const MOST: usize = 4;
 
 /// Levels in the range of a scalar.
@@ -12,40 +12,40 @@ pub const LEVELS: f64 = (1 << 20) as f64;
 /// Concentrations of all scalars, in levels.
 pub(in crate::shallow) type Levels = [i32; MOST];
 
-/// Of a number below 2^51 that is added to it nothing is left behind the point: it is rounded to the nearest integer, half-way to an even one.
+/// Adding this to a number below 2^51 leaves no bits for a fraction: the sum is rounded to the nearest integer, ties to even.
 const ROUND: f64 = 1.5 * (1u64 << 52) as f64;
 
-/// The nearest integer to a number below 2^51; of halves the even one.
+/// The nearest integer to a number below 2^51; ties to even.
 #[inline(always)]
 pub(in crate::shallow) fn nearest(number: f64) -> f64 {
     (number + ROUND) - ROUND
 }
 
-/// An integer below 2^51 as one.
+/// Converts an integral number below 2^51.
 #[inline(always)]
 pub(in crate::shallow) fn integer(number: f64) -> i64 {
     (number + ROUND).to_bits().wrapping_sub(ROUND.to_bits()) as i64
 }
 
-/// The concentration (levels) of a column; where it is dry, its amount.
+/// The concentration (levels) of a column; for a dry one, its amount.
 #[inline(always)]
 pub(in crate::shallow) fn level(amount: f64, depth: i32) -> f64 {
     amount / f64::from(depth.max(1))
 }
 
-/// The amount that so many units of a concentration take along. Both steps of rounding keep an order: where the concentration is at most an
-/// integer, the amount is at most that times the units. All units of a column take all of its amount.
+/// The amount in so many units of a concentration. Both roundings are monotonic: where the concentration is at most an integer, the amount
+/// is at most that times the units. All units of a column take its whole amount.
 #[inline(always)]
 pub(in crate::shallow) fn share(level: f64, units: f64) -> f64 {
     nearest(level * units)
 }
 
-/// The part of amounts that so many units of `all` take along, toward 0.
+/// The part of amounts that belongs to `units` out of `all`, rounded toward 0.
 pub(in crate::shallow) fn part(amounts: &[i64; MOST], units: i64, all: i64) -> [i64; MOST] {
     amounts.map(|amount| (i128::from(amount) * i128::from(units) / i128::from(all.max(1))) as i64)
 }
 
-/// Moves the part of amounts that so many units of `all` take along from one to another.
+/// Moves the part of amounts that belongs to `units` out of `all` to others.
 pub(in crate::shallow) fn take(from: &mut [i64; MOST], units: i64, all: i64, to: &mut [i64; MOST]) {
     let part = part(from, units, all);
     for ((from, to), part) in from.iter_mut().zip(to).zip(part) {
@@ -75,7 +75,7 @@ mod tests {
             let moved = share(level, units);
             assert!(moved <= bound * units, "{moved} of {amount} in {units} of {depth}");
             assert_eq!((integer(moved) as f64, integer(-moved) as f64), (moved, -moved));
-            // What is left keeps the bound but for the half that was rounded.
+            // The remainder keeps the bound, except for half an amount of rounding.
             assert!(amount - moved <= bound * (f64::from(depth) - units) + 0.75);
         }
     }

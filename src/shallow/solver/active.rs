@@ -1,7 +1,7 @@
-//! Which strips a step works on: those with liquid and their neighbours, unless they are asleep (`rest.rs`), as runs of each row.
+//! Active strips: those with liquid and their neighbours, unless they are asleep (`rest.rs`). A step works on them as runs of each row.
 //!
-//! Between frames strips fall asleep whose liquid rests, and that of their neighbours, too. Within a frame a strip beside a moving one does not
-//! sleep, so that nothing can come into one that does: as soon as something comes into its neighbour, it is awake.
+//! Strips fall asleep between frames, if their liquid and that of their neighbours rests. Within a frame, a strip beside a moving one does
+//! not sleep. So nothing can enter a sleeping strip: as soon as something enters its neighbour, it wakes.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use super::rest::Still;
 use crate::shallow::columns::{Columns, NONE, STRIP, resize_part, strip_of};
 use crate::shallow::pipes::Links;
 
-/// A run of active strips of a row that are one array, and whose neighbours in the rows before and behind are one array each.
+/// A run of active strips of a row that is contiguous in memory, and whose neighbours in the rows to the north and south are, too.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Span {
     /// First index.
@@ -18,7 +18,7 @@ pub struct Span {
     pub len: u32,
     /// First index of the strips to the south, or [`NONE`].
     pub south: u32,
-    /// First index of the strips to the north, or [`NONE`]: there is none, or it is not worked on.
+    /// First index of the strips to the north, or [`NONE`]: there is none, or steps skip it.
     pub north: u32,
 }
 
@@ -27,34 +27,34 @@ pub struct Span {
 pub struct Active {
     /// Whether each strip had liquid after the last step.
     wet: Vec<bool>,
-    /// Whether each strip is wet or beside a wet one: in all others there is neither liquid nor flow.
+    /// Whether each strip is wet or beside a wet one: all others have neither liquid nor flow.
     active: Vec<bool>,
-    /// Whether what is in each strip may move: an active one whose neighbours rest, too, is asleep.
+    /// Whether the content of each strip may move: an active strip that rests, and whose neighbours rest, too, sleeps.
     moving: Vec<bool>,
     asleep: Vec<bool>,
-    /// Whether one may be asleep.
+    /// Whether any strip may be asleep.
     any_asleep: bool,
-    /// Whether nothing of a row, nor its links, may move: steps pass over it.
+    /// Whether nothing in a row, including its links, may move: steps skip it.
     resting: Vec<bool>,
-    /// Greatest depth of the strips of each row that are asleep (units).
+    /// Maximum depth of the sleeping strips of each row (units).
     asleep_depths: Vec<i32>,
-    /// Whether a column of each strip has room for liquid: walls are never active.
+    /// Whether some column of each strip has room for liquid: walls are never active.
     has_room: Vec<bool>,
-    /// The strips that links lead to from each strip, and where those of each begin.
+    /// The strips that links lead to, for each strip, and where each list begins.
     linked: Vec<u32>,
     linked_starts: Vec<u32>,
     /// First strip of each row, and the end of the last.
     rows: Vec<u32>,
-    /// The spans of each row, from where its strips begin.
+    /// The spans of each row, stored from the position of its first strip.
     spans: Vec<Span>,
     counts: Vec<u32>,
-    /// Rows whose spans are to be found anew.
+    /// Rows whose spans must be found again.
     stale: Vec<bool>,
     any_stale: bool,
 }
 
 impl Active {
-    /// Nothing is active yet.
+    /// Nothing is active at first.
     pub fn new(columns: &Columns, links: &Links) -> Self {
         let (strips, rows) = (columns.strips().len(), columns.grid.size[1]);
         let mut active = Self {
@@ -90,7 +90,7 @@ impl Active {
         }
     }
 
-    /// Finds again which strips are wet and active after the columns of some rows have changed, and with them `links`, if it is given.
+    /// Finds the wet and active strips again after the columns of some rows have changed, and the links if `links` is given.
     pub(super) fn refit(
         &mut self,
         columns: &Columns,
@@ -126,7 +126,7 @@ impl Active {
         }
     }
 
-    /// Lists for each strip those that links lead to, from either end.
+    /// Lists for each strip those at the other ends of its links.
     fn list_linked(&mut self, strips: usize, links: &Links) {
         let Self { linked, linked_starts: starts, .. } = self;
         let pairs = || {
@@ -145,7 +145,7 @@ impl Active {
             linked[*end as usize] = other;
             *end += 1;
         }
-        // Each once.
+        // Removes duplicates.
         let mut count = 0;
         for strip in 0..strips {
             let own = starts[strip] as usize..starts[strip + 1] as usize;
@@ -181,47 +181,47 @@ impl Active {
         &self.spans[first..first + self.counts[row] as usize]
     }
 
-    /// Whether each strip had liquid at the start of the frame, or got wet since.
+    /// Whether each strip had liquid at the start of the frame, or has become wet since.
     pub fn wet(&self) -> &[bool] {
         &self.wet
     }
 
-    /// Whether each strip is wet or beside a wet one: in all others there is neither liquid nor flow.
+    /// Whether each strip is wet or beside a wet one: all others have neither liquid nor flow.
     pub(super) fn active(&self) -> &[bool] {
         &self.active
     }
 
-    /// Whether what is in each strip may move.
+    /// Whether the content of each strip may move.
     pub fn moving(&self) -> &[bool] {
         &self.moving
     }
 
-    /// Whether nothing of a row, nor its links, may move.
+    /// Whether nothing in a row, including its links, may move.
     pub fn rests(&self, row: usize) -> bool {
         self.resting[row]
     }
 
-    /// Whether that is so of all rows.
+    /// Whether nothing may move in any row.
     pub fn all_rest(&self) -> bool {
         !self.resting.contains(&false)
     }
 
-    /// Whether a strip may be asleep.
+    /// Whether any strip may be asleep.
     pub fn may_sleep(&self) -> bool {
         self.any_asleep
     }
 
-    /// Greatest depths of the strips of all rows that are asleep (units).
+    /// Maximum depths of the sleeping strips of all rows (units).
     pub fn asleep_depths(&self) -> &[i32] {
         &self.asleep_depths
     }
 
-    /// Greatest depth of the strips of a row that are asleep (units).
+    /// Maximum depth of the sleeping strips of a row (units).
     pub fn asleep_depth(&self, row: usize) -> i32 {
         self.asleep_depths[row]
     }
 
-    /// Makes the strips of some runs, which are in order, active, and no others but those beside liquid.
+    /// Makes the strips of some runs active, which are in order, and otherwise only those beside liquid.
     pub(super) fn reset(
         &mut self,
         columns: &Columns,
@@ -249,7 +249,7 @@ impl Active {
         self.refresh(columns, depth);
     }
 
-    /// Whether a strip might have a neighbour that is not active. Looks at little: nearly always none has.
+    /// Whether a strip might have an inactive neighbour. A cheap test: nearly always none is.
     fn may_be_alone(&self, columns: &Columns, strip: usize) -> bool {
         let active = |other: u32| other == NONE || self.active[other as usize];
         let next = self.active.get(strip + 1).is_none_or(|next| *next);
@@ -258,7 +258,7 @@ impl Active {
         has_links || !(next && before && active(columns.north(strip)) && active(columns.south(strip)))
     }
 
-    /// Makes no strip of a range active.
+    /// Deactivates the strips of a range.
     fn let_sleep(&mut self, columns: &Columns, strips: std::ops::Range<usize>) {
         let mut strip = find(&self.active[..strips.end], strips.start, true);
         while strip < strips.end {
@@ -268,14 +268,14 @@ impl Active {
         }
     }
 
-    /// Makes a strip that got wet, or was stirred, and its neighbours, active and awake.
+    /// Makes a strip that became wet or was stirred, and its neighbours, active and awake.
     pub fn wake(&mut self, columns: &Columns, strip: usize) {
         (self.wet[strip], self.moving[strip]) = (true, true);
         self.activate(columns, strip);
         self.for_each_beside(columns, strip, |active, other| active.activate(columns, other));
     }
 
-    /// Calls `see` with each strip that a pipe leads to from one.
+    /// Calls `see` with each strip that a pipe leads to from `strip`.
     fn for_each_beside(&mut self, columns: &Columns, strip: usize, mut see: impl FnMut(&mut Self, usize)) {
         let beside = [columns.east(strip), columns.west(strip)];
         beside.into_iter().flatten().for_each(|other| see(self, other));
@@ -287,14 +287,14 @@ impl Active {
         }
     }
 
-    /// Wakes a wet strip that something has come into or gone out of.
+    /// Wakes a wet strip after a transfer into or out of it.
     pub fn stir(&mut self, columns: &Columns, strip: usize) {
         if self.wet[strip] && !self.moving[strip] {
             self.wake(columns, strip);
         }
     }
 
-    /// Wakes all strips: what rests may be decided anew.
+    /// Wakes all strips: what rests must be decided again.
     pub fn rouse_all(&mut self) {
         self.asleep.fill(false);
         self.moving.copy_from_slice(&self.wet);
@@ -314,7 +314,7 @@ impl Active {
         }
     }
 
-    /// The spans of the next row name those of this one.
+    /// Marks a row and the next one, because its spans refer to those of this row.
     fn make_stale(&mut self, row: usize) {
         self.any_stale = true;
         self.stale[row] = true;
@@ -324,7 +324,7 @@ impl Active {
         }
     }
 
-    /// Finds what is wet, and lets strips go that are dry and beside dry ones; `dried` is called with the indices of each.
+    /// Finds the wet strips, and deactivates those that are dry and beside dry ones; `dried` is called with the indices of each.
     pub fn settle(
         &mut self,
         columns: &Columns,
@@ -332,7 +332,7 @@ impl Active {
         mut dried: impl FnMut(std::ops::Range<usize>),
     ) {
         let rows = self.counts.len();
-        // What is asleep stays as wet as it is, and so does what is beside it.
+        // Sleeping strips stay as wet as they are, and so do those beside them.
         let Self { wet, active, asleep, counts, .. } = self;
         for row in (0..rows).filter(|&row| counts[row] > 0) {
             for strip in columns.row(row).filter(|&strip| active[strip] && !asleep[strip]) {
@@ -350,7 +350,7 @@ impl Active {
         }
     }
 
-    /// Lets strips fall asleep that rest, and whose neighbours do.
+    /// Puts strips to sleep that rest, and whose neighbours rest.
     pub fn fall_asleep(&mut self, still: &Still) {
         let (columns, rows) = (still.columns, self.counts.len());
         for row in 0..rows {
@@ -369,7 +369,7 @@ impl Active {
                 }
             }
         }
-        // What began to move beside a strip that is asleep wakes it.
+        // A strip that began to move wakes its sleeping neighbours.
         self.any_asleep = self.asleep.contains(&true);
         for row in 0..rows {
             for strip in if self.any_asleep && self.counts[row] > 0 { columns.row(row) } else { 0..0 } {
@@ -444,7 +444,7 @@ impl Active {
                 south: at(columns.south(strip)),
                 north: at(north),
             };
-            // Also across a gap of cells: the pipe over it is closed.
+            // A span may bridge a gap of cells: the pipe over it is closed.
             let goes_on = |last: &Span| {
                 let follows = |last_at: u32, at: u32| {
                     if last_at == NONE { at == NONE } else { at == last_at + last.len }
@@ -473,7 +473,7 @@ fn has_room(columns: &Columns, strip: usize) -> bool {
     base.iter().zip(ceiling).any(|(base, ceiling)| base < ceiling)
 }
 
-/// Runs of strips that are marked.
+/// Runs of marked strips.
 pub(in crate::shallow) fn runs(marks: &[bool]) -> impl Iterator<Item = std::ops::Range<usize>> + Clone + '_ {
     let mut end = 0;
     std::iter::from_fn(move || {
@@ -483,10 +483,10 @@ pub(in crate::shallow) fn runs(marks: &[bool]) -> impl Iterator<Item = std::ops:
     })
 }
 
-/// The first strip from one on that is marked, or not; else the count of all.
+/// The first strip, from `from` on, whose mark equals `wanted`; otherwise the count of all.
 fn find(marks: &[bool], from: usize, wanted: bool) -> usize {
     let rest = &marks[from..];
-    // Many at once, where none is wanted.
+    // Skips many at once where none matches.
     let has_none = |chunk: &&[bool]| chunk.iter().fold(true, |none, mark| none & (*mark != wanted));
     let skipped = rest.chunks(64).take_while(has_none).map(<[bool]>::len).sum::<usize>();
     from + skipped + rest[skipped..].iter().take_while(|mark| **mark != wanted).count()

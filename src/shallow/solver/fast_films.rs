@@ -1,10 +1,10 @@
-//! Films that outrun waves, and whose inertia therefore counts less.
+//! Fast films: they outrun waves, and their inertia is reduced.
 //!
-//! In a film on a slope a disturbance travels at 3 u. Where waves are slower, at c, the liquid's inertia lets each bump grow: roll waves, which
-//! liquid that carries its momentum along, and has surface tension, grows far more slowly if at all. A pipe between wet columns where
-//! 3 u > c is *fast*: its inertia counts so much less that (c dt / dx)^2 is [`FAST_WAVES`]. What a steady film carries does not depend on its
-//! inertia. Which pipes are fast is found at the start of each frame, from the state alone. Where steps are too long for a disturbance, which would
-//! pass more than a cell in one and grow, a fast pipe is held back.
+//! In a film on a slope a disturbance travels at 3 u. Where waves are slower, at c, the liquid's inertia lets each bump grow: roll waves.
+//! Liquid that advects its momentum and has surface tension grows them far more slowly, if at all. A pipe between wet columns where 3 u > c
+//! is *fast*: its inertia is reduced by a factor with which (c dt / dx)^2 is [`FAST_WAVES`]. The discharge of a steady film does not depend
+//! on its inertia. Which pipes are fast is found at the start of each frame, from the state alone. Where steps are so long that a
+//! disturbance would pass more than a cell in one, and grow, the flux of a fast pipe is limited.
 
 use std::ops::Range;
 
@@ -16,28 +16,28 @@ use crate::shallow::columns::{NONE, STRIP, resize_part, strip_from, strip_of};
 
 /// (c dt / dx)^2 of a fast pipe: below 1/2, the bound of stability.
 pub const FAST_WAVES: f32 = 0.35;
-/// Inertia counts at most so many times less: what is shallower than that is never fast for long.
+/// Maximum inertia factor: shallower films are never fast for long.
 const LIGHTEST: f32 = 16.0;
-/// And at least this many times: what is fast can be told from what is not.
+/// Minimum inertia factor of a fast pipe: it must differ from that of others once packed.
 const HEAVIEST: f32 = 1.0 + 1.0 / 128.0;
 
-/// Inertia of a column's pipes that counts as it is (`packed`).
+/// Inertia factors of a column whose pipes are not fast (`packed`).
 pub const NORMAL: u32 = 0x3f80_3f80;
 
-/// Where inertia counts less.
+/// Where inertia is reduced.
 #[derive(Debug, Clone)]
 pub struct Fast {
-    /// How many times less in the pipes of each column, to the east and to the south ([`packed`]); of rows that have fast pipes.
+    /// Inertia factors of the pipes of each column, to the east and to the south ([`packed`]); of rows that have fast pipes.
     light: PerColumn<u32>,
-    /// Strips of those rows where it does.
+    /// Strips of those rows with fast pipes.
     strips: Vec<bool>,
     rows: Vec<bool>,
 }
 
-/// What is fast is found in.
+/// The liquid that is searched for fast films.
 #[derive(Clone, Copy)]
 pub struct Films<'a> {
-    /// Strips that are worked on.
+    /// Active strips.
     pub active: &'a Active,
     /// H (units).
     pub depth: &'a [i32],
@@ -47,7 +47,7 @@ pub struct Films<'a> {
     pub drive: f32,
 }
 
-/// A span of a row and those to the south of it; the depths have one more than the fluxes: the column to the east.
+/// A span of a row and the columns to the south of it; the depths have one more element than the fluxes: the column to the east.
 #[derive(Clone, Copy)]
 struct Span<'a> {
     depth: &'a [i32],
@@ -62,7 +62,7 @@ impl Fast {
         Self { light, strips: vec![false; columns / STRIP], rows: vec![false; rows] }
     }
 
-    /// Gives a part of the columns another count of indices.
+    /// Changes the count of indices of a part of the columns.
     pub fn resize_part(&mut self, part: Range<usize>, len: usize) {
         self.rows.fill(false);
         resize_part(&mut self.strips, part.start / STRIP..part.end / STRIP, len / STRIP, false);
@@ -79,29 +79,29 @@ impl Fast {
         self.rows[row]
     }
 
-    /// How many times less inertia counts in the pipes of all columns (`packed`).
+    /// Inertia factors of the pipes of all columns (`packed`).
     pub fn light(&self) -> &[u32] {
         &self.light
     }
 
-    /// Of strips in rows with fast pipes, whether they have some.
+    /// Whether each strip has fast pipes; of rows with fast pipes.
     pub fn strips(&self) -> &[bool] {
         &self.strips
     }
 
-    /// Nothing is fast: there is no viscosity.
+    /// Marks nothing as fast: there is no viscosity.
     pub fn clear(&mut self) {
         self.rows.fill(false);
     }
 
-    /// Finds the rows with fast pipes; returns the least power of two, to `farthest`, of cells that no disturbance leaves behind in
+    /// Finds the rows with fast pipes. Returns a power of two, at most `farthest`: the cells within which each disturbance stays during
     /// `step` times the last step.
     pub fn find(&mut self, films: &Films, step: f32, farthest: u32) -> u32 {
         let rows = &mut self.rows[..];
         dispatch!(find_rows(rows: &mut [bool], films: &Films, step: f32, farthest: u32) -> u32)
     }
 
-    /// Finds how much less inertia counts in the fast pipes of those rows, for steps like one.
+    /// Finds the inertia factors of the fast pipes of those rows, for steps like `step`.
     pub fn lighten(&mut self, films: &Films, step: &Step) {
         let fast = self;
         dispatch!(lighten_rows(fast: &mut Fast, films: &Films, step: &Step))
@@ -112,7 +112,7 @@ impl Fast {
 fn find_rows(rows: &mut [bool], films: &Films, step: f32, farthest: u32) -> u32 {
     let mut cells = 1;
     for (row, is_fast) in rows.iter_mut().enumerate() {
-        // Those that were fast mostly still are.
+        // Rows that were fast mostly still are.
         let was_fast = std::mem::take(is_fast);
         for (_, span) in films.row(row) {
             if was_fast || span.may_be_fast(films.drive) {
@@ -136,7 +136,7 @@ fn find_rows(rows: &mut [bool], films: &Films, step: f32, farthest: u32) -> u32 
 fn lighten_rows(fast: &mut Fast, films: &Films, step: &Step) {
     let Fast { light, strips: is_fast, rows } = fast;
     for row in (0..rows.len()).filter(|&row| rows[row]) {
-        // Also of strips that wake in this frame.
+        // Includes strips that wake up during this frame.
         let strips = films.active.strips(row);
         light[strips.start * STRIP..strips.end * STRIP].fill(packed(1.0, 1.0));
         is_fast[strips].fill(false);
@@ -204,16 +204,16 @@ impl<'a> Span<'a> {
         }
     }
 
-    /// Whether one of its pipes could be fast: its greatest flux, if it were through the shallowest.
+    /// Whether one of its pipes could be fast: tests the largest flux with the shallowest depth.
     #[inline(always)]
     fn may_be_fast(&self, drive: f32) -> bool {
-        // Dry columns, behind all others here, have no fast pipes.
+        // Dry columns, which this maps to the maximum, have no fast pipes.
         let behind = |depth: i32| (depth as u32).wrapping_sub(1);
         let (mut greatest, mut shallowest) = ([0; STRIP], [u32::MAX; STRIP]);
         for at in 0..self.strips() {
             let Strip { depth, south_depth, flux: [east, south], .. } = self.strip(at);
             for x in 0..STRIP {
-                // Numbers over 0 are in the order of their bits, and the greatest of integers is found for whole vectors at once.
+                // Positive floats order like their bits, and a maximum of integers vectorises.
                 let [east, south] = [east[x], south[x]].map(|flux| flux.abs().to_bits() as i32);
                 greatest[x] = greatest[x].max(east.max(south));
                 shallowest[x] = shallowest[x].min(behind(depth[x]).min(behind(south_depth[x])));
@@ -225,8 +225,8 @@ impl<'a> Span<'a> {
         is_fast(drive, [shallowest; 2], f32::from_bits(greatest as u32))
     }
 
-    /// Whether one of its pipes is fast, and, where that is asked for, whether a disturbance goes further than a cell in one of those in `step` times
-    /// the last step.
+    /// Whether one of its pipes is fast; with `WAYS`, also whether a disturbance in one of those travels further than a cell in `step`
+    /// times the last step.
     #[inline(always)]
     fn find<const WAYS: bool>(&self, drive: f32, step: f32) -> [bool; 2] {
         let (mut any, mut farther) = ([0; STRIP], [0; STRIP]);
@@ -256,7 +256,7 @@ fn is_fast(drive: f32, depth: [f32; 2], flux: f32) -> bool {
     (9.0 * flux * flux > drive * mean * mean * mean) & (lesser(depth[0], depth[1]) > 0.0)
 }
 
-/// How many times less the inertia of a pipe counts in a step; `drive` is the last step's, in which the flux is.
+/// The inertia factor of a pipe in a step; `drive` is that of the last step, which the flux refers to.
 #[inline(always)]
 fn light_of(drive: f32, step: &Step, depth: [f32; 2], flux: f32) -> f32 {
     let section = lesser(0.5 * (depth[0] + depth[1]), step.section);
@@ -264,19 +264,19 @@ fn light_of(drive: f32, step: &Step, depth: [f32; 2], flux: f32) -> f32 {
     if is_fast(drive, depth, flux) { greater(light, HEAVIEST) } else { 1.0 }
 }
 
-/// As the others, of a link, whose flux is in the last step's measure, about as long as this one.
+/// As `light_of`, for a link: its flux refers to the last step, which is about as long as this one.
 #[inline(always)]
 pub fn light(step: &Step, depth: [f32; 2], flux: f32) -> f32 {
     light_of(step.drive, step, depth, flux)
 }
 
-/// Two numbers in one, each cut to the first half of its bits: what a steady film carries does not depend on them.
+/// Packs two factors, each truncated to its upper 16 bits: the discharge of a steady film does not depend on them.
 #[inline(always)]
 fn packed(east: f32, south: f32) -> u32 {
     east.to_bits() >> 16 | south.to_bits() & 0xffff_0000
 }
 
-/// The numbers of `packed`.
+/// Unpacks the factors of `packed`.
 #[inline(always)]
 pub fn unpacked(both: u32) -> [f32; 2] {
     [both << 16, both & 0xffff_0000].map(f32::from_bits)

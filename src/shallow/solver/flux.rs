@@ -1,16 +1,16 @@
-//! The flux of a pipe: driven by gravity, held back by viscous drag (thesis Eq. 4.1 and 4.5).
+//! The flux of a pipe: driven by gravity, reduced by viscous drag (thesis Eq. 4.1 and 4.5).
 //!
-//! A flux is kept as the depth (units) that it moves in a step: w = f dt / (dx^2 unit). In these, Eq. 4.1 with the wetted section
-//! A = dx H reads w' = zeta w + (dt^2 g unit / dx^2) H (eta_i - eta_j), and Eq. 4.5 w'' = w' H^2 / (H^2 + 3 dt nu (1 + S^2)^2); H is the depth
-//! of the column that gives.
+//! A flux is stored as the depth (units) that it moves in a step: w = f dt / (dx^2 unit). In this form, Eq. 4.1 with the wetted section A =
+//! dx H reads w' = zeta w + (dt^2 g unit / dx^2) H (eta_i - eta_j), and Eq. 4.5 w'' = w' H^2 / (H^2 + 3 dt nu (1 + S^2)^2); in Eq. 4.5 H is
+//! the donor's depth.
 
 use super::fast_films::unpacked;
 use crate::shallow::columns::{STRIP, strip_from, strip_mut, strip_of};
 
-/// The numbers of a step that all pipes share.
+/// The coefficients of a step that all pipes share.
 #[derive(Debug, Clone, Copy)]
 pub struct Step {
-    /// zeta = omega^dt, times the step over the last one, in whose measure fluxes are kept.
+    /// zeta = omega^dt, times the ratio of this step to the last one, which stored fluxes refer to.
     pub kept: f32,
     /// dt^2 g unit / dx^2 (1 / units).
     pub drive: f32,
@@ -18,44 +18,44 @@ pub struct Step {
     pub drag: f32,
     /// [`FAST_WAVES`](super::fast_films::FAST_WAVES) divided by `drive` (units). Divided by a depth: the factor by which the inertia of a fast film is reduced.
     pub lighter: f32,
-    /// The part of a column's depth that a pipe of a fast film moves in a step at most.
+    /// The maximum transfer of a pipe of a fast film in a step, as part of a column's depth.
     pub fastest: f32,
-    /// Greatest depth in the section A (units), for stability; where the section is whole, as in the thesis, its depth dx.
+    /// Maximum depth in the section A (units), for stability; with whole sections, as in the thesis, their depth dx.
     pub section: f32,
-    /// Whether all sections are whole.
+    /// Whether all sections are dx^2.
     pub is_whole: bool,
-    /// How the liquid thins; none: it does not.
+    /// The shear-thinning law; None: constant viscosity.
     pub thinning: Option<Thinning>,
     /// Surface of the liquid at rest beyond the border (units), or BOTTOMLESS: there is none.
     pub still: i32,
-    /// dt (g unit)^1/2 / dx: times the root of a depth (units) it is the way of a wave in a step, in cells.
+    /// dt (g unit)^1/2 / dx: times the root of a depth (units), the distance (cells) that a wave travels in a step.
     pub wave: f32,
-    /// What gravity adds to the fall of the surface over a cell along x and along z (units).
+    /// What gravity adds to the drop of the surface over a cell, along x and along z (units).
     pub tilt: [i32; 2],
-    /// 6/5 nu dt / dx^2: friction beside pipes (`walls`); 0: there is none.
+    /// 6/5 nu dt / dx^2: lateral friction (`lateral_friction`); 0: there is none.
     pub lateral: f32,
-    /// The step over the last one, in whose measure fluxes are kept.
+    /// This step over the last one, which stored fluxes refer to.
     pub again: f32,
     /// Edge of a cell (units).
     pub cell: f32,
-    /// Liquid comes to rest in a pipe whose surfaces differ by so much at most (units),
+    /// Maximum surface difference (units) at which the liquid in a pipe comes to rest,
     pub level: i32,
-    /// and whose flux is at most this part of the depth in its section: both drive nothing visible.
+    /// and maximum flux, as part of the depth in its section: below both no motion is visible.
     pub slow: f32,
 }
 
-/// Carreau's law, of a flux and the depth of the column that gives it.
+/// Carreau's law, as a function of a flux and the donor's depth.
 #[derive(Debug, Clone, Copy)]
 pub struct Thinning {
-    /// 3 lambda dx / (dt unit), with the step in whose measure fluxes are: times flux / depth^2 it is lambda times the shear rate at the ground.
+    /// 3 lambda dx / (dt unit), with the step that fluxes refer to: times flux / depth^2 it is lambda times the shear rate at the ground.
     pub shear: f32,
-    /// The least viscosity, as part of that at rest.
+    /// The minimum viscosity, as part of that at rest.
     pub thinnest: f32,
     /// (n - 1) / 2.
     pub power: f32,
 }
 
-/// What the steps of a flow have in common: chosen once a step, not for each pipe.
+/// Compile-time variants of a step: selected once a step, not for each pipe.
 pub trait Kind {
     /// Whether there is viscosity.
     const VISCOUS: bool;
@@ -65,7 +65,7 @@ pub trait Kind {
     const THINS: bool;
 }
 
-/// A kind of flow: viscous, with whole sections, thinning, or not.
+/// A variant: viscous, with whole sections, shear-thinning, or not.
 pub struct Of<const VISCOUS: bool, const WHOLE: bool, const THINS: bool>;
 
 impl<const VISCOUS: bool, const WHOLE: bool, const THINS: bool> Kind for Of<VISCOUS, WHOLE, THINS> {
@@ -74,20 +74,20 @@ impl<const VISCOUS: bool, const WHOLE: bool, const THINS: bool> Kind for Of<VISC
     const THINS: bool = THINS;
 }
 
-/// The greater number; a single instruction, as neither is ever NaN.
+/// Maximum; a single instruction, as neither number is ever NaN.
 #[inline(always)]
 pub fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// The lesser number.
+/// Minimum.
 #[inline(always)]
 pub fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// What a pipe is to transfer (units): the nearest integer to its flux and what earlier transfers left of theirs; and what this one leaves. Cut
-/// toward zero, what is left would push on in the direction of the flux. A pipe without flux keeps nothing.
+/// The transfer of a pipe (units), which is its flux plus the remainder of earlier transfers, rounded to nearest; and the new remainder. If
+/// it were truncated toward zero, the remainder would keep driving in the direction of the flux. A pipe without flux keeps no remainder.
 #[inline(always)]
 pub fn split(flux: f32, left: f32) -> [f32; 2] {
     let asked = if flux == 0.0 { 0.0 } else { flux + left };
@@ -95,13 +95,13 @@ pub fn split(flux: f32, left: f32) -> [f32; 2] {
     [whole, asked - whole]
 }
 
-/// The flux through a pipe from i to j after a step (units of depth): `fall` is eta_i - eta_j, `depth` H of both (units), `flux` the last flux;
-/// the liquid's inertia counts `light` times less.
+/// The flux through a pipe from i to j after a step (units of depth): `fall` is eta_i - eta_j, `depth` H of both (units), `flux` the last
+/// flux; `light` is the factor by which the liquid's inertia is reduced.
 #[inline(always)]
 pub fn flux_of<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open: f32, light: f32) -> f32 {
     let kept = step.kept * flux;
     let drive = step.drive * light * fall as f32;
-    // The mean depth drives, the same uphill and downhill: with that of the column that gives, waves would gain by each swing.
+    // The mean depth drives, the same uphill and downhill: with the donor's depth, waves would gain energy in each oscillation.
     let section = if K::WHOLE { step.section } else { lesser(0.5 * (depth[0] + depth[1]), step.section) };
     let driven = kept + drive * section;
     let giver = if driven > 0.0 { depth[0] } else { depth[1] };
@@ -111,23 +111,23 @@ pub fn flux_of<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open
         let open = square * open;
         driven * (open / (open + drag))
     } else {
-        // Nothing is held back, but a dry column gives nothing, and a closed pipe lets nothing pass.
+        // No drag, but a dry column gives nothing, and a closed pipe lets nothing pass.
         if giver * open > 0.0 { driven } else { 0.0 }
     }
 }
 
 impl Step {
-    /// A flux, or none, where the surface is level but for less than can be seen and it is slow: all of it comes to rest, so that it can sleep.
+    /// Sets a flux to 0 where it is slow and the surface differs from level by less than is visible, so that the liquid can sleep.
     #[inline(always)]
     pub fn rested<K: Kind>(&self, fall: i32, depth: [f32; 2], flux: f32) -> f32 {
         let section = if K::WHOLE { self.section } else { lesser(0.5 * (depth[0] + depth[1]), self.section) };
         let moves = (fall.abs() > self.level) | (flux.abs() > self.slow * section);
-        // A zero has one sign.
+        // Turns -0 into 0.
         if moves { flux + 0.0 } else { 0.0 }
     }
 
-    /// The flux of a pipe whose inertia counts `light` times less: where that is over 1, it moves so much of the giver's depth at most. Marks
-    /// where it would be more.
+    /// Limits the flux of a pipe whose inertia is reduced (`light` above 1) to a part of the donor's depth. Sets `held` where the limit
+    /// acts.
     #[inline(always)]
     fn held_back(&self, light: f32, depth: [f32; 2], flux: f32, held: &mut i32) -> f32 {
         let most =
@@ -137,7 +137,7 @@ impl Step {
         within
     }
 
-    /// The viscosity of a flux, as part of that at rest; `square` is the square of the depth (units^2).
+    /// The viscosity at a flux, as part of that at rest; `square` is the square of the depth (units^2).
     #[inline(always)]
     pub fn thinned(&self, flux: f32, square: f32) -> f32 {
         let Some(law) = self.thinning else { return 1.0 };
@@ -146,7 +146,7 @@ impl Step {
     }
 }
 
-/// x^p for x from 1 and p from -1/2 to 0, to 1e-5 of it; the same on every processor, and for whole vectors at once.
+/// x^p for x from 1 and p from -1/2 to 0, to a relative 1e-5; the same on every processor, and vectorisable.
 #[inline(always)]
 fn power(x: f32, p: f32) -> f32 {
     const MANTISSA: u32 = 0x7f_ffff;
@@ -158,7 +158,7 @@ fn power(x: f32, p: f32) -> f32 {
     let square = s * s;
     let series = s * (1.0 + square * (1.0 / 3.0 + square * (1.0 / 5.0 + square * (1.0 / 7.0))));
     let log = p * (exponent + 2.0 * std::f32::consts::LOG2_E * series);
-    // 2^log: the nearest integer below or above, and the series of the rest, at most 1/2.
+    // 2^log: the nearest integer exponent, and the series of the rest, at most 1/2.
     let nearest = (log - 0.5) as i32;
     let rest = (log - nearest as f32) * std::f32::consts::LN_2;
     let whole = f32::from_bits(((127 + nearest) as u32) << 23);
@@ -169,8 +169,8 @@ fn power(x: f32, p: f32) -> f32 {
                     + rest * (1.0 / 2.0 + rest * (1.0 / 6.0 + rest * (1.0 / 24.0 + rest * (1.0 / 120.0))))))
 }
 
-/// Columns of a span of a row, and those to the south of them; each array has the span's length, `base` and `depth` one more: the columns
-/// to the east.
+/// Columns of a span of a row, and those to the south of them. Each array has the span's length; `base` and `depth` have one more element,
+/// for the column to the east.
 pub struct Row<'a> {
     /// b (units).
     pub base: &'a [i32],
@@ -182,24 +182,24 @@ pub struct Row<'a> {
     pub south_depth: &'a [i32],
     /// Openness to the east and to the south.
     pub open: [&'a [f32]; 2],
-    /// How much less inertia counts to the east and to the south, where it does (`fast::packed`).
+    /// Inertia factors of the pipes to the east and to the south, where reduced (`fast_films::packed`).
     pub light: &'a [u32],
-    /// In which strips it does.
+    /// Strips in which some are reduced.
     pub is_light: &'a [bool],
 }
 
-/// What the pipes of a span carry, to the east and to the south.
+/// State of a span's pipes, to the east and to the south.
 pub struct Carried<'a> {
     /// Flux (units a step).
     pub flux: [&'a mut [f32]; 2],
-    /// What transfers left (units).
+    /// Remainders of transfers (units).
     pub left: [&'a mut [f32]; 2],
-    /// What is to be transferred (units).
+    /// Transfers of this step (units).
     pub transfer: [&'a mut [f32]; 2],
 }
 
-/// Computes the fluxes of a span's pipes, and what these are to transfer; whether one of a fast film was held back. What is slow comes to rest, if it
-/// may.
+/// Computes the fluxes and transfers of a span's pipes; returns whether one of a fast film was limited. With `RESTS`, slow liquid comes to
+/// rest.
 #[inline(always)]
 pub fn flux_row<K: Kind, const LIGHT: bool, const RESTS: bool>(
     step: &Step,
@@ -245,7 +245,7 @@ pub fn flux_row<K: Kind, const LIGHT: bool, const RESTS: bool>(
     LIGHT && held != [0; STRIP]
 }
 
-/// As [`flux_row`], with fluxes to the east and to the south that are known (`walls`).
+/// As [`flux_row`], for fluxes to the east and to the south that are already solved (`lateral_friction`).
 #[inline(always)]
 pub fn solved_row<const LIGHT: bool>(step: &Step, row: &Row, solved: [&[f32]; 2], carried: Carried) -> bool {
     let mut held = [0; STRIP];
@@ -297,8 +297,8 @@ struct Ends<'a> {
     light: &'a [u32; STRIP],
 }
 
-/// Fluxes of a strip's pipes to the east or to the south. A strip has a fixed length, and each array that changes is an argument of its own:
-/// the compiled code then neither tests for overlapping arrays before a row nor ends it column by column.
+/// Fluxes of a strip's pipes to the east or to the south. A strip has a fixed length, and each array that changes is a separate argument:
+/// so the compiler emits neither overlap tests before a row nor a scalar loop at its end.
 #[inline(always)]
 fn flux_strip<K: Kind, const LIGHT: bool, const RESTS: bool, const AXIS: usize>(
     step: &Step,
@@ -341,7 +341,7 @@ mod tests {
     }
 
     impl Step {
-        /// A step of nothing.
+        /// A step with all coefficients 0.
         pub(in crate::shallow::solver) fn still() -> Self {
             Self {
                 kept: 1.0,

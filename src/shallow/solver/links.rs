@@ -1,4 +1,4 @@
-//! Flow through links: pipes between layers, and out of the domain. Few, and one at a time.
+//! Flow through links: pipes between layers, and out of the domain. They are few, and processed one at a time.
 
 use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
 use std::ops::Range;
@@ -10,7 +10,7 @@ use super::rows::band_views::LinkPart;
 use crate::shallow::pipes::Links;
 use crate::shallow::scalars::MOST as SCALARS;
 
-/// Beyond what any column has (units): sums of transfers stay within 64 bits.
+/// Clamp on transfers, beyond any column's depth (units): their sums fit 64 bits.
 const MOST: f32 = 2.1e9;
 
 /// The flow through each link.
@@ -18,15 +18,15 @@ const MOST: f32 = 2.1e9;
 pub struct LinkFlow {
     /// Flux (units a step).
     pub flux: Vec<f32>,
-    /// What truncation left (units).
+    /// Remainder of the transfer (units).
     pub left: Vec<f32>,
     /// Transfer in this step (units).
     pub transfer: Vec<f32>,
-    /// What went over it freely in the last step: amounts of each scalar that the liquid carries.
+    /// Amounts of each scalar that fell freely over each link in the last step.
     pub fallen: [Vec<f64>; SCALARS],
-    /// Units that left the domain since the flow began.
+    /// Units that have left the domain so far.
     pub lost: i64,
-    /// Units that came in over an absorbing border.
+    /// Units that have entered over an absorbing border.
     pub gained: i64,
 }
 
@@ -37,14 +37,14 @@ impl LinkFlow {
         Self { flux: none.clone(), left: none.clone(), transfer: none, ..Self::default() }
     }
 
-    /// What falls freely has so many scalars.
+    /// Sets the count of scalars of liquid that falls freely.
     pub(super) fn carry(&mut self, scalars: usize) {
         for (at, fallen) in self.fallen.iter_mut().enumerate() {
             *fallen = vec![0.0; if at < scalars { self.flux.len() } else { 0 }];
         }
     }
 
-    /// Puts links with other flow in place of some.
+    /// Replaces a range of links by others with these fluxes and remainders.
     pub(in crate::shallow) fn replace(
         &mut self,
         part: Range<usize>,
@@ -66,18 +66,18 @@ impl LinkFlow {
     }
 }
 
-/// Units that went out of the domain and came in from there.
+/// Units that crossed the border of the domain.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Outside {
-    /// Went out.
+    /// Out of it.
     pub lost: i64,
-    /// Came in.
+    /// Into it.
     pub gained: i64,
 }
 
 impl LinkPart<'_> {
-    /// Computes the flux and the transfer of the links that a row owns; `first` is the part's first link, `depth` H of columns of this row and
-    /// the next one.
+    /// Computes the flux and the transfer of the links that a row owns; `first` is the part's first link, `depth` gives H of columns of
+    /// this row and the next one.
     pub fn drive<K: Kind>(
         &mut self,
         step: &Step,
@@ -93,7 +93,7 @@ impl LinkPart<'_> {
             let own = depth(i);
             let at = link - first;
             let (eta, beyond, is_still) = match links.to[link] {
-                // As into the void, whatever lies below.
+                // Whatever lies below, as into the void.
                 _ if lips.at(link) == Fall::Ahead => (base[i] - edge(columns), 0, false),
                 j if lips.at(link) == Fall::Back => {
                     let (base, depth) = (base[j as usize], depth(j as usize));
@@ -118,7 +118,8 @@ impl LinkPart<'_> {
         }
     }
 
-    /// Computes the flux and the transfer of a link that liquid falls freely over from its second column, of its fall and depth (units).
+    /// Computes the flux and the transfer of a link that liquid falls freely from at its second column, given its surface drop and depth
+    /// (units).
     fn drive_back<K: Kind>(&mut self, step: &Step, at: usize, fall: i32, depth: i32, open: f32) {
         let (flux, depth) = (-self.flux[at], [depth as f32, 0.0]);
         let light = if K::VISCOUS && !K::WHOLE { fast_films::light(step, depth, flux) } else { 1.0 };
@@ -128,8 +129,8 @@ impl LinkPart<'_> {
         (self.transfer[at], self.left[at]) = (transfer.clamp(-MOST, MOST), left);
     }
 
-    /// Calls `add` with each column of some that gives through a link of a row, or takes, and how much (units, rounded up, so that sums do not
-    /// depend on their order).
+    /// Calls `add` with each column that gives (or receives) through a link of a row, and how much (units, rounded up to integers, so that
+    /// sums do not depend on their order).
     pub fn each(
         &self,
         links: &Links,
@@ -149,7 +150,7 @@ impl LinkPart<'_> {
         }
     }
 
-    /// Multiplies the transfers and fluxes of the links that a row owns by a factor of the column that gives, or of the one that takes.
+    /// Multiplies the transfers and fluxes of the links that a row owns by a factor of the donor or of the receiver.
     pub fn scale(
         &mut self,
         links: &Links,
@@ -169,8 +170,8 @@ impl LinkPart<'_> {
         }
     }
 
-    /// Finds the units that the links of a row transfer; `change` is called with each column and what it gains. What falls freely leaves its
-    /// column only.
+    /// Applies the transfers of a row's links in whole units; `change` is called with each column and its gain. Liquid that falls freely
+    /// only leaves its column.
     pub fn move_units(
         &mut self,
         links: &Links,
@@ -181,7 +182,7 @@ impl LinkPart<'_> {
     ) {
         for link in links.row(row) {
             let transfer = self.transfer[link - first];
-            // K keeps it within 32 bits.
+            // K limits it to 32 bits.
             let units = transfer as i32;
             if units == 0 {
                 continue;
@@ -207,14 +208,15 @@ impl LinkPart<'_> {
     }
 }
 
-/// What lies at the far end of a link that leaves the domain: its surface and its depth over the link's column (units), and whether it is liquid at rest.
+/// The far end of a link that leaves the domain: its surface and its depth above the base of the link's column (units), and whether it is
+/// liquid at rest.
 pub(super) fn beyond(links: &Links, columns: &Columns, link: usize, still: i32) -> (i32, i32, bool) {
     let (eta, is_still) = links.outside(columns, link, still);
     (eta, if is_still { eta - columns.bases()[links.from[link] as usize] } else { 0 }, is_still)
 }
 
-/// The flux of a wave that leaves over the border (units a step): a surface that stands `fall` over the one at rest goes out at the speed of
-/// waves (Sommerfeld's condition), and what came is not thrown back.
+/// The flux of a wave that leaves over the border (units a step): a surface that is `fall` above the one at rest flows out at the speed of
+/// waves (Sommerfeld's condition), and waves are not reflected.
 fn radiated(step: &Step, fall: i32, depth: [f32; 2]) -> f32 {
     let mean = if step.is_whole { step.section } else { lesser(0.5 * (depth[0] + depth[1]), step.section) };
     if fall.saturating_abs() <= step.level { 0.0 } else { lesser(step.wave * mean.sqrt(), 1.0) * fall as f32 }

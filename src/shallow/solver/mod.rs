@@ -1,9 +1,10 @@
 //! The state of the liquid, and one step of it (thesis 4.1.2, Alg. 4.1).
 //!
-//! A step goes over the rows once (`rows.rs`): fluxes (`flux.rs`, `solver/fast_films.rs`, `links.rs`), their scaling (`solver/transfers/scale.rs`), and transfers (`solver/transfers/whole_units.rs`), on the
-//! strips that are wet or beside wet ones, unless all rests there (`active.rs`, `rest.rs`), by one band of rows for each thread (`solver/rows/bands.rs`,
-//! `solver/rows/band_views.rs`). Columns that are full up to their ceiling are a network of their own, found first (`solver/pressurised/network.rs`, `solver/pressurised/heads.rs`, `solver/transfers/limiter.rs`); then friction
-//! beside pipes, if it is wanted (`walls`). What the liquid carries follows transfers (`carry.rs`).
+//! A step is one pass over the rows (`rows/`): fluxes (`flux.rs`, `fast_films.rs`, `links.rs`), their scaling (`transfers/scale.rs`) and
+//! transfers (`transfers/whole_units.rs`), on the strips that are wet or beside wet ones, unless these are at rest (`active.rs`,
+//! `rest.rs`), with one band of rows for each thread (`rows/bands.rs`, `rows/band_views.rs`). Columns that are full to their ceiling form a
+//! separate network, which is solved first (`pressurised/network.rs`, `pressurised/heads.rs`, `transfers/limiter.rs`); then lateral
+//! friction, if enabled (`lateral_friction/`). Scalars follow transfers (`transfers/scalars.rs`).
 
 pub(super) mod active;
 pub mod fast_films;
@@ -47,25 +48,25 @@ pub struct Flow {
     pub(super) depth: PerColumn<i32>,
     /// Flux to the east and to the south (units in a step of `last`).
     pub(super) flux: [PerColumn<f32>; 2],
-    /// What truncation left of transfers to the east and to the south (units).
+    /// Remainders of transfers to the east and to the south (units).
     pub(super) left: [PerColumn<f32>; 2],
     pub(super) links: LinkFlow,
     pub(super) lips: Lips,
     active: Active,
     bands: Bands,
     pub(super) network: Network,
-    /// Length of the step in whose measure fluxes are (s).
+    /// The step length (s) that fluxes refer to.
     pub(super) last: f64,
     fast: Fast,
-    /// Friction beside pipes.
+    /// Lateral friction of pipes.
     pub(super) walls: Walls,
-    /// What it carries.
+    /// Amounts of scalars.
     pub(super) amounts: Amounts,
     /// Whether nothing sleeps, for comparison.
     is_sleepless: bool,
 }
 
-/// What a restored state replaces.
+/// The parts that a restored state replaces.
 pub(super) struct Stored<'a> {
     /// Whether each strip is worked on.
     pub active: &'a [bool],
@@ -75,18 +76,18 @@ pub(super) struct Stored<'a> {
     pub numbers: [&'a mut [f32]; 4],
     /// As [`Flow::heads`].
     pub heads: &'a mut [f32],
-    /// Among others, the greatest depths of rows.
+    /// Including upper bounds of the depths of rows.
     pub bands: &'a mut Bands,
     /// Flow through links.
     pub links: &'a mut LinkFlow,
     /// Length of the last step (s).
     pub last: &'a mut f64,
-    /// What it carries.
+    /// Amounts of scalars.
     pub amounts: &'a mut Amounts,
 }
 
 impl Stored<'_> {
-    /// Empties the active strips of a range; in others there is nothing.
+    /// Clears the active strips of a range; others are empty.
     pub fn clear(&mut self, strips: std::ops::Range<usize>) {
         let first = strips.start;
         for run in runs(&self.active[strips]) {
@@ -103,7 +104,7 @@ impl Stored<'_> {
 }
 
 impl Flow {
-    /// Dry columns.
+    /// Flow in dry columns.
     pub fn new(columns: &Columns, pipes: &Pipes) -> Self {
         let none = |array| PerColumn::new(array, columns.len(), 0.0);
         Self {
@@ -144,28 +145,28 @@ impl Flow {
         &self.depth[..self.depth.len() - STRIP]
     }
 
-    /// Whether each strip is wet or beside a wet one: in all others there is neither liquid nor flow.
+    /// Whether each strip is wet or beside a wet one: all others have neither liquid nor flow.
     pub(super) fn active(&self) -> &[bool] {
         self.active.active()
     }
 
-    /// Fluxes (units in a step of `last`) and what truncation left of transfers (units), both to the east and to the south, by column index.
+    /// Fluxes (units in a step of `last`) and remainders of transfers (units), each to the east and to the south, by column index.
     pub(super) fn numbers(&self) -> [&[f32]; 4] {
         let ([east, south], [left_east, left_south]) = (&self.flux, &self.left);
         [east, south, left_east, left_south]
     }
 
-    /// Heads over the surface (units) of full columns, by column index.
+    /// Heads above the surface (units) of full columns, by column index.
     pub(super) fn heads(&self) -> &[f32] {
         self.network.over()
     }
 
-    /// Among others, the greatest depths of rows.
+    /// Including upper bounds of the depths of rows.
     pub(super) fn bands(&self) -> &Bands {
         &self.bands
     }
 
-    /// All that a restored state replaces; then comes [`Flow::wake`].
+    /// All parts that a restored state replaces; [`Flow::wake`] must follow.
     pub(super) fn stored(&mut self) -> Stored<'_> {
         let ([east, south], [left_east, left_south]) = (&mut self.flux, &mut self.left);
         Stored {
@@ -180,7 +181,8 @@ impl Flow {
         }
     }
 
-    /// Makes the strips of some runs, which are in order, active, and no others but those beside liquid: what is [`Stored`] has changed.
+    /// Makes the strips of some runs active, which are in order, and otherwise only those beside liquid: call it after changing what is
+    /// [`Stored`].
     pub(super) fn wake(
         &mut self,
         columns: &Columns,
@@ -194,7 +196,7 @@ impl Flow {
         self.depth.iter().map(|&depth| i64::from(depth)).sum()
     }
 
-    /// Carries other scalars, of which there is nothing yet.
+    /// Replaces the scalars; all amounts are 0.
     pub(super) fn carry(&mut self, columns: &Columns, amounts: Amounts) {
         self.bands.carry(columns, amounts.count());
         self.links.carry(amounts.count());
@@ -202,7 +204,7 @@ impl Flow {
         self.active.rouse_all();
     }
 
-    /// As [`Flow::change_depth`], of liquid that comes with these concentrations, or goes with what it carries.
+    /// As [`Flow::change_depth`]; added liquid has these concentrations, removed liquid takes its scalars along.
     pub(super) fn add(
         &mut self,
         columns: &Columns,
@@ -219,7 +221,7 @@ impl Flow {
         added
     }
 
-    /// Adds to the depth of a column, or takes from it, within 0 and its ceiling; returns what was added.
+    /// Adds to or subtracts from the depth of a column, within 0 and its ceiling; returns the change.
     pub(super) fn change_depth(&mut self, columns: &Columns, index: usize, units: i64) -> i64 {
         let room = i64::from(columns.ceilings()[index]) - i64::from(columns.bases()[index]);
         let before = i64::from(self.depth[index]);
@@ -233,7 +235,7 @@ impl Flow {
         after - before
     }
 
-    /// Gives a part of the columns another count of indices; what they hold is then left over from before.
+    /// Changes the count of indices of a part of the columns; their contents are then unspecified.
     pub(super) fn resize_part(&mut self, part: Range<usize>, len: usize) {
         self.depth.resize_part(part.clone(), len, 0);
         for numbers in self.flux.iter_mut().chain(&mut self.left) {
@@ -244,7 +246,7 @@ impl Flow {
         self.network.resize_part(part, len);
     }
 
-    /// Finds again what depends on the columns of some rows, and on the links unless these join the same ones.
+    /// Updates what depends on the columns of some rows, and on the links unless these join the same columns.
     pub(super) fn refit(
         &mut self,
         columns: &Columns,
@@ -265,7 +267,7 @@ impl Flow {
         }
     }
 
-    /// Begins a frame: strips where all is dry are left, and those where all rests sleep.
+    /// Begins a frame: deactivates strips where all is dry, and lets those at rest sleep.
     pub fn begin_frame(&mut self, columns: &Columns, pipes: &Pipes, bounds: Bounds) {
         self.walls.begin_frame();
         let [east, south] = &mut self.flux;
@@ -284,19 +286,19 @@ impl Flow {
         }
     }
 
-    /// Wakes all that sleeps: something has changed that is not liquid.
+    /// Wakes all strips: something other than the liquid has changed.
     pub fn rouse(&mut self) {
         self.active.rouse_all();
     }
 
-    /// Whether nothing is to sleep from now on.
+    /// Sets whether sleeping is disabled.
     pub fn set_sleepless(&mut self, is_sleepless: bool) {
         self.is_sleepless = is_sleepless;
         self.active.rouse_all();
     }
 
-    /// Finds fast films; returns the least power of two of cells, to `farthest`, that no disturbance in them leaves behind in `step` times the last
-    /// step. `drive` is g unit dt^2 / dx^2 of that one (1 / units).
+    /// Finds fast films. Returns a power of two, at most `farthest`: the cells within which each disturbance in them stays during `step`
+    /// times the last step, whose g unit dt^2 / dx^2 is `drive` (1 / units).
     pub fn find_fast(&mut self, columns: &Columns, drive: f64, step: f64, farthest: u32) -> u32 {
         self.active.refresh(columns, &self.depth);
         let Self { fast, active, depth, flux: [east, south], .. } = self;
@@ -304,29 +306,29 @@ impl Flow {
         fast.find(&films, step as f32, farthest)
     }
 
-    /// Lets the inertia of fast films count less in steps like one.
+    /// Reduces the inertia of fast films for steps like `step`.
     pub fn lighten(&mut self, drive: f64, step: &Step) {
         let Self { fast, active, depth, flux: [east, south], .. } = self;
         fast.lighten(&Films { active, depth, flux: [east, south], drive: drive as f32 }, step);
     }
 
-    /// No film is fast.
+    /// Marks no film as fast.
     pub fn calm(&mut self) {
         self.fast.clear();
     }
 
-    /// At least the greatest depth (units).
+    /// Upper bound of the depth (units).
     pub fn deepest(&self) -> i32 {
         self.bands.deepest()
     }
 
-    /// Finds the links that liquid falls freely from in the next step.
+    /// Finds the overflow edges of the next step: the links that liquid falls freely from.
     pub(super) fn find_lips(&mut self, columns: &Columns, links: &Links, cliffs: Cliffs) {
         self.lips.find(columns, links, cliffs, &self.depth);
     }
 
-    /// One step of `dt` (s); returns the count of rows in which K_min, and in which K_max, was not 1, and in which fast films were held back. Runs on
-    /// the threads of the pool around it, if [`Flow::divide`] has divided it.
+    /// One step of `dt` (s). Returns the counts of rows in which K_min and K_max were not 1, and in which fast films were limited. Runs on
+    /// the threads of the surrounding pool, if [`Flow::divide`] has divided it.
     pub fn step(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, dt: f64, stop: &Stop) -> [u32; 3] {
         self.active.refresh(columns, &self.depth);
         if self.active.all_rest() && self.network.is_empty() {
@@ -385,13 +387,13 @@ impl Flow {
         scaled
     }
 
-    /// Divides steps among so many threads, where that is faster; whether it is.
+    /// Divides steps among so many threads, if that is faster; returns whether it is.
     pub fn divide(&mut self, columns: &Columns, threads: usize) -> bool {
         self.bands.divide(columns, threads);
         self.bands.are_several()
     }
 
-    /// Wakes what the step has moved through links.
+    /// Wakes strips between which the step's links moved liquid.
     fn stir(&mut self, columns: &Columns, links: &Links) {
         for link in (0..links.len()).filter(|&link| self.links.transfer[link] != 0.0) {
             for end in [links.from[link], links.to[link]].into_iter().filter(|&end| end != NONE) {
@@ -400,7 +402,7 @@ impl Flow {
         }
     }
 
-    /// Moves what the flow through full columns takes along.
+    /// Moves the scalars of transfers between full columns.
     fn carry_flooded(&mut self) {
         let Amounts { amounts, party_levels, scalars, .. } = &mut self.amounts;
         let mut changes = [Changes::default(); MOST];
@@ -411,7 +413,7 @@ impl Flow {
         self.amounts.settle(&changes);
     }
 
-    /// Columns of strips that a step works on, and at most how many of them may be full.
+    /// Count of columns in the strips that a step works on, and an upper bound of those that are full.
     pub(super) fn work(&mut self, columns: &Columns) -> [usize; 2] {
         let wet = STRIP * self.active.count();
         if !self.bands.find_filling() {
@@ -423,7 +425,7 @@ impl Flow {
         [wet, full.min(wet).max(self.network.len())]
     }
 
-    /// Finds what flows with friction beside it.
+    /// Computes the fluxes with lateral friction.
     fn rub(&mut self, columns: &Columns, pipes: &Pipes, step: &Step) {
         let [east, south] = &self.flux;
         let liquid = Liquid {
@@ -440,7 +442,7 @@ impl Flow {
         self.walls.find(step, &liquid);
     }
 
-    /// Finds what flows through full columns.
+    /// Computes the flow through full columns.
     fn flood(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, stop: &Stop) {
         let ([east, south], [left_east, left_south]) = (&self.flux, &self.left);
         let state = State {

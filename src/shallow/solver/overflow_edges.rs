@@ -1,15 +1,15 @@
-//! Lips: links that liquid falls freely from. What goes over one does not arrive at its other end in the same step, and what lies there
-//! does not push back.
+//! Overflow edges (`Lips`): links that liquid falls freely from. What goes over one does not arrive at its other end in the same step, and
+//! the liquid there does not push back.
 
 use super::links::LinkFlow;
 use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::pipes::Links;
 use crate::shallow::pipes::cliffs::Cliffs;
 
-/// Which way liquid falls freely over a link in a step.
+/// Direction in which liquid falls freely over a link in a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Fall {
-    /// It does not.
+    /// It does not fall.
     #[default]
     No,
     /// From its first column.
@@ -18,38 +18,38 @@ pub enum Fall {
     Back,
 }
 
-/// The lips of a step, by link. Without falls there is none.
+/// The overflow edges of a step, by link; empty without falls.
 #[derive(Debug, Clone, Default)]
 pub struct Lips {
     falls: Vec<Fall>,
-    /// H of the column that gives, at the start of the step (units).
+    /// H of the donor at the start of the step (units).
     depth: Vec<i32>,
     /// Units that the network of full columns moves over each.
     flooded: Vec<i64>,
 }
 
-/// What went over a lip in a step.
+/// Liquid that went over an overflow edge in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Over {
     /// The link.
     pub link: usize,
-    /// The column that it came from, and the one below; [`NONE`]: the void.
+    /// The donor, and the column below; [`NONE`]: the void.
     pub from: u32,
     pub to: u32,
-    /// How much (units).
+    /// Volume (units).
     pub units: i64,
-    /// H of the column that it came from, at the start of the step (units).
+    /// H of the donor at the start of the step (units).
     pub depth: i32,
 }
 
 impl Lips {
-    /// Room for so many links.
+    /// With capacity for so many links.
     pub(in crate::shallow) fn with_room(links: usize) -> Self {
         let (falls, depth) = (Vec::with_capacity(links), Vec::with_capacity(links));
         Self { falls, depth, flooded: Vec::with_capacity(links) }
     }
 
-    /// Finds the lips: links from a base that is higher, by over `cliffs`, than the surface at the other end, and those into the void.
+    /// Finds the overflow edges: links whose base is more than `cliffs` above the surface at the other end, and those into the void.
     pub(in crate::shallow) fn find(
         &mut self,
         columns: &Columns,
@@ -69,18 +69,18 @@ impl Lips {
         }
     }
 
-    /// Which way liquid falls freely over a link.
+    /// Direction in which liquid falls freely over a link.
     #[inline(always)]
     pub fn at(&self, link: usize) -> Fall {
         self.falls.get(link).copied().unwrap_or_default()
     }
 
-    /// Adds what the network of full columns moves over a lip.
+    /// Adds what the network of full columns moves over an overflow edge.
     pub(super) fn add_flooded(&mut self, link: usize, units: i64) {
         self.flooded[link] += units;
     }
 
-    /// What went over the lips in a step, in their order.
+    /// The liquid that went over the overflow edges in a step, in their order.
     pub(in crate::shallow) fn over<'a>(
         &'a self,
         links: &'a Links,
@@ -98,7 +98,7 @@ impl Lips {
     }
 }
 
-/// What a column falls by where the ground beyond it does not count: the edge of a cell (units).
+/// Surface drop assumed where the ground beyond does not count: the edge of a cell (units).
 pub(super) fn edge(columns: &Columns) -> i32 {
     (columns.grid.cell / columns.heights.unit).min(f64::from(i32::MAX / 2)) as i32
 }
@@ -106,13 +106,13 @@ pub(super) fn edge(columns: &Columns) -> i32 {
 fn fall(columns: &Columns, links: &Links, cliffs: Cliffs, link: usize, depth: &[i32]) -> Fall {
     let (from, to) = (links.from[link], links.to[link]);
     if to == NONE {
-        // Beyond the border of the domain there is no void.
+        // There is no void beyond the border of the domain.
         let is_void = links.sides[link].cell(columns.cell(from as usize), columns.grid.size).is_some();
         return if is_void { Fall::Ahead } else { Fall::No };
     }
     let base = columns.bases();
     let (i, j) = (from as usize, to as usize);
-    // Bases and depths are within 2^30, and surfaces too.
+    // Bases, depths and surfaces are within 2^30.
     if base[i] - (base[j] + depth[j]) > cliffs.0 {
         Fall::Ahead
     } else if base[j] - (base[i] + depth[i]) > cliffs.0 {

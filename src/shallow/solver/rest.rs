@@ -1,16 +1,16 @@
-//! Liquid at rest: where no step changes anything, steps pass over it.
+//! Liquid at rest: steps skip the strips in which they would change nothing.
 //!
-//! A pipe *rests* when nothing has flowed through it and nothing will: its flux and what transfers have left are 0, and it is closed, or its giver is
-//! dry, or its surfaces differ by at most [`Step::level`](super::flux::Step), which drives nothing. A strip rests with all its pipes, those that its
-//! neighbours own among them, and sleeps when its neighbours rest, too (`active.rs`). A step would leave it as it is, to the bit: so nothing depends on
-//! what sleeps, and strips of 16 cells along x are as good as any others.
+//! A pipe *rests* when nothing has flowed through it and nothing will: its flux and the remainder of its transfers are 0, and it is closed,
+//! or its donor is dry, or its surfaces differ by at most [`Step::level`](super::flux::Step), which drives nothing. A strip rests when all
+//! its pipes do, including those that its neighbours own. It sleeps when its neighbours rest, too (`active.rs`). A step would leave it as
+//! it is, to the bit: so results do not depend on which strips sleep, and strips of 16 cells along x are as good as any others.
 
 use super::links::{LinkFlow, beyond};
 use super::pressurised::network::full_of;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
 use crate::shallow::pipes::{Links, Pipes};
 
-/// A liquid in which what rests is found.
+/// The liquid that is searched for strips at rest.
 #[derive(Clone, Copy)]
 pub struct Still<'a> {
     /// Columns.
@@ -19,39 +19,39 @@ pub struct Still<'a> {
     pub pipes: &'a Pipes,
     /// H (units).
     pub depth: &'a [i32],
-    /// Fluxes and what transfers left, to the east and to the south.
+    /// Fluxes and remainders of transfers, each to the east and to the south.
     pub numbers: [&'a [f32]; 4],
     /// Flow through links.
     pub links: &'a LinkFlow,
-    /// Heads over the surface of full columns (units).
+    /// Heads above the surface of full columns (units).
     pub heads: &'a [f32],
-    /// What rests, in the next steps.
+    /// Bounds of rest in the next steps.
     pub bounds: Bounds,
 }
 
-/// What of a step decides what rests.
+/// The quantities of a step that rest depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
-    /// Surfaces that differ by so much at most drive nothing (units); 0: nothing comes to rest.
+    /// Surfaces that differ by at most this drive nothing (units); 0: nothing comes to rest.
     pub level: i32,
-    /// What gravity adds to the fall of the surface over a cell along x and along z (units).
+    /// What gravity adds to the drop of the surface over a cell, along x and along z (units).
     pub tilt: [i32; 2],
     /// Surface of the liquid at rest beyond the border (units), or BOTTOMLESS: there is none.
     pub still: i32,
 }
 
 impl Still<'_> {
-    /// Whether the columns of a strip rest, with all their pipes but for links.
+    /// Whether the columns of a strip rest, with all their pipes except links.
     pub fn rests(&self, strip: usize) -> bool {
         let [east, south, left_east, left_south] = self.numbers.map(|numbers| strip_of(numbers, strip));
-        // What flows mostly does so from the first.
+        // Moving strips mostly fail this first test.
         if has_any(east) || has_any(south) || has_any(left_east) || has_any(left_south) {
             return false;
         }
         let (first, columns) = (strip * STRIP, self.columns);
         let numbers =
             [columns.bases(), columns.ceilings(), self.depth].map(|numbers| strip_of(numbers, strip));
-        // Full columns are a network, which steps look at.
+        // Full columns form a network, which steps handle.
         if full_of(numbers) != [0; STRIP] || has_any(strip_of(self.heads, strip)) {
             return false;
         }
@@ -75,14 +75,14 @@ impl Still<'_> {
         !has_any(south) && !has_any(left_south) && (0..STRIP).all(is_held)
     }
 
-    /// Whether nothing will flow through a pipe without a flux.
+    /// Whether nothing will flow through a pipe whose flux is 0.
     fn is_held(&self, [i, j]: [usize; 2], open: f32, axis: usize) -> bool {
         let base = self.columns.bases();
         let fall = base[i] + self.depth[i] - (base[j] + self.depth[j]) + self.bounds.tilt[axis];
         open == 0.0 || fall.abs() <= self.bounds.level || self.depth[if fall > 0 { i } else { j }] == 0
     }
 
-    /// The ends of those of some links that do not rest.
+    /// The ends of those links of a range that do not rest.
     pub fn moving_links(&self, links: std::ops::Range<usize>) -> impl Iterator<Item = [u32; 2]> {
         let Links { from, to, .. } = &self.pipes.links;
         links.filter(|&link| !self.link_rests(link)).map(|link| [from[link], to[link]])
@@ -104,7 +104,7 @@ impl Still<'_> {
     }
 }
 
-/// Whether a number is not 0; a step would change -0 into 0.
+/// Whether a number is not +0: a step would change -0 into 0.
 fn has_any<const N: usize>(numbers: &[f32; N]) -> bool {
     numbers.iter().fold(0, |any, number| any | number.to_bits()) != 0
 }

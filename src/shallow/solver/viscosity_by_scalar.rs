@@ -1,7 +1,7 @@
-//! Liquid whose viscosity depends on what it carries: blood that clots with age, and that irrigation thins.
+//! Viscosity that depends on a scalar: blood that clots with age, and that irrigation dilutes.
 //!
-//! What holds a pipe back is 3 nu / H^2 over its openness (Eq. 4.5): more viscosity is less openness. Each frame begins with the concentrations of its columns; the
-//! steps of the frame then have the openness that these leave.
+//! The drag of a pipe is 3 nu / H^2 over its openness (Eq. 4.5): a higher viscosity acts like a lower openness. Each frame starts from the
+//! concentrations of its columns and uses the resulting openness in all its steps.
 
 use super::Flow;
 use super::active::runs;
@@ -13,14 +13,15 @@ use crate::shallow::pipes::{Links, Pipes};
 use crate::shallow::scalars::check_scalar;
 use crate::shallow::scalars::shares::{LEVELS, level};
 
-/// How viscosity depends on a scalar: it is the liquid's up to `from`, and `times` that from `to` on; between them it grows with the concentration.
+/// How viscosity depends on a scalar: it is the liquid's own up to `from`, `times` that from `to` on, and linear in the concentration in
+/// between.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Thickening {
-    /// Which scalar: an age, of blood that clots; a dye, of what is mixed.
+    /// Index of the scalar: an age for blood that clots; a dye for mixtures.
     pub scalar: usize,
-    /// Concentration up to which it is the liquid's, in the scalar's own measure.
+    /// Concentration up to which viscosity is the liquid's own, in the scalar's own measure.
     pub from: f64,
-    /// Concentration from which on it is `times` that; it may be the lesser one.
+    /// Concentration from which on it is `times` that; it may be below `from`.
     pub to: f64,
     /// 1e-6 to 1e9.
     pub times: f64,
@@ -45,19 +46,19 @@ impl Thickening {
     }
 }
 
-/// The openness of pipes in a frame, where the liquid thickens; else empty.
+/// The openness of pipes in a frame, if viscosity depends on a scalar; otherwise empty.
 #[derive(Debug, Clone)]
 pub(in crate::shallow) struct Thick {
-    /// As in [`Pipes`]; the pipes' own while a frame lasts.
+    /// As in [`Pipes`]; holds the pipes' own openness during a frame.
     east: PerColumn<f32>,
     south: PerColumn<f32>,
     links: Vec<f32>,
-    /// Viscosity of each column, over the liquid's; padded by a strip, as depths are.
+    /// Viscosity of each column, relative to the liquid's; padded by a strip, as depths are.
     times: PerColumn<f32>,
 }
 
 impl Thick {
-    /// No room yet.
+    /// Without buffers.
     pub fn none() -> Self {
         Self {
             east: PerColumn::new(Array::OpenEast, 0, 0.0),
@@ -73,7 +74,7 @@ impl Thick {
         arrays.into_iter().map(PerColumn::bytes).sum::<usize>() + size_of_val(&self.links[..])
     }
 
-    /// Puts the openness that the liquid leaves in place of the pipes' own.
+    /// Replaces the pipes' own openness by one that includes the viscosity.
     ///
     /// # Errors
     /// `Argument`: there is no such scalar.
@@ -112,7 +113,7 @@ impl Thick {
         Ok(())
     }
 
-    /// Puts the pipes' own openness back.
+    /// Restores the pipes' own openness.
     pub fn end(&mut self, pipes: &mut Pipes) {
         self.change_positions(pipes);
     }
@@ -123,7 +124,7 @@ impl Thick {
         std::mem::swap(&mut self.links, &mut pipes.links.open);
     }
 
-    /// Makes room.
+    /// Resizes the buffers.
     fn fit(&mut self, columns: &Columns, links: &Links) {
         let len = columns.len();
         for (numbers, len) in [(&mut self.east, len), (&mut self.south, len), (&mut self.times, len + STRIP)]
@@ -136,11 +137,11 @@ impl Thick {
         self.links.resize(links.len(), 0.0);
     }
 
-    /// Finds the viscosity of the columns.
+    /// Finds the relative viscosity of the columns.
     fn find_times(&mut self, law: &Thickening, flow: &Flow) {
         let amounts = &flow.amounts;
         let range = amounts.scalars[law.scalar].range / LEVELS;
-        // Levels over `from`, and what a level adds.
+        // Levels above `from`, and what a level adds.
         let (from, each) = (law.from / range, range / (law.to - law.from));
         let line = Line { from, each, rise: (law.times - 1.0) as f32 };
         for run in runs(flow.active()) {
@@ -151,7 +152,7 @@ impl Thick {
     }
 }
 
-/// Viscosity over the liquid's, of a level: 1 + rise (level - from) each, the part between 0 and 1.
+/// Relative viscosity at a level: 1 + rise * clamp((level - from) * each, 0, 1).
 #[derive(Debug, Clone, Copy)]
 struct Line {
     from: f64,
@@ -175,13 +176,13 @@ impl Line {
     }
 }
 
-/// Depths (units) and viscosities of the columns at both ends of a strip's pipes.
+/// Depths (units) and relative viscosities of the columns at both ends of a strip's pipes.
 struct Ends {
     depth: [[i32; STRIP]; 2],
     times: [[f32; STRIP]; 2],
 }
 
-/// A strip's numbers from an index on; where the array ends, none are left for what is not there.
+/// A strip's numbers from an index on; defaults behind the end of the array.
 fn numbers_from<T: Copy + Default>(numbers: &[T], first: usize) -> [T; STRIP] {
     let mut out = [T::default(); STRIP];
     let end = numbers.len().min(first + STRIP);
@@ -189,7 +190,7 @@ fn numbers_from<T: Copy + Default>(numbers: &[T], first: usize) -> [T; STRIP] {
     out
 }
 
-/// Makes pipes less open, by the mean viscosity at their ends.
+/// Divides the openness of pipes by the mean viscosity at their ends.
 #[inline(always)]
 fn close(ends: &Ends, open: &mut [f32; STRIP]) {
     for (x, open) in open.iter_mut().enumerate() {
@@ -198,7 +199,7 @@ fn close(ends: &Ends, open: &mut [f32; STRIP]) {
     }
 }
 
-/// The mean of two viscosities by the depths that have them; the same from both ends, and 1 where all is dry.
+/// The mean of two viscosities, weighted by depth; the same from either end, and 1 where all is dry.
 #[inline(always)]
 fn mean(depth: [f32; 2], times: [f32; 2]) -> f32 {
     let all = depth[0] + depth[1];

@@ -1,8 +1,8 @@
-//! Where liquid comes in and goes out: sources, drains, orifices and absorbers, at the end of each step (thesis Alg. 4.1, line 5).
+//! Where liquid enters and leaves: sources, drains, orifices and absorbers, at the end of each step (thesis Alg. 4.1, line 5).
 //!
-//! Each moves whole units. What its rate asks for is shared equally by the columns in its circle; what is left of the division waits for the
-//! next step, so that a source delivers its rate to a unit a column. What finds no room in them waits, too, but no more than a step asks for: a
-//! source in a cavity that is full stands still, and does not make up for it when the cavity opens.
+//! Each moves whole units. The volume that its rate requests is shared equally by the columns in its circle; the remainder of the division
+//! waits for the next step, so that a source delivers its rate to within one unit per column. What does not fit in the columns waits too,
+//! but no more than one step requests: a source in a full cavity stops, and does not catch up when the cavity opens.
 
 mod pour;
 
@@ -19,60 +19,61 @@ pub struct FlowPoint {
     pub kind: Kind,
     /// Its centre (m).
     pub at: [f64; 3],
-    /// Columns whose centres lie within so much of it, seen from above (m); the nearest one, if none does.
+    /// Acts on the columns whose centres lie within this distance, seen from above (m); on the nearest one if there are none.
     pub radius: f64,
-    /// Volume per second (m3/s), 0 and up; 1 ml is 1e-6 m3. Of an orifice the most that goes out.
+    /// Volume per second (m3/s), 0 or more; 1 ml is 1e-6 m3. For an orifice, the maximum outflow.
     pub rate: f64,
-    /// How the rate changes; none: it does not.
+    /// How the rate varies; none: it is constant.
     pub pulse: Option<Pulse>,
 }
 
 /// What a [`FlowPoint`] does.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
-    /// Liquid comes in.
+    /// Liquid enters.
     Source,
-    /// Liquid goes out, as long as there is some below it.
+    /// Liquid leaves, as long as there is some below it.
     Drain,
-    /// As a drain, until it has taken so much (m3): gauze.
+    /// Like a drain, until it has taken this volume (m3): gauze.
     Absorber(f64),
-    /// A hole in the ground, through which liquid runs out by its own weight: Cd a (2 g H)^(1/2) a second (Torricelli's law), of the mean depth H in its circle. The
-    /// number is Cd a (m2): the hole's area times the share of it that the jet fills, 0.6 to 0.65 for a sharp edge.
+    /// A hole in the ground, through which liquid drains under its own weight: Cd a (2 g H)^(1/2) a second (Torricelli's law), for the mean
+    /// depth H in its circle. The number is Cd a (m2): the hole's area times the share of it that the jet fills, 0.6 to 0.65 for a sharp
+    /// edge.
     Orifice(f64),
 }
 
-/// A rate that swings: rate (1 + share sin(2 pi frequency t)), never under 0.
+/// A pulsating rate: rate (1 + share sin(2 pi frequency t)), never below 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pulse {
-    /// Swings a second, 0 and up.
+    /// Pulse frequency (Hz), 0 or more.
     pub frequency: f64,
-    /// By which share of the rate it swings, 0 to 1.
+    /// Amplitude as a share of the rate, 0 to 1.
     pub share: f64,
 }
 
-/// A flow point on its columns.
+/// A flow point with its columns.
 #[derive(Debug, Clone, PartialEq)]
 struct Placed {
     point: FlowPoint,
     columns: Vec<u32>,
-    /// Units asked for that have not moved.
+    /// Units requested that have not moved yet.
     waiting: f64,
     /// Units moved so far: those that came in or went out.
     moved: i64,
-    /// Concentrations of what comes in.
+    /// Concentrations of what enters.
     levels: Levels,
 }
 
-/// Units a column that a source owes at most, beside what a step asks for: what is left of a division, in cells of half the length, too.
+/// Maximum units per column that a source owes, besides one step's request: remainders of divisions, also in cells of half the length.
 const OWED: f64 = 4.0;
 
 /// All flow points.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Flows {
     placed: Vec<Placed>,
-    /// Units that came in through all sources so far.
+    /// Units that entered through all sources so far.
     pub sourced: i64,
-    /// Units that went out through all drains so far.
+    /// Units that left through all drains so far.
     pub drained: i64,
     /// Units that went into all absorbers so far.
     pub absorbed: i64,
@@ -116,7 +117,7 @@ impl FlowPoint {
         (self.rate * (1.0 + self.pulse.map_or(0.0, swing))).max(0.0)
     }
 
-    /// Lists the columns in its circle: in each cell the one that the centre lies in, or is nearest to.
+    /// Lists the columns in its circle: in each cell the one that contains the centre, or is nearest to it.
     pub(super) fn find_columns(&self, columns: &Columns, found: &mut Vec<u32>) {
         let grid = &columns.grid;
         let [x, y, z] = self.at;
@@ -149,7 +150,7 @@ impl FlowPoint {
             }
         }
         if !has_cells {
-            // A vertex on the border of a terrain may lie a little outside, in 32 bits.
+            // Rounding to 32 bits may put a vertex on the border of a terrain slightly outside.
             let within = |axis: usize, at: f64| {
                 let (low, size) = (grid.origin[axis], grid.size[axis] as f64 * grid.cell);
                 let inside = at.clamp(low, low + size * (1.0 - 1e-12));
@@ -161,10 +162,10 @@ impl FlowPoint {
 }
 
 impl Flows {
-    /// Sets the flow points, in place of those before; what these have moved stays in the sums. `which` names one in an error.
+    /// Sets the flow points, in place of the previous ones; what those have moved stays in the sums. `which` names one in an error.
     ///
     /// # Errors
-    /// `Argument`: a number out of range, or a point that has no column within its radius (or two cells): it lies inside solid, or outside of
+    /// `Argument`: a number out of range, or a point that has no column within its radius (or two cells): it lies inside solid, or outside
     /// the domain.
     pub fn set(
         &mut self,
@@ -184,7 +185,7 @@ impl Flows {
         Ok(())
     }
 
-    /// As [`Flows::set`], but a point that has no column rests until it does.
+    /// As [`Flows::set`], but a point without a column rests until it has one.
     ///
     /// # Errors
     /// `Argument`: a number out of range.
@@ -210,7 +211,7 @@ impl Flows {
         placed.point.find_columns(columns, &mut placed.columns);
     }
 
-    /// Lets a point rest; returns what it waits for and has moved (units), which it forgets.
+    /// Puts a point to rest; returns what it waits for and has moved (units), which it clears.
     pub(super) fn rest(&mut self, point: usize) -> (f64, i64) {
         let placed = &mut self.placed[point];
         placed.columns.clear();
@@ -237,7 +238,7 @@ impl Flows {
         Ok(())
     }
 
-    /// Gives what comes through a source other concentrations.
+    /// Sets the concentrations of what enters through a source.
     ///
     /// # Errors
     /// `Argument`: there is no such point.
@@ -250,12 +251,12 @@ impl Flows {
         Ok(())
     }
 
-    /// What comes through sources carries nothing.
+    /// What enters through sources carries nothing from now on.
     pub(super) fn forget_levels(&mut self) {
         self.placed.iter_mut().for_each(|placed| placed.levels = [0; MOST]);
     }
 
-    /// Finds the columns of all points again, after the terrain has moved. A point that has none rests until it does.
+    /// Finds the columns of all points again, after the terrain has moved. A point without one rests until it has one.
     pub(super) fn find_again(&mut self, columns: &Columns) {
         for placed in &mut self.placed {
             placed.point.find_columns(columns, &mut placed.columns);
@@ -267,18 +268,18 @@ impl Flows {
         self.placed[point].moved
     }
 
-    /// What each flow point does, waits for and has moved (units), in their order: its part of a saved state.
+    /// Kind of each flow point, what it waits for and has moved (units), in their order: its part of a saved state.
     pub(super) fn progress(&self) -> impl ExactSizeIterator<Item = (Kind, f64, i64)> + '_ {
         self.placed.iter().map(|placed| (placed.point.kind, placed.waiting, placed.moved))
     }
 
-    /// Puts what a flow point waits for and has moved in place.
+    /// Restores what a flow point waits for and has moved.
     pub(super) fn set_progress(&mut self, point: usize, waiting: f64, moved: i64) {
         let placed = &mut self.placed[point];
         (placed.waiting, placed.moved) = (waiting, moved);
     }
 
-    /// Moves what the points ask for in a step of `dt` that begins at `time` (s), where things fall by `gravity` (m/s2).
+    /// Moves what the points request in a step of `dt` that begins at `time` (s), under `gravity` (m/s2).
     pub fn step(&mut self, columns: &Columns, flow: &mut Flow, gravity: f64, time: f64, dt: f64) {
         let volume = columns.grid.cell * columns.grid.cell * columns.heights.unit;
         for placed in &mut self.placed {
@@ -293,7 +294,7 @@ impl Flows {
     }
 }
 
-/// Points on their columns, of which one may have none.
+/// Points with their columns; a point may have none.
 fn placed(columns: &Columns, points: &[FlowPoint], which: &impl Fn(usize) -> String) -> Result<Vec<Placed>> {
     let position = |(at, point): (usize, &FlowPoint)| {
         point.validate().map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
@@ -305,7 +306,7 @@ fn placed(columns: &Columns, points: &[FlowPoint], which: &impl Fn(usize) -> Str
 }
 
 impl Placed {
-    /// What the point asks for in a second (m3).
+    /// The rate that the point requests (m3/s).
     fn rate(&self, columns: &Columns, flow: &Flow, gravity: f64, time: f64) -> f64 {
         let rate = self.point.rate_at(time);
         let Kind::Orifice(opening) = self.point.kind else { return rate };
@@ -314,13 +315,13 @@ impl Placed {
         (opening * (2.0 * gravity * depth).sqrt()).min(rate)
     }
 
-    /// Moves what the point asks for, in units of some `volume` (m3); returns those moved.
+    /// Moves what the point requests, in units of `volume` (m3); returns the units moved.
     fn step(&mut self, columns: &Columns, flow: &mut Flow, asked: f64, volume: f64) -> i64 {
         if self.columns.is_empty() {
             return 0;
         }
         let count = self.columns.len() as f64;
-        // Nothing is owed for long; a drain over a dry position does not make up for it either.
+        // Nothing is owed for long; a drain over a dry position does not catch up either.
         self.waiting = self.waiting.min(asked.max(OWED * count)) + asked;
         let mut share = (self.waiting / count).floor().min(1e18) as i64;
         if let Kind::Absorber(capacity) = self.point.kind {
@@ -338,7 +339,7 @@ impl Placed {
         self.moved += moved;
         self.waiting -= moved as f64;
         if sign < 0 {
-            // A drain over a dry position does not make up for it later.
+            // A drain over a dry position does not catch up later.
             self.waiting = self.waiting.min(count);
         }
         moved

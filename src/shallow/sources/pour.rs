@@ -1,15 +1,15 @@
-//! Liquid that a host pours or takes at once, and what its flow points have moved.
+//! Liquid that a host pours or takes at once, and the volumes that its flow points have moved.
 
 use super::{FlowPoint, Kind};
 use crate::error::{Error, Result};
 use crate::shallow::system::Shallow;
 
 impl Shallow {
-    /// Pours a volume (m3; negative: takes it) into the columns that a source at a position (m) would act on, an equal share into each, between dry and its
-    /// ceiling; returns what came in (m3).
+    /// Pours a volume (m3; negative: takes it) in equal shares into the columns that a source at this position (m) would act on. Each
+    /// column stays between dry and its ceiling; returns what came in (m3).
     ///
     /// # Errors
-    /// `Argument`: as [`Shallow::set_flows`] of a source there.
+    /// `Argument`: as [`Shallow::set_flows`] for a source there.
     pub fn pour_at(&mut self, at: [f64; 3], radius: f64, volume: f64) -> Result<f64> {
         let point = FlowPoint { kind: Kind::Source, at, radius, rate: 0.0, pulse: None };
         point.validate()?;
@@ -32,13 +32,14 @@ impl Shallow {
         self.flows.moved(point) as f64 * (cell * cell * self.columns.heights.unit)
     }
 
-    /// Moves a flow point with the terrain that it lies on, which has moved; what it has moved and waits for stays. Where it finds no column
-    /// it rests until it does.
+    /// Moves a flow point with the terrain that it lies on; what it has moved and waits for stays. Where it finds no column it rests until
+    /// it does.
     pub fn move_flow(&mut self, point: usize, at: [f64; 3]) {
         self.flows.move_to(&self.columns, point, at);
     }
 
-    /// As [`Shallow::set_flows`], where the terrain has moved since the points were first set: one that finds no column rests until it does.
+    /// As [`Shallow::set_flows`], after the terrain has moved since the points were first set: one that finds no column rests until it
+    /// does.
     ///
     /// # Errors
     /// `Argument`: a number out of range.
@@ -51,7 +52,7 @@ impl Shallow {
         self.flows.is_resting(point)
     }
 
-    /// Gives a flow point another rate (m3/s): a valve. What it has moved, and how much an absorber holds, stays.
+    /// Sets another rate (m3/s) for a flow point: a valve. What it has moved, and how much an absorber holds, stays.
     ///
     /// # Errors
     /// As [`Flows::set_rate`](super::Flows::set_rate).

@@ -1,9 +1,9 @@
-//! What liquid leaves on the ground: stains that fade, and what the ground absorbs. Both stay at the vertices of the terrain's mesh, and go with it where
-//! it deforms.
+//! Stains on the ground, which fade, and liquid that the ground absorbs. Both are stored at the vertices of the terrain's mesh, and move
+//! with it where it deforms.
 //!
-//! A vertex is *wet* while a column of its cell has a film at its height, to a cell (`wet.rs`). Then its *stain* goes towards what the liquid there
-//! stains, and when it has dried, half of it fades in each half-life. What fades is looked at only when a vertex is asked for, or gets wet again: dry ground
-//! costs nothing. Absorbing ground takes whole units, which the liquid's balance counts.
+//! A vertex is *wet* while a column of its cell has a film within a cell's edge of its height (`wet.rs`). Then its *stain* approaches that
+//! of the liquid there; after it has dried, half of the stain fades in each half-life. Fading is computed only when a vertex is read or
+//! becomes wet again: dry ground costs nothing. Absorbing ground takes whole units, which the liquid's balance counts.
 
 mod state;
 mod wet;
@@ -17,30 +17,31 @@ use crate::error::{Error, Result};
 use crate::geometry::Vec3;
 use wet::Wet;
 
-/// What nobody sees is none, before it is so little that processors differ.
+/// Invisible stains are set to 0, before they are so small that processors give different results.
 const UNSEEN: f64 = 1e-6;
 
 /// How liquid stains the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Staining {
-    /// The scalar that stains, by its concentration over its range, from 0 to 1: clear liquid washes it off. None: any liquid stains, fully.
+    /// The scalar that stains, by its concentration over its range, from 0 to 1: clear liquid washes stains off. None: any liquid stains,
+    /// fully.
     pub scalar: Option<usize>,
-    /// Depth from which a column is a film that wets (m), 0 and up; 1e-5.
+    /// Minimum depth of a film that wets (m), 0 and up. Default: 1e-5.
     pub film: f64,
-    /// Time (s) in which 63 % of a stain comes or is washed off, 0 and up; 0.2.
+    /// Time (s) in which 63 % of a stain develops or is washed off, 0 and up. Default: 0.2.
     pub takes: f64,
-    /// Half-life of a stain on dry ground (s), 1e-3 and up; infinite: it stays; 60.
+    /// Half-life of a stain on dry ground (s), 1e-3 and up; infinite: it stays. Default: 60.
     pub half_life: f64,
-    /// What the ground absorbs; none.
+    /// How the ground absorbs liquid; None: it does not.
     pub absorbs: Option<Absorbing>,
 }
 
-/// How ground absorbs liquid: at `rate` while it is dry, and less and less as it fills, (1 - held / capacity) of it.
+/// Absorption of the ground: at `rate` while it is dry, decreasing as it fills, by the factor 1 - held / capacity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Absorbing {
-    /// The most that it holds (m: m3 for each m2 of its mesh), over 0; gauze some 1e-3, soft tissue 1e-4.
+    /// Capacity (m: m3 for each m2 of its mesh), above 0; gauze some 1e-3, soft tissue 1e-4.
     pub capacity: f64,
-    /// How fast dry ground takes it (m/s), 0 and up.
+    /// Rate at which dry ground absorbs (m/s), 0 and up.
     pub rate: f64,
 }
 
@@ -77,16 +78,16 @@ impl Staining {
     }
 }
 
-/// The stains on a mesh, and what it has absorbed.
+/// The stains on a mesh, and the liquid that it has absorbed.
 #[derive(Debug, Clone)]
 pub struct Stains {
     staining: Staining,
     /// A hash of the mesh's triangles.
     mesh: [u8; 16],
-    /// Of each vertex: its stain at the time (s) when it was wet last.
+    /// For each vertex: its stain at the time (s) when it was last wet.
     stain: Vec<f32>,
     since: Vec<f64>,
-    /// Of each vertex: units that it has absorbed, and that it holds at most. Empty, if it does not absorb.
+    /// For each vertex: units absorbed, and its capacity in units. Empty, if the ground does not absorb.
     held: Vec<i64>,
     capacity: Vec<i64>,
     /// Volume of a unit of the liquid (m3).
@@ -97,10 +98,10 @@ pub struct Stains {
 }
 
 impl Stains {
-    /// Clean and dry ground under a liquid: a mesh (positions in m) whose vertices may move, but whose triangles stay.
+    /// Clean, dry ground under a liquid: a mesh (positions in m) whose vertices may move, but whose triangles are fixed.
     ///
     /// # Errors
-    /// `Argument`: as [`Staining::validate`]; the liquid has no such scalar; a triangle of a vertex that is not there; a vertex that is not finite.
+    /// `Argument`: as [`Staining::validate`]; the liquid has no such scalar; a triangle refers to a missing vertex; a vertex is not finite.
     pub fn new(
         liquid: &Shallow,
         positions: &[Vec3],
@@ -137,7 +138,7 @@ impl Stains {
         })
     }
 
-    /// How it stains.
+    /// The parameters of staining.
     pub fn staining(&self) -> &Staining {
         &self.staining
     }
@@ -152,17 +153,17 @@ impl Stains {
         self.stain.is_empty()
     }
 
-    /// Follows the liquid to its time, once a frame, with the vertices where they are now: `positions` (m), of the ground that the liquid has. Allocates nothing
-    /// after the first time. Returns what the ground has absorbed since the last call (m3).
+    /// Advances to the liquid's time; call it once a frame, with the present vertices: `positions` (m), of the ground that the liquid has.
+    /// Allocates nothing after the first call. Returns what the ground has absorbed since the last call (m3).
     ///
     /// # Errors
-    /// `Argument`, and nothing changes: another count of vertices than the mesh has, one that is not finite, a liquid whose units are others or that has not
-    /// the scalar any more.
+    /// `Argument`, and nothing changes: a count of vertices other than the mesh's; one that is not finite; a liquid with other units, or
+    /// that no longer has the scalar.
     pub fn update(&mut self, liquid: &mut Shallow, positions: &[Vec3]) -> Result<f64> {
         self.check(liquid, positions)?;
         let (last, now) = (self.time, liquid.time());
         self.time = now;
-        // The liquid may have been put back to an earlier time.
+        // The liquid may have been restored to an earlier time.
         let passed = (now - last).max(0.0);
         let heights = liquid.columns.heights;
         self.wet.find(&liquid.columns, &liquid.flow, (self.staining.film / heights.unit).min(2e9) as i32);
@@ -170,7 +171,7 @@ impl Stains {
             return Ok(0.0);
         }
         let comes = 1.0 - libm::exp(-passed / self.staining.takes);
-        // Where it takes no time, and none has passed.
+        // Staining takes no time, and none has passed.
         let comes = if comes.is_nan() { 1.0 } else { comes };
         let dry = self.staining.absorbs.map_or(0.0, |absorbing| absorbing.rate * passed / absorbing.capacity);
         let mut absorbed = 0;
@@ -204,10 +205,10 @@ impl Stains {
         Ok(absorbed as f64 * self.unit)
     }
 
-    /// How stained each vertex is now, 0 to 1.
+    /// The present stain of each vertex, 0 to 1.
     ///
     /// # Errors
-    /// `Argument`: there is not one position for each vertex.
+    /// `Argument`: `out` does not have one element for each vertex.
     pub fn stains(&self, out: &mut [f32]) -> Result<()> {
         self.check_room(out.len())?;
         out.iter_mut().zip(self.each()).for_each(|(out, stain)| *out = stain);
@@ -219,7 +220,7 @@ impl Stains {
         (0..self.len()).map(|vertex| self.at(vertex, self.time) as f32)
     }
 
-    /// How soaked each vertex is, 0 to 1 of its capacity; 0, if the ground does not absorb.
+    /// Absorbed liquid at each vertex, 0 to 1 of its capacity; 0, if the ground does not absorb.
     ///
     /// # Errors
     /// As [`Stains::stains`].
@@ -229,7 +230,7 @@ impl Stains {
         Ok(())
     }
 
-    /// How soaked each vertex is.
+    /// Absorbed liquid at each vertex, as part of its capacity.
     pub(crate) fn each_soaked(&self) -> impl ExactSizeIterator<Item = f32> {
         (0..self.len()).map(|vertex| match (self.held.get(vertex), self.capacity.get(vertex)) {
             (Some(held), Some(capacity)) => *held as f32 / (*capacity).max(1) as f32,
@@ -237,7 +238,7 @@ impl Stains {
         })
     }
 
-    /// How much the ground has absorbed (m3): part of [`Balance::absorbed`](super::Balance).
+    /// Volume that the ground has absorbed (m3): part of [`Balance::absorbed`](super::Balance).
     pub fn absorbed(&self) -> f64 {
         self.held.iter().sum::<i64>() as f64 * self.unit
     }

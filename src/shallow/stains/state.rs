@@ -1,4 +1,4 @@
-//! The stains of a mesh as bytes, and back.
+//! Saves the stains of a mesh as bytes and restores them.
 //!
 //! | part | bytes |
 //! |---|---|
@@ -7,9 +7,9 @@
 //! | volume of a unit, time | 8 each |
 //! | count of vertices, count of those that absorb | 8 each |
 //! | stains | 4 each |
-//! | when each was wet last | 8 each |
+//! | time at which each was last wet | 8 each |
 //! | units that each holds | 8 each |
-//! | hash of all this | 16 |
+//! | hash of everything above | 16 |
 
 use xxhash_rust::xxh3::xxh3_128;
 
@@ -26,7 +26,7 @@ impl Stains {
         56 + 12 * self.len() + 8 * self.held.len() + SEAL
     }
 
-    /// The stains as bytes; how liquid stains is not part of them.
+    /// The stains as bytes, without the parameters of staining.
     pub fn save(&self) -> Vec<u8> {
         let mut out = Vec::with_capacity(self.save_size());
         out.extend(MAGIC);
@@ -43,11 +43,11 @@ impl Stains {
         out
     }
 
-    /// Puts saved stains in place: with the liquid's state of the same time everything goes on to the same bytes.
+    /// Restores saved stains: with the liquid's state of the same time, results continue with the same bytes.
     ///
     /// # Errors
-    /// `Bytes`, and nothing changes: bytes that are not of stains, cut short or damaged; of another terrain: other triangles, another count of vertices, or a liquid
-    /// with other cells; of ground that absorbs where this does not, or the other way round.
+    /// `Bytes`, and nothing changes: not stains, truncated or damaged; another terrain: other triangles, another count of vertices, or a
+    /// liquid with other cells; ground that absorbs where this does not, or vice versa.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<()> {
         if !bytes.starts_with(&MAGIC) {
             return Err(refused("are not of this format"));

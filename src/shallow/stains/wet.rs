@@ -1,4 +1,4 @@
-//! Which columns are wet at the vertices of a mesh.
+//! Finds the wet columns at the vertices of a mesh.
 
 use crate::geometry::Vec3;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
@@ -9,9 +9,9 @@ use crate::shallow::solver::active::runs;
 #[derive(Debug, Clone, Copy)]
 struct WetStrip {
     strip: u32,
-    /// Bits of the columns that have one.
+    /// Bits of these columns.
     bits: u16,
-    /// The next one over the same cells, or [`NONE`].
+    /// The next strip over the same cells, or [`NONE`].
     next: u32,
 }
 
@@ -19,7 +19,7 @@ struct WetStrip {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Wet {
     strips: Vec<WetStrip>,
-    /// The first over each 16 cells of a row, or [`NONE`].
+    /// The first strip over each 16 cells of a row, or [`NONE`].
     first: Vec<u32>,
 }
 
@@ -43,13 +43,13 @@ impl Wet {
         }
     }
 
-    /// Whether there is none.
+    /// Whether no column is wet.
     pub fn is_empty(&self) -> bool {
         self.strips.is_empty()
     }
 
-    /// The column of a position's cell that wets it: one that is within a cell of it, from the base to the surface. Of several the nearest, of two
-    /// as near the lower one.
+    /// The column that wets a position: it is in the position's cell, and its range from base to surface is within a cell's edge of the
+    /// position's height. Of several, the nearest; of two equally near, the lower one.
     #[inline(always)]
     pub fn column_at(&self, columns: &Columns, depth: &[i32], position: &Vec3) -> Option<usize> {
         let position = position.cast::<f64>();
@@ -69,7 +69,7 @@ impl Wet {
                 let column = strip as usize * STRIP + x % STRIP;
                 let base = f64::from(columns.bases()[column]);
                 let off = (base - height).max(height - (base + f64::from(depth[column]))).max(0.0);
-                // The strips of a block are in the order of their layers from above.
+                // The strips of a block are in order, from the highest layer down.
                 if off <= least {
                     (nearest, least) = (Some(column), off);
                 }

@@ -1,26 +1,27 @@
 //! A triangle mesh of the liquid's surface (thesis 4.2.1 to 4.2.4), written into the caller's buffers.
 //!
-//! It needs [`Columns`] and a depth for each of their indices, and so serves any solver of height fields (thesis 4.4). Every wet column
-//! whose surface reaches that of neighbours becomes a vertex at the centre of its cell, and so do the dry columns around them.
+//! It needs [`Columns`] and a depth for each of their indices, so it serves any solver of height fields (thesis 4.4). Every wet column
+//! whose surface reaches that of its neighbours becomes a vertex at the centre of its cell, and so do the dry columns around.
 //!
 //! | word | meaning |
 //! |---|---|
-//! | height | eta, the level of a column's surface: its base and the depth (units); of a dry column its base |
+//! | height | eta, the level of a column's surface: its base plus its depth (units); for a dry column its base |
 //! | room | [min, max) of a column: from the underside of its solid to its ceiling; the rooms of a cell do not overlap |
-//! | linked | of two columns of neighbouring cells (8), one of them wet: each one's room holds the other's height |
-//! | quartet | the columns of 2 x 2 cells; named by the north-west cell (least x and z) |
-//! | group | four columns of a quartet, or three that are not part of four, in which all pairs with a wet column are linked |
-//! | full | of a quartet and a layer: its four columns are a group |
-//! | odd | of a quartet: a wet column in it is not in a full group, and it is searched for groups column by column |
-//! | wall | a column whose solid a neighbour's surface ends at, below the neighbour's ceiling |
-//! | extra | a vertex within a wall, which the surface below it goes on to |
+//! | linked | two columns of neighbouring cells (8), one of them wet, where each one's room holds the other's height |
+//! | quartet | the columns of 2 x 2 cells, named by the north-west cell (minimum x and z) |
+//! | group | four columns of a quartet, or three that are not part of such four, in which every pair with a wet column is linked |
+//! | full | a quartet whose four columns on a layer are a group is full on this layer |
+//! | odd | a quartet with a wet column that is in no full group; it is searched for groups column by column |
+//! | wall | a column at whose solid a neighbour's surface ends, below the neighbour's ceiling |
+//! | extra | a vertex within a wall, to which the surface that ends there is extended |
 //!
-//! Two dry columns of a group need no link. Groups become two triangles or one, which face up. A group of four is divided along a
-//! diagonal: the only one whose two columns are both wet or both dry; if one is wet and the other dry, the wet one; otherwise that with the
-//! greater sum of heights, and if these are equal the one from north-west to south-east. The surface ends at the centres of the outermost cells.
+//! Two dry columns of a group need no link. Groups become one or two triangles, which face up. A group of four is divided along a diagonal:
+//! if only one diagonal has ends that are both wet or both dry, along that one; if one is wet and the other dry, along the wet one;
+//! otherwise along the one with the larger sum of heights, and if these are equal from north-west to south-east. The surface ends at the
+//! centres of the outermost cells.
 //!
-//! Where a group of four lacks one link, of two cells side by side, its two triangles overlap ([`Check::doubled`]): the liquid of these
-//! columns is at different layers there.
+//! Where a group of four lacks one link, between two cells side by side, its two triangles overlap ([`Check::doubled`]): the liquid of
+//! these columns is on different layers there.
 
 pub(in crate::shallow) mod buffers;
 pub mod heights;
@@ -45,21 +46,21 @@ pub use self_check::{Check, check};
 /// The liquid in columns.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Depths<'a> {
-    /// Depth of each index (units): at most from base to ceiling; 0 or less is dry, and so are indices without a column.
+    /// Depth of each index (units), at most from base to ceiling; 0 or less is dry, and so are indices without a column.
     pub depth: &'a [i32],
     /// Mean velocity of each index along x and z (m/s); may be empty.
     pub velocity: &'a [[f32; 2]],
-    /// Whether each strip may have a wet column; without it all are searched.
+    /// Whether each strip may have a wet column; if absent, all strips are searched.
     pub active: Option<&'a [bool]>,
-    /// Least depth at which each index is shown where it is wet (units), at most from base to ceiling; in place of [`Layout::least_depth`].
+    /// Minimum depth at which each index is shown where it is wet (units), at most from base to ceiling; replaces [`Layout::least_depth`].
     /// May be empty. See [`heights::minimum_heights::Lifts`].
     pub least: &'a [i32],
-    /// How far below its base each index is shown where it is dry (units), at most to the underside of its solid; in place of
+    /// How far below its base each index is shown where it is dry (units), at most down to the underside of its solid; replaces
     /// [`Layout::least_depth`]. May be empty.
     pub sunk: &'a [i32],
-    /// A number of each index for each array of [`Target::carried`]: concentrations of scalars. May be empty.
+    /// One number per index for each array of [`Target::carried`]: concentrations of scalars. May be empty.
     pub carried: [&'a [f32]; MOST],
-    /// Where the surface ends over nothing, and comes down to the ground's edge; without them it ends in the middle of the last cell.
+    /// Where the surface ends above nothing and is extended down to the ground's edge; if absent, it ends in the middle of the last cell.
     pub ledges: Option<&'a Ledges>,
 }
 
@@ -73,21 +74,21 @@ pub enum Up {
     Z,
 }
 
-/// How the mesh is written. Triangles are counter-clockwise seen from above; with `left_handed` clockwise. In each case the cross product of
-/// a triangle's edges points along its normals.
+/// How the mesh is written. Triangles are counter-clockwise seen from above, or clockwise with `left_handed`. In both cases the cross
+/// product of a triangle's edges points along its normals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Layout {
-    /// The caller's units in a metre: 1, or 100 for centimetres. For positions, depths and velocities.
+    /// The caller's units per metre: 1, or 100 for centimetres. For positions, depths and velocities.
     pub scale: f64,
     /// The axis that points up.
     pub up: Up,
     /// Left-handed axes: the horizontal axis that is not x points the other way (Y up: z to the north; Z up: y to the south).
     pub left_handed: bool,
-    /// Least height of a wet vertex above its base (m), against flicker where the terrain is drawn too (thesis 4.2.4: 0.05 of a cell), and
-    /// how far below its base a dry one is at least, where the liquid around is not lower still.
+    /// Minimum height of a wet vertex above its base (m), against flicker where the terrain is drawn too (thesis 4.2.4: 0.05 of a cell). A
+    /// dry vertex is at least as far below its base, and further where the liquid around is lower.
     pub least_depth: f64,
-    /// Depth (m) from which a wet vertex is at its full height, so that none jumps as its column wets or dries: below
-    /// it, the thinner the liquid, the nearer its vertex is to where that of a dry column would be. 0: at once; 0.02 of a cell does well.
+    /// Depth (m) from which a wet vertex is at its full height. Below it, the thinner the liquid, the closer its vertex is to that of a dry
+    /// column, so that no vertex jumps as its column wets or dries. 0: at once; 0.02 of a cell works well.
     pub fade_depth: f64,
     /// Depth from which the liquid is opaque (m), for [`Target::opacities`].
     pub opaque_depth: f64,
@@ -106,7 +107,7 @@ impl Default for Layout {
     }
 }
 
-/// Where vertex indices go.
+/// Where vertex indices are written.
 #[derive(Debug, Default)]
 pub enum Indices<'a> {
     /// Nowhere.
@@ -118,27 +119,27 @@ pub enum Indices<'a> {
     U32(&'a mut [u32]),
 }
 
-/// Buffers of the caller. They are written from their beginning, in order, and never read, and may be longer than the mesh; those that are
-/// absent are not wanted. Vertices are in order of their columns' indices, extras behind them.
+/// Buffers of the caller. They are written from the start, in order, and never read; they may be longer than the mesh. Those that are
+/// absent are not wanted. Vertices are in the order of their columns' indices, followed by extras.
 #[derive(Debug, Default)]
 pub struct Target<'a> {
-    /// Three numbers a vertex (m x scale).
+    /// Three numbers per vertex (m x scale).
     pub positions: Option<&'a mut [f32]>,
-    /// Three numbers a vertex: a unit vector.
+    /// Three numbers per vertex: a unit vector.
     pub normals: Option<&'a mut [f32]>,
-    /// One number a vertex (m x scale); dry and extra: 0.
+    /// One number per vertex (m x scale); 0 for dry vertices and extras.
     pub depths: Option<&'a mut [f32]>,
-    /// One number a vertex: depth / [`Layout::opaque_depth`], at most 1 (thesis 4.2.2).
+    /// One number per vertex: depth / [`Layout::opaque_depth`], at most 1 (thesis 4.2.2).
     pub opacities: Option<&'a mut [f32]>,
-    /// Three numbers a vertex (m/s x scale): velocity at the surface, 1.5 times the mean (Eq. 4.4); nothing upward.
+    /// Three numbers per vertex (m/s x scale): velocity at the surface, 1.5 times the mean (Eq. 4.4); the upward component is 0.
     pub velocities: Option<&'a mut [f32]>,
-    /// One number a vertex of each array of [`Depths::carried`]; of one that is dry or an extra, the mean of the wet columns around.
+    /// One number per vertex for each array of [`Depths::carried`]; for a dry vertex or an extra, the mean of the wet columns around.
     pub carried: [Option<&'a mut [f32]>; MOST],
-    /// Layer of each vertex's column; of an extra, the lowest of the wet columns around whose surface ends there.
+    /// Layer of each vertex's column; for an extra, the lowest layer of the wet columns around whose surface ends there.
     pub layers: Option<&'a mut [u32]>,
     /// Index of each vertex's column; [`NONE`] for an extra.
     pub columns: Option<&'a mut [u32]>,
-    /// Three a triangle.
+    /// Three per triangle.
     pub indices: Indices<'a>,
 }
 
@@ -153,10 +154,10 @@ pub struct Counts {
     pub indices: usize,
 }
 
-/// Makes surfaces; keeps its memory from one to the next.
+/// Builds surfaces; reuses its memory.
 #[derive(Debug, Default)]
 pub struct Surface {
-    /// Strips above each other in the columns of the last call of `reserve`, or the first.
+    /// For each strip, the one above it, in the columns of the last call of `reserve` or of the first call.
     above: Vec<u32>,
     found: Found,
     walls: Walls,
@@ -164,12 +165,12 @@ pub struct Surface {
     search: Search,
     normals: Normals,
     around: Around,
-    /// Of each index, as it is shown (units).
+    /// Height of each index as shown (units).
     heights: Vec<i32>,
 }
 
 impl Surface {
-    /// Makes room for whatever liquid these columns may hold: from then on [`Surface::build`] allocates nothing for them.
+    /// Reserves memory for any liquid that these columns can hold: from then on [`Surface::build`] allocates nothing for them.
     pub fn reserve(&mut self, columns: &Columns) {
         let layers = columns.strips().iter().map(|strip| strip.layer as usize + 1).max().unwrap_or(0);
         quartets::links::find_above(columns, &mut self.above);
@@ -185,7 +186,7 @@ impl Surface {
     /// Size of the mesh that [`Surface::build`] would write.
     ///
     /// # Errors
-    /// As [`Surface::build`], of the depths.
+    /// As [`Surface::build`], for the depths.
     pub fn count(&mut self, columns: &Columns, depths: &Depths<'_>) -> Result<Counts> {
         let len = columns.len();
         if depths.depth.len() != len {
@@ -243,12 +244,12 @@ impl Surface {
         })
     }
 
-    /// Writes the mesh of the liquid's surface and returns its size; [`bound`] is the most that it can be.
+    /// Writes the mesh of the liquid's surface and returns its size, at most [`bound`].
     ///
     /// # Errors
-    /// `Argument`, and nothing is written: arrays of depths, velocities, activity, lifts or concentrations of another length than the columns';
-    /// velocities or concentrations are wanted and none given; a scale or opaque depth that is not positive and finite, a least or fade depth that is negative or not
-    /// finite; a buffer that is too short; over 65,536 vertices for indices of 16 bits.
+    /// `Argument`, and nothing is written: arrays of depths, velocities, activity, minimum heights or concentrations whose length differs
+    /// from the columns'; velocities or concentrations that are wanted but not given; a scale or opaque depth that is not positive and
+    /// finite; a minimum or fade depth that is negative or not finite; a buffer that is too short; over 65,536 vertices for 16-bit indices.
     pub fn build(
         &mut self,
         columns: &Columns,
@@ -303,7 +304,7 @@ impl Layout {
 }
 
 impl Target<'_> {
-    /// Whether the liquid has what is wanted.
+    /// Checks that everything wanted is given.
     pub(in crate::shallow) fn check_wanted(&self, depths: &Depths<'_>) -> Result<()> {
         if self.velocities.is_some() && depths.velocity.is_empty() && !depths.depth.is_empty() {
             return Err(Error::argument("velocities of the surface are wanted, and the liquid has none"));
@@ -315,7 +316,7 @@ impl Target<'_> {
         Ok(())
     }
 
-    /// Whether the mesh fits.
+    /// Checks that the mesh fits the buffers.
     pub(in crate::shallow) fn check(&self, counts: &Counts) -> Result<()> {
         let fits = |name: &str, room: Option<usize>, needed: usize| match room {
             Some(room) if room < needed => Err(Error::argument(format!(

@@ -6,16 +6,16 @@ use super::{Columns, NONE};
 /// What [`check`] counts.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Check {
-    /// Pairs of linked wet columns, side by side, that share no edge of a triangle although a group of theirs exists: 0 unless the mesh is
-    /// of other columns.
+    /// Pairs of linked wet columns, side by side, that share no triangle edge although they have a group: 0 unless the mesh belongs to
+    /// other columns.
     pub unlinked: usize,
-    /// Pairs of linked wet columns, side by side, that no third column is linked with both of, so that no triangle can join them.
+    /// Pairs of linked wet columns, side by side, with no third column that is linked with both, so that no triangle can join them.
     pub alone: usize,
-    /// Edges that two triangles have in the same direction: where the liquid of a quartet parts into two layers.
+    /// Edges that two triangles use in the same direction: where the liquid of a quartet splits into two layers.
     pub doubled: usize,
 }
 
-/// Checks a mesh of the surface: of each vertex the column ([`super::Target::columns`]), and the vertex indices of its triangles.
+/// Checks a mesh of the surface, from the column of each vertex ([`super::Target::columns`]) and the vertex indices of its triangles.
 ///
 /// Slow: for tests.
 pub fn check(columns: &Columns, depth: &[i32], vertex_columns: &[u32], indices: &[u32]) -> Check {

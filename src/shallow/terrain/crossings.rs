@@ -1,7 +1,7 @@
 //! Where vertical lines cross a triangle: which lines, decided exactly, and at what heights.
 //!
 //! Each line is shifted by a symbolic (e, e^2) in (x, z), e infinitesimal, so that it meets no edge and no vertex. Nothing but the shift
-//! prefers a side: mirroring the scene or turning it by 90 degrees gives the same bits unless a line meets an edge exactly.
+//! prefers a side: mirroring the scene or rotating it by 90 degrees gives the same bits unless a line meets an edge exactly.
 
 use super::lines::{LANES, ROUNDOFF, WHOLE, greater, integer_of, lesser, whole};
 use crate::shallow::columns::grid::{Heights, TOP};
@@ -11,30 +11,30 @@ pub type Corner = [f64; 3];
 
 /// A triangle that lines may cross.
 pub struct Facet {
-    /// In the triangle's order, from the one whose height no other has: the lowest, or the highest where two are lowest.
+    /// In the triangle's order, starting with the one whose height is unique: the lowest, or the highest where two are lowest.
     pub corners: [Corner; 3],
-    /// Least and greatest height (m).
+    /// Minimum and maximum height (m).
     range: [f64; 2],
-    /// Rounding may change the sign of an area (m2, twice) up to this.
+    /// Up to this, rounding may change the sign of an area (m2, twice).
     doubt: f64,
-    /// In a triangle of this area (m2, twice) or less, rounding may move a height by 2^-8 units.
+    /// In a triangle of at most this area (m2, twice), rounding may move a height by 2^-8 units.
     rough: f64,
 }
 
-/// What several lines are to a triangle.
+/// How several lines lie relative to a triangle.
 #[derive(Default)]
 pub struct Crossed {
-    /// How far they are within it and without (m2, as areas).
+    /// How far they are inside and outside it (m2, as areas).
     within: [f64; LANES],
     beside: [f64; LANES],
     /// Its area (m2, twice), negative if it faces up.
     area: [f64; LANES],
-    /// Height (units), within the range and rounded, for [`integer_of`].
+    /// Height (units), clamped to the range and rounded, for [`integer_of`].
     units: [f64; LANES],
 }
 
 impl Facet {
-    /// A triangle whose heights matter to within a small part of a unit (m).
+    /// A triangle whose heights matter to within a small part of `unit` (m).
     #[inline(always)]
     pub fn new([a, b, c]: [Corner; 3], unit: f64) -> Self {
         let range = |axis: usize| {
@@ -51,18 +51,18 @@ impl Facet {
             [c, a, b]
         };
         let area = (x[1] - x[0]) * (z[1] - z[0]);
-        // A weight (below) is off by 8 roundings of the area at most: three for each product, two for their difference.
+        // A weight (below) is off by at most 8 roundings of the area: three for each product, two for their difference.
         let doubt = 16.0 * ROUNDOFF * area;
-        // Three weights share in the numerator, three in the denominator.
+        // Three weights enter the numerator, three the denominator.
         let rough = area * ((y[1] - y[0]) * (48.0 * 256.0 * ROUNDOFF / unit));
         Self { corners, range: y, doubt, rough }
     }
 
-    /// The height (m) at which the line at (x, z) crosses the triangle, which must be within the ranks of its corners, and whether the
+    /// The height (m) at which the line at (x, z), which must be within the ranks of the triangle's corners, crosses it, and whether the
     /// triangle faces up there.
     ///
-    /// Whether it does is exact. The order of corners, mirrors and turns by 90 degrees do not change a bit of the height; on an edge it
-    /// depends on the edge alone.
+    /// Whether it crosses is exact. The order of corners, mirroring and rotation by 90 degrees do not change a bit of the height; on an
+    /// edge it depends on the edge alone.
     #[inline(never)]
     pub fn cross(&self, at: [f64; 2]) -> Option<(f64, bool)> {
         let from = |corner: usize| [self.corners[corner][0] - at[0], self.corners[corner][2] - at[1]];
@@ -81,7 +81,7 @@ impl Facet {
         Some((height, !is_left))
     }
 
-    /// Computes what [`Facet::one_of`] tells of several lines.
+    /// Computes what [`Facet::one_of`] returns, for several lines.
     #[inline(always)]
     pub fn cross_all(&self, x: &[f64; LANES], z: &[f64; LANES], heights: &Heights, out: &mut Crossed) {
         let [r, p, q] = self.corners;
@@ -104,14 +104,14 @@ impl Facet {
         }
     }
 
-    /// Of one of several lines, the height (units) at which it crosses the triangle, and whether this faces up there.
+    /// For one of several lines, the height (units) at which it crosses the triangle, and whether the triangle faces up there.
     #[inline(always)]
     pub fn one_of(&self, lane: usize, all: &Crossed, at: [f64; 2], heights: &Heights) -> Option<(u32, bool)> {
         let area = all.area[lane];
         if all.within[lane] > self.doubt && area.abs() > self.rough {
             Some((integer_of(all.units[lane]), area < 0.0))
         } else if all.beside[lane] > self.doubt {
-            // Weights of both signs, and no doubt of them.
+            // Weights of both signs, beyond doubt.
             None
         } else {
             self.cross(at).map(|(height, is_up)| (heights.round(height) as u32, is_up))
@@ -152,8 +152,8 @@ impl Facet {
         [1, 2].map(|turn| self.corners[(corner + turn) % 3]).map(|[x, _, z]| [x, z])
     }
 
-    /// Height (m) where the last two corners have these weights, twice the areas that a point spans with the edges opposite to them, out
-    /// of a sum. The two share alike, so that their order does not matter.
+    /// Height (m) from the weights of the last two corners (twice the areas that a point spans with the edges opposite to them) and the sum
+    /// of all weights. The two are treated alike, so that their order does not matter.
     #[inline(always)]
     fn height(&self, weights: [f64; 2], sum: f64) -> f64 {
         let [r, p, q] = self.corners.map(|corner| corner[1]);
@@ -174,7 +174,7 @@ fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-/// Height (m) of an edge at a point (x, z) of it.
+/// Height (m) of an edge at a point (x, z) on it.
 fn along(a: &Corner, b: &Corner, at: [f64; 2]) -> f64 {
     let (low, high) = if a[1] <= b[1] { (a, b) } else { (b, a) };
     if low[1] == high[1] {
@@ -186,13 +186,13 @@ fn along(a: &Corner, b: &Corner, at: [f64; 2]) -> f64 {
     low[1] + part * (high[1] - low[1])
 }
 
-/// (b - a) x (s - a), twice the signed area of (a, b, s) in (x, z): the sign is exact, the magnitude the nearest f64 but for some
-/// 2^-64 of it, and both depend on the exact value alone.
+/// (b - a) x (s - a), twice the signed area of (a, b, s) in (x, z): the sign is exact, the magnitude the nearest f64 to within about 2^-64
+/// of it, and both depend on the exact value alone.
 ///
-/// Exact because all is done in integers. Each f64 is m 2^k. Where the six coordinates are multiples of a power of two below 2^62 times
-/// it, i128 holds differences (63 bits), products (126) and their difference (127). Otherwise the six products of the expanded
-/// determinant are summed in 768 bits. Those hold multiples of 2^-320 below 2^448: a and b come from f32 without denormals
-/// (multiples of 2^-149 below 2^128), and s is the centre of a cell of 1e-9 m or more, a multiple of 2^-84, within some 2^100.
+/// Exact because all of it is done in integers. Each f64 is m 2^k. Where the six coordinates are multiples of a power of two and below 2^62
+/// times it, i128 holds differences (63 bits), products (126) and their difference (127). Otherwise the six products of the expanded
+/// determinant are summed in 768 bits. Those hold multiples of 2^-320 below 2^448: a and b come from f32 without denormals (multiples of
+/// 2^-149 below 2^128), and s is the centre of a cell of 1e-9 m or more, a multiple of 2^-84, within some 2^100.
 pub fn exact_cross(a: [f64; 2], b: [f64; 2], s: [f64; 2]) -> f64 {
     let products = [[a[0], s[0], b[1], s[1]], [a[1], s[1], b[0], s[0]]].map(exact_product);
     if let [Some(first), Some(second)] = products {
@@ -220,14 +220,14 @@ pub fn exact_cross(a: [f64; 2], b: [f64; 2], s: [f64; 2]) -> f64 {
     sum.value()
 }
 
-/// (a - s) (b - t), where f64 holds it: differences without error that are zero or have up to 26 bits.
+/// (a - s) (b - t), if exact in f64: the differences have no rounding error, and are zero or have up to 26 bits.
 fn exact_product([a, s, b, t]: [f64; 4]) -> Option<f64> {
     let (p, q) = (a - s, b - t);
     if p == 0.0 || q == 0.0 {
         return Some(0.0);
     }
     let is_short = |difference: f64| difference.to_bits() & ((1 << 27) - 1) == 0;
-    // What rounding took from a - s (Knuth) is 0.
+    // The rounding error of a - s (Knuth) is 0.
     let is_exact = |difference: f64, a: f64, s: f64| {
         let back = a - difference;
         (a - (difference + back)) + (back - s) == 0.0
@@ -235,7 +235,7 @@ fn exact_product([a, s, b, t]: [f64; 4]) -> Option<f64> {
     (is_short(p) && is_short(q) && is_exact(p, a, s) && is_exact(q, b, t)).then_some(p * q)
 }
 
-/// An f64 that is no denormal, as odd m (or 0) and k of m 2^k.
+/// An f64 that is not denormal, as odd m (or 0) and k of m 2^k.
 fn integer(value: f64) -> (i64, i32) {
     let bits = value.to_bits();
     let exponent = (bits >> 52 & 0x7ff) as i32;
@@ -253,7 +253,7 @@ fn power_of_two(exponent: i32) -> f64 {
     f64::from_bits(((1023 + exponent) as u64) << 52)
 }
 
-/// A sum of integers times powers of two, in digits of 32 bits, the first of 2^-320.
+/// A sum of integers times powers of two, in 32-bit digits; the first has the weight 2^-320.
 struct Sum([i64; 24]);
 
 impl Sum {
@@ -363,7 +363,7 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             f64::from((state >> 40) as f32 / (1 << 23) as f32 - 1.0)
         };
-        // Numbers from -1 to 1 as integers, on a lattice on which i128 has room for areas.
+        // Numbers from -1 to 1 as integers, on a lattice whose areas fit i128.
         let scale = 2f64.powi(57);
         let exact = |value: f64| (value * scale) as i128;
         let mut wrong = 0;

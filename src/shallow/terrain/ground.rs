@@ -1,4 +1,4 @@
-//! The terrain's own solids below shapes that move: so that these move without the terrain being cast again.
+//! The terrain's own solids below moving shapes, so that shapes move without casting the terrain again.
 
 use std::ops::Range;
 
@@ -40,13 +40,13 @@ impl Listed {
     }
 }
 
-/// Shapes that move, and the terrain's own solids.
+/// Moving shapes, and the terrain's own solids.
 #[derive(Debug, Clone, Default)]
 pub struct Ground {
     bodies: Vec<Shape>,
-    /// Of every cell (`Grid::index`), while there are shapes.
+    /// Solids of every cell (`Grid::index`), while there are shapes.
     own: Listed,
-    /// What `own` is made anew in.
+    /// Scratch buffer in which `own` is rebuilt.
     spare: Listed,
     /// The solids of some cells, united with those of the shapes.
     united: Listed,
@@ -61,7 +61,7 @@ impl Ground {
         &self.bodies
     }
 
-    /// Sets the shapes; calls `see` with the boxes of cells that one which changes may have covered, or may cover.
+    /// Sets the shapes; calls `see` with the boxes of cells that a changed shape may have covered before, or may cover now.
     pub fn set_bodies(&mut self, grid: &Grid, bodies: &[Shape], mut see: impl FnMut([Range<usize>; 2])) {
         for index in 0..bodies.len().max(self.bodies.len()) {
             let (old, new) = (self.bodies.get(index), bodies.get(index));
@@ -73,7 +73,7 @@ impl Ground {
         self.bodies.extend_from_slice(bodies);
     }
 
-    /// Forgets the terrain's solids; [`Ground::add`] is then called for every cell, row by row along x.
+    /// Clears the terrain's solids; [`Ground::add`] is then called for every cell, row by row along x.
     pub fn clear(&mut self) {
         self.own.clear();
     }
@@ -84,7 +84,7 @@ impl Ground {
         self.own.end_cell();
     }
 
-    /// Puts other solids in place of those of a box of cells; `cast` are those of its cells, row by row along x.
+    /// Replaces the solids of a box of cells by those of `cast`, one cell after another, row by row along x.
     pub fn replace<'a>(
         &mut self,
         grid: &Grid,
@@ -109,7 +109,7 @@ impl Ground {
         std::mem::swap(own, spare);
     }
 
-    /// Unites the solids of some cells (x, z), row by row along x, with those of the shapes, but in cells that are `apart`.
+    /// Unites the solids of some cells (x, z), row by row along x, with those of the shapes, except in cells that are `apart`.
     pub fn unite(
         &mut self,
         grid: &Grid,
@@ -148,7 +148,7 @@ impl Ground {
         }
     }
 
-    /// The united solids of a cell, by its rank among those.
+    /// The united solids of a cell, by its rank among these cells.
     pub fn united(&self, rank: usize) -> &[Solid] {
         self.united.cell(rank)
     }

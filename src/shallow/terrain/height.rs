@@ -1,14 +1,13 @@
-//! Solids of height fields: each cell is solid from its height down for ever.
+//! Solids of height fields: each cell is solid from its height down without end.
 
 use super::Solids;
 use crate::error::{Error, Result};
 use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 
-/// One solid a cell from heights (m) at the centres of the cells, row by row along x (`Grid::index`). Heights beyond the range become
-/// its ends.
+/// One solid per cell, from heights (m) at the centres of the cells, row by row along x (`Grid::index`). Heights are clamped to the range.
 ///
 /// # Errors
-/// `Argument`: a grid that [`Grid::validate`] refuses, another count of heights than of cells, a height that is not finite.
+/// `Argument`: a grid that [`Grid::validate`] refuses, a count of heights that is not that of cells, a height that is not finite.
 pub fn solids(tops: impl ExactSizeIterator<Item = f64>, grid: Grid, heights: Heights) -> Result<Solids> {
     grid.validate()?;
     let [nx, nz] = grid.size;
@@ -26,7 +25,7 @@ pub fn solids(tops: impl ExactSizeIterator<Item = f64>, grid: Grid, heights: Hei
     Ok(out)
 }
 
-/// One solid a cell from a grey image that lies on the ground.
+/// One solid per cell, from a grey image that lies on the ground.
 ///
 /// # Errors
 /// `Argument`: as [`solids`] and [`Image::validate`].
@@ -41,11 +40,11 @@ pub fn of_image(image: &Image<'_>, grid: Grid, heights: Heights) -> Result<Solid
 /// A grey image on the ground, whose values are heights.
 #[derive(Debug, Clone, Copy)]
 pub struct Image<'a> {
-    /// Values of the pixels, row by row along x, the first row at the least z: 0 is black and 1 is white.
+    /// Values of the pixels, row by row along x, the first row at the minimum z: 0 is black and 1 is white.
     pub greys: &'a [f32],
     /// Count of pixels along x and along z.
     pub size: [usize; 2],
-    /// The corner with the least x and z (m).
+    /// The corner with the minimum x and z (m).
     pub corner: [f64; 2],
     /// Length along x and along z (m).
     pub extent: [f64; 2],
@@ -57,7 +56,7 @@ impl Image<'_> {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// `Argument`: no pixel, another count of values than of pixels, a value that is not finite, an extent that is not a positive
+    /// `Argument`: no pixel, a count of values that is not that of pixels, a value that is not finite, an extent that is not a positive
     /// length, a corner or level that is not finite.
     pub fn validate(&self) -> Result<()> {
         let ([width, height], count) = (self.size, self.greys.len());
@@ -80,25 +79,25 @@ impl Image<'_> {
         Ok(())
     }
 
-    /// Height (m) at a position, bilinear between the centres of pixels; beyond the outermost centres it is theirs. An image that is
-    /// mirrored or turned by 90 degrees about its middle, position and all, gives the same bits.
+    /// Height (m) at a position, bilinear between the centres of pixels and constant beyond the outermost ones. Mirroring image and
+    /// position about the image's middle, or rotating both by 90 degrees, gives the same bits.
     pub fn height(&self, at: [f64; 2]) -> f64 {
         let [x, z] = [0, 1].map(|axis| self.beside(axis, at[axis]));
         let grey = |x: usize, z: usize| f64::from(self.greys[z * self.size[0] + x]);
         let greys = [0, 1].map(|j| [0, 1].map(|i| grey(x[i].0, z[j].0)));
         let least = greys.as_flattened().iter().fold(f64::INFINITY, |least, grey| least.min(*grey));
-        // Differences from the least, so that an even image stays even.
+        // Differences from the minimum, so that a uniform image stays uniform.
         let part = |i: usize, j: usize| x[i].1 * z[j].1 * (greys[j][i] - least);
         let grey = least + ((part(0, 0) + part(1, 1)) + (part(1, 0) + part(0, 1)));
         let [black, white] = self.levels;
         black + grey * (white - black)
     }
 
-    /// The two pixels along an axis between whose centres a coordinate lies, and their weights; one that has all of it twice.
+    /// The two pixels between whose centres a coordinate lies, and their weights; the same pixel twice if it has all of the weight.
     fn beside(&self, axis: usize, position: f64) -> [(usize, f64); 2] {
         let (count, last) = (self.size[axis] as f64, self.size[axis] - 1);
         let pixel = self.extent[axis] / count;
-        // From the middle of the image, about which a mirror exchanges first and last.
+        // Relative to the middle of the image, about which mirroring swaps first and last.
         let position = position - (self.corner[axis] + self.extent[axis] / 2.0);
         let centre = |index: usize| (index as f64 + 0.5 - count / 2.0) * pixel;
         let first = (position / pixel + (count - 1.0) / 2.0).floor().clamp(0.0, last as f64) as usize;
@@ -173,7 +172,7 @@ mod tests {
     fn a_mirrored_or_turned_image_gives_the_same_bits() {
         let greys = [0.1, 0.7, 0.3, 0.9, 0.2, 0.6f32];
         let mirrored: Vec<f32> = [2, 1, 0, 5, 4, 3].iter().map(|&index: &usize| greys[index]).collect();
-        // (x, z) becomes (z, -x): rows run along what was z.
+        // (x, z) becomes (z, -x): rows run along the former z.
         let turned: Vec<f32> = [2, 5, 1, 4, 0, 3].iter().map(|&index: &usize| greys[index]).collect();
         let turned = Image { size: [2, 3], corner: [-1.0, -1.5], extent: [2.0, 3.0], ..image(&turned) };
         for x in -20..=20 {

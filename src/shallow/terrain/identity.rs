@@ -1,4 +1,4 @@
-//! Which terrain a liquid is on: what a snapshot and a saved state compare, so that neither has to look at all columns each time.
+//! Which terrain a liquid is on: snapshots and saved states compare this, so that neither has to compare all columns each time.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -7,17 +7,17 @@ use xxhash_rust::xxh3::Xxh3;
 
 use crate::shallow::columns::{Columns, STRIP};
 
-/// Tells the columns of a liquid from all others of the process by a number, and from those of other processes by a hash. Where columns
-/// change, a new one takes its place.
+/// Distinguishes the columns of a liquid from all others of the process by a number, and from those of other processes by a hash. Changed
+/// columns get a new identity.
 #[derive(Debug)]
 pub(in crate::shallow) struct Identity {
     number: u64,
-    /// Found when it is first asked for.
+    /// Computed on first use.
     hash: OnceLock<[u8; 16]>,
 }
 
 impl Identity {
-    /// Of columns that are new or have just changed.
+    /// For columns that are new or have just changed.
     pub fn new() -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(1);
         Self { number: NEXT.fetch_add(1, Ordering::Relaxed), hash: OnceLock::new() }
@@ -28,7 +28,7 @@ impl Identity {
         self.number
     }
 
-    /// A hash of the columns, whose identity this is: the same on every machine.
+    /// Hash of the columns that have this identity: the same on every machine.
     pub fn hash(&self, columns: &Columns) -> [u8; 16] {
         *self.hash.get_or_init(|| hash(columns))
     }

@@ -2,7 +2,7 @@
 
 use super::crossings::Corner;
 
-/// Positions that are asked for together.
+/// Positions that are tested together.
 pub const LANES: usize = 4;
 
 /// Unit roundoff of f64.
@@ -10,18 +10,18 @@ pub(super) const ROUNDOFF: f64 = f64::EPSILON / 2.0;
 
 /// The coordinates of the lines through the cells of one axis.
 pub struct Lines {
-    /// Ascending, between an infinity at one end and some at the other.
+    /// Ascending, with one infinity before the first and several after the last.
     positions: Vec<f64>,
     /// Count of lines.
     count: usize,
     /// 1 / cell (1/m).
     inverse: f64,
-    /// Greatest magnitude of the numbers that a coordinate is made of (m).
+    /// Maximum magnitude of the numbers that a coordinate is computed from (m).
     reach: f64,
 }
 
 impl Lines {
-    /// Lines at strictly ascending coordinates; `reach` bounds them and the origin that they are counted from.
+    /// Lines at strictly ascending coordinates; `reach` bounds them and the origin that they are measured from.
     pub fn new(centres: impl Iterator<Item = f64>, cell: f64, reach: f64) -> Self {
         let mut positions = vec![f64::NEG_INFINITY];
         positions.extend(centres);
@@ -35,7 +35,7 @@ impl Lines {
         self.positions[line as usize + 1]
     }
 
-    /// Coordinates of a line and those behind it; infinity behind the last.
+    /// Coordinates of a line and the next ones; infinity after the last.
     #[inline(always)]
     pub fn from(&self, line: u32) -> &[f64; LANES] {
         self.positions[line as usize + 1..].first_chunk().expect("infinities follow the last line")
@@ -46,11 +46,11 @@ impl Lines {
         (position - self.positions[1]) * self.inverse
     }
 
-    /// Count of lines left of a coordinate after the shift, exactly. A triangle can only cross the lines from the least rank of its
-    /// corners to the line before the greatest.
+    /// Count of lines left of a coordinate after the shift, exactly. A triangle can only cross the lines from the minimum rank of its
+    /// corners to the line before the maximum.
     #[inline]
     pub fn rank(&self, position: f64) -> u32 {
-        // Mostly it is right.
+        // Usually right.
         let guess = lesser(greater(self.lines_to(position) + 1.0, 0.0), self.count as f64);
         let mut rank = guess as i32 as usize;
         while self.positions[rank + 1] < position {
@@ -66,20 +66,20 @@ impl Lines {
 /// The edges of a triangle, to find the lines of a row that may cross it.
 pub struct Outline {
     edges: [Edge; 3],
-    /// How far (lines) a computed position may be from the true one.
+    /// How far (lines) a computed position may be from the exact one.
     error: f64,
 }
 
-/// An edge between two coordinates z (m); no row where it has one z only.
+/// An edge between two z coordinates (m); without rows if they are equal.
 struct Edge {
     range: [f64; 2],
-    /// At the position of its first end: z (m) and x (lines).
+    /// z (m) and x (lines) of its first end.
     from: [f64; 2],
     /// Change of x (lines) with z (m).
     slope: f64,
 }
 
-/// Of several rows, the first line that may cross a triangle, and the one behind the last; as numbers from [`whole`].
+/// For several rows, the first line that may cross a triangle, and the one after the last; as numbers from [`whole`].
 #[derive(Default)]
 pub struct Spans {
     first: [f64; LANES],
@@ -92,18 +92,17 @@ impl Outline {
     pub fn new(corners: &[Corner; 3], x: &Lines) -> Self {
         let edge = |corner: usize| {
             let (a, b) = (&corners[corner], &corners[(corner + 1) % 3]);
-            // The two others end where a row through all of such an edge meets it.
+            // An edge along x: the row through it meets it where the two other edges end.
             let range = if a[2] == b[2] { [1.0, -1.0] } else { [lesser(a[2], b[2]), greater(a[2], b[2])] };
             let slope = (b[0] - a[0]) * x.inverse / (b[2] - a[2]);
             Edge { range, from: [a[2], x.lines_to(a[0])], slope }
         };
         let reach = corners.iter().fold(x.reach, |reach, corner| greater(reach, corner[0].abs()));
-        // A position has seen 11 roundings of at most 2 reach, that of a line 6 of at most 1: 28 in all, and as much
-        // again is room for more.
+        // A position has 11 roundings of at most 2 reach, that of a line 6 of at most 1: 28 in all; the rest of the 128 is margin.
         Self { edges: [edge(0), edge(1), edge(2)], error: 128.0 * ROUNDOFF * reach * x.inverse }
     }
 
-    /// Of the lines from `first` to before `last`, finds those that may cross the triangle in rows at several z.
+    /// Of the lines from `first` to before `last`, finds those that may cross the triangle, in rows at several z.
     #[inline(always)]
     pub fn spans(&self, z: &[f64; LANES], [first, last]: [u32; 2], out: &mut Spans) {
         let [a, b, c] = &self.edges;
@@ -119,7 +118,7 @@ impl Outline {
             let greatest = |edge: &Edge| position(edge, f64::NEG_INFINITY);
             let start = lesser(lesser(least(a), least(b)), least(c)) - self.error;
             let end = greater(greater(greatest(a), greatest(b)), greatest(c)) + self.error;
-            // Half a line on, the nearest line is the first behind a position; the error is larger than what this rounds.
+            // Half a line further, the nearest line is the first after a position; the error exceeds what this rounds.
             out.first[lane] = whole(lesser(greater(start + 0.5, first), last));
             out.last[lane] = whole(lesser(greater(end + 0.5, first), last));
         }
@@ -127,35 +126,35 @@ impl Outline {
 }
 
 impl Spans {
-    /// The first line of a row, and the one behind the last.
+    /// The first line of a row, and the one after the last.
     #[inline(always)]
     pub fn lines(&self, row: usize) -> [u32; 2] {
         [self.first[row], self.last[row]].map(integer_of)
     }
 }
 
-/// Of a number from 0 to below 2^32 that is rounded to the nearest integer, or the even one: the integer, for [`integer_of`].
+/// Encodes a number from 0 to below 2^32, rounded to the nearest integer (ties to even), for [`integer_of`].
 #[inline(always)]
 pub(super) fn whole(number: f64) -> f64 {
     number + WHOLE
 }
 
-/// The integer of [`whole`].
+/// The integer that [`whole`] encoded.
 #[inline(always)]
 pub(super) fn integer_of(whole: f64) -> u32 {
     whole.to_bits() as u32
 }
 
-/// f64 has no room for fractions of it: integers that are added stand in its last bits.
+/// At this magnitude f64 has no fraction bits: added integers appear in its lowest bits.
 pub(super) const WHOLE: f64 = (1u64 << 52) as f64;
 
-/// The lesser of two numbers that are not NaN: one instruction, unlike `f64::min`.
+/// The smaller of two numbers that are not NaN: one instruction, unlike `f64::min`.
 #[inline(always)]
 pub(super) fn lesser(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
-/// The greater of two numbers that are not NaN.
+/// The larger of two numbers that are not NaN.
 #[inline(always)]
 pub(super) fn greater(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }

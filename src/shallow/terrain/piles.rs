@@ -3,19 +3,19 @@
 use super::solids::Solid;
 use crate::shallow::columns::grid::BOTTOMLESS;
 
-/// The crossings of the lines of a box of cells: height (units) x 2 + 1 if the triangle faces up.
+/// The crossings of the lines of a box of cells: height (units) x 2, plus 1 if the triangle faces up.
 #[derive(Debug, Default)]
 pub(super) struct Piles {
     /// Cell and crossing, in any order.
     crossings: Vec<[u32; 2]>,
-    /// Of each cell, and behind the last one: count of its crossings, then where they begin in `sorted`, then where they end.
+    /// For each cell, and one after the last: count of its crossings, then where they begin in `sorted`, then where they end.
     ends: Vec<u32>,
     /// The crossings of each cell together.
     sorted: Vec<u32>,
 }
 
 impl Piles {
-    /// Forgets the crossings, for a count of cells.
+    /// Clears the crossings, for this many cells.
     pub fn reset(&mut self, cells: usize) {
         self.crossings.clear();
         self.ends.clear();
@@ -34,7 +34,7 @@ impl Piles {
         self.crossings.push([cell as u32, crossing]);
     }
 
-    /// Sorts the crossings of each cell and makes solids of them; `starts` gets where each cell's begin and the end of the last.
+    /// Sorts the crossings of each cell and makes solids of them; `starts` gets where each cell's solids begin, and the end of the last.
     pub fn stack(&mut self, starts: &mut Vec<u32>, solids: &mut Vec<Solid>) {
         let Self { crossings, ends, sorted } = self;
         let mut next = 0;
@@ -59,7 +59,7 @@ impl Piles {
         }
     }
 
-    /// Where the buffers lie, and how much they hold.
+    /// Addresses and capacities of the buffers.
     #[cfg(test)]
     pub fn memory(&self) -> [usize; 6] {
         let Self { crossings, ends, sorted } = self;
@@ -68,7 +68,7 @@ impl Piles {
         [sizes[0], sizes[1], sizes[2], positions[0], positions[1], positions[2]]
     }
 
-    /// Keeps room for half as many crossings again: frames that find a little more allocate nothing.
+    /// Reserves memory for half as many crossings again: frames that find a few more allocate nothing.
     pub fn keep_room(&mut self) {
         keep_room(&mut self.crossings);
         keep_room(&mut self.sorted);
@@ -83,7 +83,7 @@ fn pile(line: &[u32], solids: &mut Vec<Solid>) {
     let mut above = line.iter().rev().peekable();
     while let Some(crossing) = above.next() {
         winding += ((crossing & 1) << 1) as i32 - 1;
-        // Changes at one height are summed.
+        // Changes at the same height are summed.
         if above.peek().is_some_and(|next| *next >> 1 == crossing >> 1) || is_solid == (winding > 0) {
             continue;
         }
@@ -101,7 +101,7 @@ fn pile(line: &[u32], solids: &mut Vec<Solid>) {
     solids[first..].reverse();
 }
 
-/// Keeps room for half as much again.
+/// Reserves memory for half as much again.
 pub(super) fn keep_room<T>(buffer: &mut Vec<T>) {
     let wanted = buffer.len() + buffer.len() / 2;
     if buffer.capacity() < wanted {

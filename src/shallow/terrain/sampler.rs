@@ -6,25 +6,25 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights, TOP};
 
-/// Positions of a batch.
+/// Positions per batch.
 const BATCH: u64 = 1 << 14;
-/// Most samples on a line, but for its ends.
+/// Maximum number of samples on a line, without its ends.
 const MOST_SAMPLES: f64 = (1 << 24) as f64;
-/// Most voxels from its one end to the other.
+/// Maximum number of voxels from one end to the other.
 const MOST_STEPS: f64 = 1e15;
 
-/// The solids of every cell: where distances are negative. Each line is sampled from the least height up in steps of a voxel (m), and
-/// a change of sign is placed by linear interpolation; solids and gaps thinner than a voxel may be missed. What is solid at the least
-/// height is so for ever below.
+/// The solids of every cell: where distances are negative. Each line is sampled from the minimum height up in steps of a voxel (m), and
+/// sign changes are located by linear interpolation; solids and gaps thinner than a voxel may be missed. What is solid at the minimum
+/// height is solid without end below it.
 ///
-/// Below and above the heights `between` (m) distances keep their sign: there only the ends of the lines are sampled, and a level set may lie in a range of any
-/// length.
+/// Below and above the heights `between` (m) distances keep their sign: only the ends of the lines are sampled there, so that a level set
+/// may lie in a height range of any length.
 ///
-/// `sample` gets positions (m), at most 16,384 at a time, and puts their distances (m) into its second argument, whatever that held.
+/// `sample` gets positions (m), at most 16,384 at a time, and replaces the contents of its second argument by their distances (m).
 ///
 /// # Errors
-/// `Argument`: a grid that [`Grid::validate`] refuses, a voxel that is not a positive length or too small for the heights, another count
-/// of distances than of positions, a distance that is not finite. And those of `sample`.
+/// `Argument`: a grid that [`Grid::validate`] refuses, a voxel that is not a positive length or too small for the heights, a count of
+/// distances that is not that of positions, a distance that is not finite. Also what `sample` returns.
 pub fn solids(
     grid: Grid,
     heights: Heights,
@@ -70,7 +70,7 @@ struct Ladder {
     low: f64,
     high: f64,
     voxel: f64,
-    /// Samples between the first, at the least height, and the last: the first of these, in voxels, and their count.
+    /// The first sample after the one at the minimum height, in voxels; count of samples with both ends.
     first: u64,
     count: u64,
 }
@@ -82,7 +82,7 @@ impl Ladder {
             return Err(Error::argument(format!("a voxel of {voxel} m is not a positive length")));
         }
         let steps = ((high - low) / voxel).ceil();
-        // The samples around those heights; nothing where they do not meet the range.
+        // The samples around those heights; none where they do not overlap the range.
         let first = ((between[0] - low) / voxel).floor().clamp(1.0, steps.max(1.0));
         let end = (((between[1] - low) / voxel).ceil() + 1.0).clamp(first, steps.max(1.0));
         if steps < 1.0 || end - first >= MOST_SAMPLES || steps >= MOST_STEPS {
@@ -93,7 +93,7 @@ impl Ladder {
         Ok(Self { low, high, voxel, first: first as u64, count: (end - first) as u64 + 2 })
     }
 
-    /// A sample of all cells' lines, one line after another.
+    /// Position of a sample, numbered along one line after another.
     fn position(&self, grid: &Grid, index: u64) -> DVec3 {
         let (cell, step) = ((index / self.count) as usize, index % self.count);
         let [x, z] = grid.centre([cell % grid.size[0], cell / grid.size[0]]);
@@ -106,12 +106,12 @@ impl Ladder {
     }
 }
 
-/// A line on its way up.
+/// A line as it is sampled upward.
 #[derive(Default)]
 struct Line {
     /// Height and distance of the sample below (m).
     below: Option<[f64; 2]>,
-    /// The bottom of the solid that the sample below is in.
+    /// The bottom of the solid that contains the sample below.
     bottom: Option<i32>,
     solids: Vec<Solid>,
 }
@@ -134,14 +134,14 @@ impl Line {
         self.below = Some([height, distance]);
     }
 
-    /// Keeps a solid that has units.
+    /// Adds a solid that is at least one unit high.
     fn add(&mut self, solid: Solid) {
         if solid[0] < solid[1] {
             self.solids.push(solid);
         }
     }
 
-    /// Ends the line at the greatest height; the next may begin when its solids are taken.
+    /// Ends the line at the maximum height; the next may begin once its solids are taken.
     fn finish(&mut self) {
         if let Some(bottom) = self.bottom.take() {
             self.add([bottom, TOP]);
@@ -190,7 +190,7 @@ mod tests {
                 layers[solids.len()] += 1;
                 assert_eq!(solids[0][0], BOTTOMLESS);
                 assert!((heights().metres(solids[0][1]) + 0.8).abs() < 1e-6, "{cell:?}");
-                // Near the rims a line is almost a tangent.
+                // Near the rims a line is almost tangent.
                 if solids.len() == 3 && reach(0.4) > 0.2 {
                     let metres = solids[1..].as_flattened().iter().map(|&units| heights().metres(units));
                     for (found, border) in metres.zip(borders) {
@@ -238,7 +238,7 @@ mod tests {
                 && metres.zip([-0.55, 0.55]).all(|(found, wanted)| (found - wanted).abs() < 0.01),
             "{middle:?}"
         );
-        // The same samples as of the whole range, and so the same solids.
+        // The same samples as for the whole range, and so the same solids.
         let whole = of(heights(), [-1.0, 1.0]);
         let part = of(heights(), [-0.6, 0.6]);
         assert!((0..GRID.cells()).all(|cell| whole.cell(cell) == part.cell(cell)));

@@ -1,4 +1,4 @@
-//! Solids of simple shapes that move: obstacles for which no triangle is cast.
+//! Solids of simple moving shapes: obstacles for which no triangle is cast.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::shallow::columns::grid::{Grid, Heights};
 
-/// How far axes of a cuboid may be from unit vectors that are perpendicular to each other.
+/// Tolerance for the axes of a cuboid, which must be perpendicular unit vectors.
 const SKEW: f64 = 1e-6;
 
 /// A solid shape (m).
@@ -76,7 +76,7 @@ impl Shape {
         }
     }
 
-    /// The cells that it may cover: ranges of x and of z. Those of other cells have no solid of it.
+    /// The cells that it may cover: ranges of x and of z. Other cells contain no solid of it.
     pub fn cells(&self, grid: &Grid) -> [Range<usize>; 2] {
         let bounds = self.bounds();
         [0, 1].map(|axis| {
@@ -89,7 +89,7 @@ impl Shape {
         })
     }
 
-    /// Least and greatest x, and z (m).
+    /// Minimum and maximum x, and z (m).
     fn bounds(&self) -> [[f64; 2]; 2] {
         let around = |middle: f64, reach: f64| [middle - reach, middle + reach];
         match self {
@@ -105,7 +105,7 @@ impl Shape {
         }
     }
 
-    /// The part of the vertical line at (x, z) that is within: bottom and top (m).
+    /// The part of the vertical line at (x, z) inside the shape: bottom and top (m).
     pub fn interval(&self, at: [f64; 2]) -> Option<[f64; 2]> {
         match self {
             Self::Sphere { centre, radius } => {
@@ -118,7 +118,7 @@ impl Shape {
         }
     }
 
-    /// The solid of the vertical line at (x, z) in units, if it is as high as one.
+    /// The solid of the vertical line at (x, z) in units, if it is at least one unit high.
     pub fn solid(&self, at: [f64; 2], heights: &Heights) -> Option<Solid> {
         let [bottom, top] = self.interval(at)?.map(|height| heights.round(height));
         (bottom < top).then_some([bottom, top])
@@ -137,13 +137,13 @@ impl Shape {
     }
 }
 
-/// A square root, of numbers from 0 on.
+/// The square root; none of negative numbers.
 fn root(square: f64) -> Option<f64> {
     (square >= 0.0).then(|| square.sqrt())
 }
 
-/// A capsule is what a sphere sweeps on its way from end to end; the highest and the lowest position on the line are each touched by one of
-/// those spheres.
+/// A capsule is what a sphere sweeps from one end to the other; the highest and the lowest position on the line each lie on one of those
+/// spheres.
 fn of_capsule([from, to]: &[DVec3; 2], radius: f64, at: [f64; 2]) -> Option<[f64; 2]> {
     let way = to - from;
     let [x, z] = [at[0] - from.x, at[1] - from.z];
@@ -153,7 +153,7 @@ fn of_capsule([from, to]: &[DVec3; 2], radius: f64, at: [f64; 2]) -> Option<[f64
         return Some([from.y.min(to.y) - half, from.y.max(to.y) + half]);
     }
     let length = square.sqrt();
-    // The line as seen from above: how far along the way, and how far beside it.
+    // The line as seen from above: how far along the segment, and how far beside it.
     let along = (x * way.x + z * way.z) / length;
     let beside = (x * way.z - z * way.x) / length;
     let room = radius * radius - beside * beside;
@@ -168,7 +168,7 @@ fn of_capsule([from, to]: &[DVec3; 2], radius: f64, at: [f64; 2]) -> Option<[f64
     Some([end(-1.0)?, end(1.0)?])
 }
 
-/// Between each pair of parallel faces.
+/// Intersects the slabs between parallel faces.
 fn of_cuboid(centre: &DVec3, axes: &[DVec3; 3], half: &[f64; 3], at: [f64; 2]) -> Option<[f64; 2]> {
     let [x, z] = [at[0] - centre.x, at[1] - centre.z];
     let (mut bottom, mut top) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -197,7 +197,7 @@ mod tests {
         Heights::between(-2.0, 2.0).unwrap()
     }
 
-    /// A box turned about all axes.
+    /// A box rotated about all axes.
     fn cuboid(centre: DVec3, half: [f64; 3]) -> Shape {
         let a = DVec3::new(0.6, 0.64, 0.48);
         let b = DVec3::new(0.8, -0.48, -0.36);

@@ -2,7 +2,7 @@
 
 use crate::shallow::columns::grid::{Grid, Heights};
 
-/// A solid interval (units): from its bottom ([`crate::shallow::columns::grid::BOTTOMLESS`]: it reaches down for ever) to its top.
+/// A solid interval (units), bottom to top; a bottom of [`crate::shallow::columns::grid::BOTTOMLESS`] means that it has no lower end.
 pub type Solid = [i32; 2];
 
 /// The solid intervals of every cell, from the lowest up; they neither touch nor overlap.
@@ -18,8 +18,8 @@ pub struct Solids {
 }
 
 impl Solids {
-    /// Intervals from lists of each cell, row by row along x (`Grid::index`). Sorted and united here: those that touch or overlap become
-    /// one; empty ones (top below bottom) go.
+    /// Intervals from a list for each cell, row by row along x (`Grid::index`). They are sorted and united here: those that touch or
+    /// overlap become one, and empty ones (top below bottom) are dropped.
     pub fn new(grid: Grid, heights: Heights, cells: impl IntoIterator<Item = Vec<Solid>>) -> Self {
         let mut out = Self { grid, heights, starts: vec![0], solids: Vec::new() };
         for mut cell in cells {
@@ -29,12 +29,12 @@ impl Solids {
         out
     }
 
-    /// No cell yet; [`Solids::push`] adds one after another.
+    /// No cells yet; [`Solids::push`] adds them one by one.
     pub fn empty(grid: Grid, heights: Heights) -> Self {
         Self { grid, heights, starts: vec![0], solids: Vec::new() }
     }
 
-    /// Adds the next cell, whose intervals are sorted and apart.
+    /// Adds the next cell, whose intervals are sorted and separate.
     pub fn push(&mut self, cell: &[Solid]) {
         debug_assert!(cell.windows(2).all(|pair| pair[0][1] < pair[1][0]));
         self.solids.extend_from_slice(cell);
@@ -46,7 +46,7 @@ impl Solids {
         &self.solids[self.starts[index] as usize..self.starts[index + 1] as usize]
     }
 
-    /// Most intervals that a cell has.
+    /// Maximum number of intervals in a cell.
     pub fn layers(&self) -> usize {
         self.starts.windows(2).map(|pair| (pair[1] - pair[0]) as usize).max().unwrap_or(0)
     }

@@ -1,15 +1,15 @@
 //! Solids of triangles, open or closed, that may overlap: a point is solid where the winding number is above 0.
 //!
-//! Going down a vertical line from above, where the winding number is 0, a triangle that faces up adds 1 and one that faces down takes 1.
-//! So solids that overlap unite, an open sheet that faces up is solid down to [`BOTTOMLESS`](crate::shallow::columns::grid::BOTTOMLESS), and one that faces down is nothing.
-//! Which lines meet a triangle is decided exactly (`crossings.rs`), so no closed surface leaks.
+//! Down a vertical line from above, where the winding number is 0, a triangle that faces up adds 1 and one that faces down subtracts 1. So
+//! overlapping solids unite, an open sheet that faces up is solid down to [`BOTTOMLESS`](crate::shallow::columns::grid::BOTTOMLESS), and
+//! one that faces down is nothing. Which lines meet a triangle is decided exactly (`crossings.rs`), so no closed surface leaks.
 //!
-//! Heights of crossings, which are right to within 2^-8 units, are rounded to units first, those outside of the range to its ends, and
-//! changes at the same height are summed. A unit of height is thus solid if and only if the winding number at its middle is above 0:
-//! solids thinner than a unit may vanish, and so may gaps.
+//! Heights of crossings, accurate to 2^-8 units, are first rounded to units and clamped to the range, and changes at the same height are
+//! summed. A unit of height is thus solid if and only if the winding number at its middle is above 0: solids thinner than a unit may
+//! vanish, and so may gaps.
 //!
-//! A line that meets an edge or vertex exactly goes by it on the side of greater x, or z. A scene that is mirrored or turned by 90 degrees
-//! gives the same solids unless a line meets the silhouette of a solid exactly, which then belongs to the other side.
+//! A line that meets an edge or vertex exactly passes it on the side of larger x, or z. A scene that is mirrored or rotated by 90 degrees
+//! gives the same solids unless a line meets the silhouette of a solid exactly; the line then belongs to the other side.
 
 use std::ops::Range;
 
@@ -23,9 +23,9 @@ use crate::geometry::Vec3;
 use crate::numeric::cpu::{FlushDenormals, dispatch};
 use crate::shallow::columns::grid::{Grid, Heights};
 
-/// So many lines of a triangle are asked without a look at its edges.
+/// Up to this many lines are tested against a triangle without looking at its edges.
 const FEW: u32 = 3;
-/// Lines of a triangle that are collected before they are asked.
+/// Lines of a triangle that are collected before they are tested.
 const ROOM: usize = 64;
 
 /// The solids of every cell. Triangles are counter-clockwise seen from outside.
@@ -43,8 +43,8 @@ pub fn solids(positions: &[Vec3], triangles: &[[u32; 3]], grid: Grid, heights: H
     Ok(out)
 }
 
-/// Casts the lines through a box of cells again and again. Buffers are kept with room for half as many crossings again: it allocates
-/// only for a larger box, more vertices or many more crossings than before.
+/// Casts the lines through a box of cells again and again. Buffers keep capacity for half as many crossings again: it allocates only for a
+/// larger box, more vertices or many more crossings than before.
 pub struct Caster {
     heights: Heights,
     size: [usize; 2],
@@ -52,7 +52,7 @@ pub struct Caster {
     lines: [Lines; 2],
     /// The cells of the last cast, along x and z.
     cells: [Range<usize>; 2],
-    /// Counts of lines left of each vertex.
+    /// For each vertex, the counts of lines left of it.
     ranks: Vec<[u32; 2]>,
     piles: Piles,
     starts: Vec<u32>,
@@ -60,11 +60,11 @@ pub struct Caster {
 }
 
 impl Caster {
-    /// A caster without a cast.
+    /// A caster without a cast yet.
     ///
     /// # Errors
     /// `Argument`: a grid that [`Grid::validate`] refuses, an origin beyond 1e30 m from 0 (the range of exact decisions), cells that f64
-    /// cannot tell apart, heights without a range.
+    /// cannot distinguish, heights without a range.
     pub fn new(grid: Grid, heights: Heights) -> Result<Self> {
         grid.validate()?;
         let Grid { cell, origin, size } = grid;
@@ -182,7 +182,7 @@ impl Caster {
         &self.starts
     }
 
-    /// The solids of all cells of the box; those of a cell from the lowest up, apart from each other.
+    /// The solids of all cells of the box; those of a cell from the lowest up, separate from each other.
     pub fn solids(&self) -> &[Solid] {
         &self.solids
     }
@@ -200,7 +200,7 @@ impl Caster {
     }
 }
 
-/// What crossings are found from, and where they go.
+/// Input of a search for crossings, and its output.
 struct Work<'a> {
     positions: &'a [Vec3],
     ranks: &'a [[u32; 2]],
@@ -248,7 +248,7 @@ impl Work<'_> {
             [p.x, p.y, p.z].map(f64::from)
         };
         let facet = Facet::new([corner(0), corner(1), corner(2)], self.heights.unit);
-        // Where there are few lines, all are asked; else those of each row that lie between edges.
+        // A few lines are all tested; of many, only those of each row that lie between edges.
         let [width, depth] = [columns, rows].map(|[first, last]| last - first);
         let first = (rows[0] - self.first[1]) * self.width + (columns[0] - self.first[0]);
         if width == 1 && depth == 1 {
@@ -320,11 +320,11 @@ impl Default for Near {
 }
 
 impl Near {
-    /// Adds the first of a count of lines side by side, at most [`LANES`].
+    /// Adds the first of `count` lines side by side, at most [`LANES`].
     #[inline(always)]
     fn add(&mut self, x: &[f64; LANES], z: f64, cell: u32, count: u32) {
         let position = self.count.min(ROOM - LANES);
-        // What is too much, the next ones overwrite.
+        // The next ones overwrite the surplus.
         self.x[position..][..LANES].copy_from_slice(x);
         self.z[position..][..LANES].fill(z);
         for (lane, out) in (0..).zip(&mut self.cells[position..][..LANES]) {

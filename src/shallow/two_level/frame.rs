@@ -1,4 +1,4 @@
-//! Frames of a liquid in cells of two sizes, in steps that both take.
+//! Frames of a liquid in cells of two sizes; both liquids take the same steps.
 
 use std::sync::atomic::AtomicBool;
 
@@ -37,9 +37,9 @@ impl Detail {
         }
     }
 
-    /// All of a frame, or nothing of it.
+    /// A whole frame, or nothing of it.
     fn whole(&mut self, dt: f64, cancel: &AtomicBool) -> Result<Report> {
-        // Both, as the steps are those of the one with the shorter ones.
+        // Ask both: all steps are as short as those of the liquid with the shorter ones.
         let may_take_long = [&mut self.fine, &mut self.coarse].map(|liquid| liquid.may_take_long(dt, None));
         if !may_take_long.contains(&true) {
             return self.steps(dt, &Stop::NEVER);

@@ -43,7 +43,7 @@ impl Ground {
         out
     }
 
-    /// What of the fine cells is the coarse liquid's, and of the coarse ones the fine liquid's.
+    /// The fine cells that belong to the coarse liquid, and the coarse cells that belong to the fine liquid.
     pub fn apart(near: &Cells) -> [Apart; 2] {
         let halved = near.clone().map(|range| range.start / 2..range.end / 2);
         [Apart { cells: near.clone(), is_inside: false }, Apart { cells: halved, is_inside: true }]
@@ -62,7 +62,7 @@ impl Ground {
     }
 }
 
-/// The mean of four cells' solids, layer by layer from the lowest, over those that have each.
+/// The mean of four cells' solids, layer by layer from the lowest, over the cells that have the layer.
 fn mean(four: [&[Solid]; 4]) -> Vec<Solid> {
     let layers = four.iter().map(|solids| solids.len()).max().unwrap_or(0);
     let layer = |layer: usize| {

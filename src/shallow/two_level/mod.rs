@@ -1,9 +1,11 @@
 //! Level of detail: cells of the terrain's size near what matters, and of twice the size everywhere else.
 //!
-//! Two liquids over one lattice of heights: a *fine* one whose ground is there in a box of cells only, the *near* part, and a *coarse* one whose ground is
-//! there in all others (`ground.rs`). Outside of its region each has no columns, and a wall there. Along the edge of the box pipes of their own join them (`seam.rs`). A coarse unit is four
-//! fine ones, so volumes are counted in fine units; what makes no coarse unit waits, with the scalars that it carries, and is part of the balance (`rests.rs`). When the box moves, four
-//! fine columns become a coarse one, and back (`shift.rs`), and what flows goes on (`momentum.rs`). Nothing is lost. `surface/` writes one mesh of both.
+//! Two liquids share one lattice of heights: a *fine* one with ground only in a box of cells, the *near* part, and a *coarse* one with
+//! ground in all other cells (`ground.rs`). Outside its region each has no columns, and a wall at the edge. Along the edge of the box,
+//! separate pipes join the two (`seam.rs`). A coarse unit is four fine ones, so volumes are counted in fine units. What does not make up a
+//! coarse unit waits, with the scalars that it carries, and is part of the balance (`rests.rs`). When the box moves, four fine columns
+//! become a coarse one, or the reverse (`shift.rs`), and fluxes persist (`momentum.rs`). Nothing is lost. `surface/` writes one mesh of
+//! both.
 
 mod frame;
 mod ground;
@@ -35,12 +37,12 @@ use shift::Shift;
 /// A box of cells: ranges of x and of z.
 pub type Cells = [Range<usize>; 2];
 
-/// By how much a side of a box may be off one of cells that it is taken to be (coarse cells).
+/// Tolerance for a side of a box to count as a side of cells (coarse cells).
 const ROUNDING: f64 = 1e-6;
 /// Fine units in a coarse one.
 const FINE: i64 = 4;
 
-/// Liquid that flows over a terrain, in fine cells near and in coarse ones far away.
+/// Liquid that flows over a terrain, in fine cells nearby and in coarse ones far away.
 pub struct Detail {
     pub(super) fine: Shallow,
     pub(super) coarse: Shallow,
@@ -50,7 +52,7 @@ pub struct Detail {
     momentum: Momentum,
     /// The near cells.
     pub(super) near: Cells,
-    /// What of each coarse cell is no coarse unit.
+    /// For each coarse cell, the liquid that does not make up a coarse unit.
     pub(super) rest: Rests,
     points: Vec<FlowPoint>,
     /// The state at the beginning of a frame that may take long.
@@ -58,10 +60,12 @@ pub struct Detail {
 }
 
 impl Detail {
-    /// Dry ground; the cells of `near` are fine. All others are of twice the size: their ground is the mean of that of four, layer by layer.
+    /// Dry ground; the cells of `near` are fine. All others are twice as large: their ground is the mean of that of four cells, layer by
+    /// layer.
     ///
     /// # Errors
-    /// As [`Shallow::new`]; `Argument` also where the domain has an odd count of cells along an axis, as [`Detail::set_near`], and for falls and thickening.
+    /// As [`Shallow::new`]; `Argument` also if the domain has an odd count of cells along an axis, as [`Detail::set_near`], and for falls
+    /// and thickening.
     pub fn new(ctx: &Context, solids: &Solids, params: Params, near: Cells) -> Result<Self> {
         params.validate()?;
         solids.grid.validate()?;
@@ -146,7 +150,7 @@ impl Detail {
         }
         self.ground = Ground::new(solids);
         let Self { ground, near, fine, coarse, .. } = &mut *self;
-        // One of them may have no ground.
+        // One of the two liquids may have no ground.
         let all = |liquid: &Shallow| liquid.columns.grid.size.map(|count| 0..count);
         let moved = [
             fine.update_cells(all(fine), |cell| ground.fine_cell(near, ground.fine.grid.position(cell)))?,
@@ -166,7 +170,7 @@ impl Detail {
         Ok(self.after(moved))
     }
 
-    /// Joins cells of both sizes again after the ground has moved; returns what that did in all.
+    /// Joins cells of both sizes again after the ground has moved; returns the combined report.
     fn after(&mut self, [fine, coarse]: [Moved; 2]) -> Moved {
         if fine.cells + coarse.cells > 0 {
             self.seam.find(&self.fine, &self.coarse, &self.near);
@@ -195,7 +199,7 @@ impl Detail {
         self.coarse.set_params(params)
     }
 
-    /// Sets sources, drains and absorbers; `which` names one in an error. Each acts on the cells of the size that its centre lies in.
+    /// Sets sources, drains and absorbers; `which` names one in an error. Each acts on the cells of the size at its centre.
     ///
     /// # Errors
     /// As [`Shallow::set_flows`].
@@ -231,7 +235,8 @@ impl Detail {
         Ok(())
     }
 
-    /// Pours a volume (m3; negative: takes it) as [`Shallow::pour_at`], into the cells of the size that the position lies in; returns what came in (m3).
+    /// Pours a volume (m3; negative: takes it) as [`Shallow::pour_at`], into the cells of the size at the position; returns what came in
+    /// (m3).
     ///
     /// # Errors
     /// As [`Shallow::pour_at`].
@@ -273,7 +278,7 @@ impl Detail {
         within(0, x) && within(1, z)
     }
 
-    /// Lets each flow point act on the cells of one size, and takes what it waits for and has moved along.
+    /// Assigns each flow point to the cells of one size, with what it waits for and has moved.
     fn route(&mut self) {
         for at in 0..self.points.len() {
             let is_near = self.is_near(&self.points[at]);
@@ -283,7 +288,7 @@ impl Detail {
             own.flows.move_to(&own.columns, at, position);
             let (waiting, moved) = other.flows.rest(at);
             let (own_waiting, own_moved) = own.flows.waiting_and_moved(at);
-            // In units of its own.
+            // In units of its new liquid.
             let (waiting, moved) = match is_near {
                 true => (waiting * FINE as f64, moved * FINE),
                 false => (waiting / FINE as f64, moved / FINE),
@@ -297,7 +302,7 @@ impl Detail {
         self.fine.time()
     }
 
-    /// Where all liquid is; what is no whole coarse unit counts as held.
+    /// Where all liquid is; what does not make up a coarse unit counts as held.
     pub fn balance(&self) -> Balance {
         let [fine, coarse] = [self.fine.units(), self.coarse.units()];
         let sum = |of: fn(&Units) -> i64| of(&fine) + FINE * of(&coarse);
@@ -324,10 +329,10 @@ fn check_carried(params: &Params) -> Result<()> {
     }
 }
 
-/// The smallest box of near cells with all that lies between two corners (m), as far as there are cells: least x and z, then greatest.
+/// The smallest box of near cells with everything between two corners (m), as far as there are cells: minimum x and z, then maximum.
 ///
 /// # Errors
-/// `Argument`: corners that have no inside, or lie outside of the domain.
+/// `Argument`: corners that enclose nothing, or lie outside the domain.
 pub fn cells_around(grid: &Grid, bounds: [f64; 4]) -> Result<Cells> {
     let [x0, z0, x1, z1] = bounds;
     // Also where one is NaN.
@@ -337,7 +342,7 @@ pub fn cells_around(grid: &Grid, bounds: [f64; 4]) -> Result<Cells> {
     let range = |axis: usize, low: f64, high: f64| {
         let [low, high] = [low, high].map(|at| 0.5 * (at - grid.origin[axis]) / grid.cell);
         let count = (grid.size[axis] / 2) as f64;
-        // What is off by rounding only adds no cells.
+        // A mere rounding error adds no cells.
         let [low, high] = [(low + ROUNDING).floor(), (high - ROUNDING).ceil()];
         2 * low.clamp(0.0, count) as usize..2 * high.clamp(0.0, count) as usize
     };

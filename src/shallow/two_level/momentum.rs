@@ -1,12 +1,12 @@
-//! What flows goes on where the near cells move: through each side of a fine cell, whichever pipe it had before and has now.
+//! Fluxes persist where the near cells move: through each side of a fine cell, whichever pipe it had before and has now.
 //!
-//! A coarse pipe is that of two sides, half of its volume each; within a coarse cell flows the mean of what comes in and goes out.
+//! A coarse pipe is that of two sides, with half of its volume each; the flux within a coarse cell is the mean of its inflow and outflow.
 
 use super::{Cells, Detail};
 use crate::shallow::Shallow;
 use crate::shallow::columns::STRIP;
 
-/// Fluxes through sides of fine cells (fine units a step): of each cell of some boxes those to the east and to the south, layer by layer.
+/// Fluxes through sides of fine cells (fine units a step): for each cell of some boxes the sides to the east and south, layer by layer.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Momentum {
     boxes: Vec<Cells>,
@@ -16,20 +16,20 @@ pub(super) struct Momentum {
 
 /// The pipe of a side.
 enum Side {
-    /// Of the fine liquid: its column.
+    /// In the fine liquid: its column.
     Fine(usize),
-    /// Of the coarse one, between two of its cells.
+    /// In the coarse liquid, between two of its cells.
     Coarse(usize),
     /// Within a coarse cell: its column, and the one before it, if a pipe joins them.
     Within(usize, Option<usize>),
-    /// Along the edge of the near cells: of this fine column, and which way.
+    /// Along the edge of the near cells: its fine column, axis and direction.
     Seam(usize, usize, i32),
     /// None.
     Closed,
 }
 
 impl Momentum {
-    /// Begins with the sides of boxes of fine cells, and of two cells around them.
+    /// Starts with the sides of boxes of fine cells, and of two cells around them.
     pub fn begin(&mut self, detail: &Detail, near: &Cells, boxes: impl Iterator<Item = Cells>) {
         let size = detail.fine.columns.grid.size;
         let wider = |cells: Cells| {
@@ -57,7 +57,7 @@ impl Momentum {
         }
     }
 
-    /// Gives the sides' pipes of now what flowed before.
+    /// Gives the current pipes of the sides the former fluxes.
     pub fn end(&self, detail: &mut Detail) {
         let near = detail.near.clone();
         let mut first = 0;
@@ -109,7 +109,7 @@ fn side(detail: &Detail, near: &Cells, cell: [usize; 2], layer: usize, axis: usi
     found.unwrap_or(Side::Closed)
 }
 
-/// The column whose regular pipe along an axis leads to another.
+/// The column whose regular pipe along an axis leads to a given column.
 fn before(liquid: &Shallow, column: usize, axis: usize) -> Option<usize> {
     let (strip, position) = (column / STRIP, column % STRIP);
     if axis == 0 {

@@ -1,4 +1,4 @@
-//! What of coarse cells is no whole coarse unit: it waits there, with what it carries.
+//! What does not make up a whole coarse unit in a coarse cell: it waits there, with what it carries.
 
 use super::FINE;
 use crate::shallow::Shallow;
@@ -14,31 +14,31 @@ pub(in crate::shallow) struct Load {
 }
 
 impl Load {
-    /// Both together.
+    /// The sum of both.
     pub fn with(mut self, other: &Self) -> Self {
         self.units += other.units;
         self.amounts.iter_mut().zip(other.amounts).for_each(|(all, own)| *all += own);
         self
     }
 
-    /// What is left without another.
+    /// What is left without another load.
     pub fn without(self, other: &Self) -> Self {
         let other = Self { units: -other.units, amounts: other.amounts.map(|amount| -amount) };
         self.with(&other)
     }
 
-    /// That of a coarse column in fine measure.
+    /// The load of a coarse column in fine units.
     pub fn in_fine(self) -> Self {
         Self { units: FINE * self.units, amounts: self.amounts.map(|amount| FINE * amount) }
     }
 
-    /// The part that so many units take along.
+    /// The share of this load that a count of units takes along.
     pub fn part(&self, units: i64) -> Self {
         Self { units, amounts: part(&self.amounts, units, self.units) }
     }
 }
 
-/// The rests of all coarse cells (fine units).
+/// The remainders of all coarse cells (fine units).
 #[derive(Debug, Clone, Default)]
 pub(in crate::shallow) struct Rests {
     units: Vec<i64>,
@@ -47,18 +47,18 @@ pub(in crate::shallow) struct Rests {
 }
 
 impl Rests {
-    /// None of so many cells.
+    /// Empty, for this many cells.
     pub fn new(cells: usize) -> Self {
         Self { units: vec![0; cells], amounts: Vec::new() }
     }
 
-    /// The liquid carries so many scalars, of which there is nothing yet.
+    /// From now on the liquid carries this many scalars, all 0 so far.
     pub fn carry(&mut self, scalars: usize) {
         self.amounts.clear();
         self.amounts.resize(if scalars > 0 { self.units.len() } else { 0 }, [0; MOST]);
     }
 
-    /// Nothing waits.
+    /// Removes everything that waits.
     pub fn clear(&mut self) {
         self.units.fill(0);
         self.amounts.fill([0; MOST]);
@@ -69,7 +69,7 @@ impl Rests {
         self.units.len()
     }
 
-    /// Whether something may be carried.
+    /// Whether scalars may be carried.
     pub fn has_amounts(&self) -> bool {
         !self.amounts.is_empty()
     }
@@ -79,7 +79,7 @@ impl Rests {
         Load { units: self.units[cell], amounts: self.amounts.get(cell).copied().unwrap_or_default() }
     }
 
-    /// Lets liquid wait in a cell, in place of what does.
+    /// Sets what waits in a cell, in place of what did.
     pub fn set(&mut self, cell: usize, load: Load) {
         self.units[cell] = load.units;
         if let Some(amounts) = self.amounts.get_mut(cell) {
@@ -99,17 +99,18 @@ impl Rests {
         (0..self.len()).map(|cell| (cell, self.of(cell))).filter(|(_, load)| *load != Load::default())
     }
 
-    /// Fine units in all.
+    /// Total of fine units.
     pub fn units(&self) -> i64 {
         self.units.iter().sum()
     }
 
-    /// How much of a scalar, in all.
+    /// Total amount of a scalar.
     pub fn amount(&self, scalar: usize) -> i128 {
         self.amounts.iter().map(|amounts| i128::from(amounts[scalar])).sum()
     }
 
-    /// Adds liquid (fine measure) to a cell's rest, and takes what makes whole coarse units (coarse measure), with its share of all amounts.
+    /// Adds liquid (in fine units) to a cell's remainder, and takes what makes whole coarse units (in coarse units), with its share of all
+    /// amounts.
     pub fn whole(&mut self, cell: usize, load: &Load) -> Load {
         let all = self.of(cell).with(load);
         let rest = all.units.rem_euclid(FINE);
@@ -118,7 +119,7 @@ impl Rests {
         if self.has_amounts() {
             let share = if all.units > 0 { part(&all.amounts, rest, all.units) } else { all.amounts };
             for (at, share) in share.into_iter().enumerate() {
-                // Of which all others make whole ones.
+                // So that the other amounts make whole coarse ones.
                 left.amounts[at] = share + (all.amounts[at] - share).rem_euclid(FINE);
                 whole.amounts[at] = (all.amounts[at] - left.amounts[at]) / FINE;
             }
@@ -131,14 +132,14 @@ impl Rests {
     }
 }
 
-/// What is in a column.
+/// The contents of a column.
 pub(super) fn of_column(liquid: &Shallow, column: usize) -> Load {
     let amounts = &liquid.flow.amounts;
     let amount = |at: usize| if at < amounts.count() { integer(amounts.amounts[at][column]) } else { 0 };
     Load { units: i64::from(liquid.flow.depths()[column]), amounts: std::array::from_fn(amount) }
 }
 
-/// Changes what is in a column: what finds no room in it waits in its cell, and what rounding leaves in a dry one is counted.
+/// Changes the contents of a column: what does not fit in it waits in its cell, and what rounding leaves in a dry one is counted.
 pub(super) fn change(liquid: &mut Shallow, column: usize, load: &Load) {
     if *load == Load::default() {
         return;

@@ -1,4 +1,4 @@
-//! What liquid in cells of two sizes carries. Amounts are counted in those of fine columns: a coarse one's is four of them.
+//! Scalars of liquid in cells of two sizes. Amounts are counted in those of fine columns: one in a coarse column counts four times.
 
 use super::{Detail, FINE};
 use crate::error::Result;
@@ -30,7 +30,8 @@ impl Detail {
         self.coarse.set_poured(concentrations)
     }
 
-    /// Sets the concentration of each scalar in what comes through a flow point, as [`Shallow::set_sourced`](crate::shallow::Shallow::set_sourced).
+    /// Sets the concentration of each scalar in what enters through a flow point, as
+    /// [`Shallow::set_sourced`](crate::shallow::Shallow::set_sourced).
     ///
     /// # Errors
     /// As there.
@@ -39,7 +40,7 @@ impl Detail {
         self.coarse.set_sourced(point, concentrations)
     }
 
-    /// Where all of a scalar is; that of what is no whole coarse unit counts as held.
+    /// Where all of a scalar is; the part in what does not make up a coarse unit counts as held.
     ///
     /// # Errors
     /// `Argument`: there is no such scalar.

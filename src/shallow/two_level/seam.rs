@@ -1,8 +1,9 @@
 //! The pipes between fine and coarse columns, along the edge of the near cells.
 //!
-//! Each leads from a fine cell over its side to the coarse one beyond: Eq. 4.1 and 4.5 over the distance of their middles, 1.5 cells, through the section of
-//! the fine cell. The coarse surface is taken beside the fine cell's middle, a quarter of a coarse cell aside, where the coarse columns along the edge
-//! say how it leans: or a film that runs along the edge would swing across it.
+//! Each leads from a fine cell across its side to the coarse one beyond: Eq. 4.1 and 4.5 over the distance of their middles, 1.5 cells,
+//! through the cross-section of the fine cell. The coarse surface is evaluated beside the fine cell's middle, a quarter of a coarse cell to
+//! the side, with the slope given by the coarse columns along the edge: otherwise a film that runs along the edge would oscillate across
+//! it.
 
 use super::rests::{Load, Rests, change, of_column};
 use super::{Cells, FINE};
@@ -19,7 +20,7 @@ use crate::shallow::time_step::Measures;
 
 /// Fine cells between the middles of a fine and a coarse cell.
 const APART: f32 = 1.5;
-/// Scaled transfers stay a little below what there is, in 32 bits.
+/// Keeps scaled transfers slightly below what is available, in 32 bits.
 const MARGIN: f32 = 1.0 - 1.0 / (1 << 20) as f32;
 
 /// A pipe.
@@ -27,15 +28,15 @@ const MARGIN: f32 = 1.0 - 1.0 / (1 << 20) as f32;
 struct Pipe {
     /// Columns of the fine and of the coarse liquid.
     ends: [u32; 2],
-    /// Coarse columns before and behind along the edge, or [`NONE`].
+    /// The previous and next coarse columns along the edge, or [`NONE`].
     along: [u32; 2],
-    /// Where the fine cell lies along the edge beside the middle of the coarse one: -1 before, 1 behind.
+    /// Where the fine cell lies along the edge, relative to the middle of the coarse one: -1 before, 1 behind.
     side: i32,
-    /// Which way it leads to the coarse column: along x or z, and -1 or 1.
+    /// Direction to the coarse column: along x or z, and -1 or 1.
     axis: usize,
     way: i32,
     open: f32,
-    /// Flux out of the fine column (fine units a step), what rounding left, and the transfer.
+    /// Flux out of the fine column (fine units a step), the rounding remainder, and the transfer.
     flux: f32,
     left: f32,
     transfer: f32,
@@ -45,29 +46,29 @@ struct Pipe {
 #[derive(Debug, Clone, Default)]
 pub(in crate::shallow) struct Seam {
     pipes: Vec<Pipe>,
-    /// The pipes before.
+    /// The previous pipes.
     old: Vec<Pipe>,
-    /// Columns of both liquids that have such pipes, each once, and the position among them of each pipe's ends.
+    /// Columns of both liquids at such pipes, each once, and the position among them of each pipe's ends.
     columns: [Vec<u32>; 2],
     positions: Vec<[u32; 2]>,
-    /// What each of these gives, and takes (fine units), then by which factor it does so.
+    /// What each of these columns gives and takes (fine units), then the factor by which it is scaled.
     gives: [Vec<f64>; 2],
     takes: [Vec<f64>; 2],
     factors: [Vec<f32>; 2],
-    /// Of each scalar, what each of these takes, less what it gives; empty where nothing is carried.
+    /// For each of these columns, what it takes of each scalar, minus what it gives; empty where nothing is carried.
     amounts: [Vec<[i64; MOST]>; 2],
-    /// Cell of each coarse one (`Grid::index`).
+    /// Cell of each coarse column (`Grid::index`).
     cells: Vec<u32>,
     /// Whether a column has a ceiling.
     has_ceilings: bool,
-    /// Whether a pipe is to move something in this step.
+    /// Whether a pipe has a transfer in this step.
     is_moving: bool,
-    /// Length of the step in whose measure fluxes are (s).
+    /// Length of the step that fluxes refer to (s).
     last: f64,
 }
 
 impl Seam {
-    /// Finds the pipes again; those between the same columns keep what flows.
+    /// Finds the pipes again; those between the same columns keep their flux.
     pub fn find(&mut self, fine: &Shallow, coarse: &Shallow, near: &Cells) {
         std::mem::swap(&mut self.pipes, &mut self.old);
         self.pipes.clear();
@@ -118,7 +119,7 @@ impl Seam {
         }
     }
 
-    /// Joins the columns of a fine cell to those of the coarse one beyond a side.
+    /// Joins the columns of a fine cell to those of the coarse cell across a side.
     fn join(&mut self, fine: &Shallow, coarse: &Shallow, cell: [usize; 2], axis: usize, way: i32) {
         let size = fine.columns.grid.size;
         let beyond = cell[axis].wrapping_add_signed(way as isize);
@@ -157,7 +158,7 @@ impl Seam {
         }
     }
 
-    /// The flux of the pipe of a fine column over a side (fine units a step); 0 where there is none.
+    /// Flux of the pipe of a fine column across a side (fine units a step); 0 if there is none.
     pub fn flux(&self, column: usize, axis: usize, way: i32) -> f32 {
         self.find_pipe(column, axis, way).map_or(0.0, |pipe| self.pipes[pipe].flux)
     }
@@ -169,17 +170,17 @@ impl Seam {
         }
     }
 
-    /// What flows in each pipe and what rounding left, in order: its part of a saved state.
+    /// Flux and rounding remainder of each pipe, in order: its part of a saved state.
     pub fn numbers(&self) -> impl ExactSizeIterator<Item = [f32; 2]> + '_ {
         self.pipes.iter().map(|pipe| [pipe.flux, pipe.left])
     }
 
-    /// Length of the step in whose measure fluxes are (s).
+    /// Length of the step that fluxes refer to (s).
     pub fn last(&self) -> f64 {
         self.last
     }
 
-    /// Puts a saved state's part back.
+    /// Restores its part of a saved state.
     pub fn set_numbers(&mut self, last: f64, numbers: impl Iterator<Item = [f32; 2]>) {
         self.last = last;
         for (pipe, [flux, left]) in self.pipes.iter_mut().zip(numbers) {
@@ -194,12 +195,13 @@ impl Seam {
         self.pipes.get(pipe).filter(|pipe| key(pipe) == wanted).map(|_| pipe)
     }
 
-    /// Finds the fluxes of a step of a length (s), from the surfaces before it, as those of all other pipes: from later ones waves would grow.
+    /// Finds the fluxes of a step of `length` (s), from the surfaces before the step, as for all other pipes: with later ones waves would
+    /// grow.
     pub fn begin_step(&mut self, fine: &Shallow, coarse: &Shallow, measures: &Measures, length: f64) {
         let step = time_step::step(&fine.params, measures, length, self.last);
         let step = Step { drive: step.drive / APART, ..step };
         self.last = length;
-        /// A copy for each kind of flow and each set of instructions.
+        /// One copy for each kind of flow and instruction set.
         macro_rules! run {
             ($($viscous:literal $whole:literal $thins:literal)*) => {
                 match (step.drag > 0.0, step.is_whole, step.drag > 0.0 && step.thinning.is_some()) {
@@ -218,7 +220,7 @@ impl Seam {
         self.is_moving = run!(true true true true true false true false true true false false false true false false false false);
     }
 
-    /// Moves what is to cross the edge, of what the step has left.
+    /// Makes the transfers across the edge, limited to what the step has left.
     pub fn end_step(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut Rests) {
         if !self.is_moving {
             return;
@@ -231,7 +233,7 @@ impl Seam {
         self.move_units(fine, coarse, rest);
     }
 
-    /// Finds all fluxes and transfers; whether there is one.
+    /// Finds all fluxes and transfers; returns whether there is a transfer.
     #[inline(always)]
     fn drive<K: Kind>(&mut self, step: &Step, fine: &Shallow, coarse: &Shallow) -> bool {
         let (bases, coarse_bases) = (fine.columns.bases(), coarse.columns.bases());
@@ -251,7 +253,7 @@ impl Seam {
                 (end != NONE as usize && coarse_depths[end] > 0)
                     .then(|| coarse_bases[end] + coarse_depths[end])
             };
-            // Eight times the rise to a quarter of a cell aside.
+            // Eight times the rise over a quarter of a cell to the side.
             let rise = match pipe.along.map(beside) {
                 _ if depth[1] == 0 => 0,
                 [Some(before), Some(behind)] => behind - before,
@@ -259,7 +261,7 @@ impl Seam {
                 [None, Some(behind)] => 2 * (behind - eta),
                 [None, None] => 0,
             };
-            // The tilt of gravity is that of a cell.
+            // The tilt of gravity is per cell.
             let tilt = (APART * step.tilt[pipe.axis] as f32) as i32 * pipe.way;
             let fall = bases[i] + depth[0] - eta - (pipe.side * rise) / 8 + tilt;
             let depth = depth.map(|depth| depth as f32);
@@ -275,7 +277,7 @@ impl Seam {
         any
     }
 
-    /// Finds K_min of the columns that give, or K_max of those that take, as if nothing left them; whether one is under 1.
+    /// Finds K_min of the columns that give, or K_max of those that take, ignoring their outflow; returns whether one is below 1.
     fn is_beyond(&mut self, gives: bool, fine: &Shallow, coarse: &Shallow) -> bool {
         let Self { gives: given, takes: taken, factors, columns, .. } = self;
         let sums = if gives { given } else { taken };
@@ -287,10 +289,10 @@ impl Seam {
                 let column = column as usize;
                 let depth = liquid.flow.depths()[column];
                 let room = liquid.columns.ceilings()[column] - liquid.columns.bases()[column] - depth;
-                // A coarse column may take less than a unit more than it is given.
+                // A coarse column may take more than it is given, by less than a unit.
                 let has = if gives { depth } else { room - 1 };
                 let has = each * f64::from(has.max(0));
-                // Few are.
+                // This is rare.
                 if sum > has {
                     (*factor, any) = ((has / sum) as f32 * MARGIN, true);
                 }
@@ -314,7 +316,7 @@ impl Seam {
         }
     }
 
-    /// Moves whole fine units with what they carry; what makes no coarse one waits in its cell.
+    /// Moves whole fine units with what they carry; what does not make up a coarse unit waits in its cell.
     fn move_units(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut Rests) {
         self.find_amounts(fine, coarse);
         let Self { gives, takes, columns, cells, amounts, .. } = self;
@@ -340,7 +342,8 @@ impl Seam {
         self.gives.iter_mut().chain(&mut self.takes).for_each(|sums| sums.fill(0.0));
     }
 
-    /// Finds how much of each scalar every column takes (less what it gives): of what a pipe moves, by the concentration of the column that gives.
+    /// Finds how much of each scalar every column takes (minus what it gives): a pipe moves it at the concentration of the column that
+    /// gives.
     fn find_amounts(&mut self, fine: &Shallow, coarse: &Shallow) {
         let Self { pipes, positions, columns, amounts, .. } = self;
         let count = fine.flow.amounts.count();
@@ -365,7 +368,7 @@ impl Seam {
     }
 }
 
-/// Adds a transfer to the sums of both ends: whole numbers, whose sums do not depend on their order.
+/// Adds a transfer to the sums of both ends: integers, so that the order does not matter.
 fn add(gives: &mut [Vec<f64>; 2], takes: &mut [Vec<f64>; 2], positions: &[u32; 2], transfer: f32) {
     let [fine, coarse] = positions.map(|position| position as usize);
     let units = f64::from(transfer.abs());
@@ -378,7 +381,7 @@ fn add(gives: &mut [Vec<f64>; 2], takes: &mut [Vec<f64>; 2], positions: &[u32; 2
     }
 }
 
-/// 1 / (1 + slope^2)^2 of the ground between both columns, as between all others: slopes of over 60 degrees count as that.
+/// 1 / (1 + slope^2)^2 of the ground between both columns, as for all other pipes; slopes are clamped to 60 degrees.
 fn openness(fine: &Shallow, coarse: &Shallow, [i, j]: [usize; 2], along: [u32; 2]) -> f32 {
     let bases = |columns: &Columns, column: usize| f64::from(columns.bases()[column]);
     let cell = fine.columns.grid.cell / fine.columns.heights.unit;

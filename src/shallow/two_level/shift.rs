@@ -1,7 +1,8 @@
 //! The near cells move: four fine columns become a coarse one, and back.
 //!
-//! A coarse column's liquid goes to the fine ones of its layer under a surface that leans as its neighbours say: level where the liquid is level, and
-//! along the ground where a film runs. What four columns cannot share equally waits in their cell, and goes into the coarse column again.
+//! A coarse column's liquid goes to the fine ones of its layer, under a surface with the slope that its neighbours give: level where the
+//! liquid is level, and along the ground where a film runs. What four columns cannot share equally waits in their cell, and returns to the
+//! coarse column later.
 
 use super::rests::{Load, change, of_column};
 use super::{Cells, Detail};
@@ -9,31 +10,31 @@ use crate::error::Result;
 use crate::shallow::Shallow;
 use crate::shallow::remap::Parcel;
 
-/// Buffers.
+/// Scratch buffers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Shift {
-    /// What goes into coarse columns, and what goes into fine ones.
+    /// Liquid that goes into coarse columns, and liquid that goes into fine ones.
     leaving: Vec<Moving>,
     entering: Vec<Moving>,
-    /// What waits for room in them, in fine cells and in coarse ones.
+    /// Held liquid in fine cells and in coarse ones, which waits for room.
     held: [Vec<Parcel>; 2],
 }
 
-/// Liquid of a coarse column that changes its cells.
+/// Liquid of a coarse column whose cells change.
 #[derive(Debug, Clone, Copy)]
 struct Moving {
     /// Coarse cell.
     cell: [usize; 2],
     layer: usize,
-    /// Fine measure.
+    /// In fine units.
     load: Load,
-    /// Surface (units), and eight times its rise from the middle of a fine cell to that of the coarse one, along x and along z.
+    /// Surface (units), and eight times its rise from the middle of the coarse cell to that of a fine one, along x and along z.
     eta: i64,
     rises: [i64; 2],
 }
 
 impl Detail {
-    /// Gives the cells that were near, or are, to the other liquid.
+    /// Hands the cells that were near, or are now, to the other liquid.
     pub(super) fn convert(&mut self, old: &Cells) -> Result<()> {
         let mut shift = std::mem::take(&mut self.shift);
         let (near, [old_coarse, new_coarse]) =
@@ -70,7 +71,7 @@ impl Detail {
         Ok(())
     }
 
-    /// Takes what waits for room in cells that are the other liquid's now: where there is no ground, it would fall.
+    /// Takes the held liquid of cells that now belong to the other liquid: where there is no ground, it would fall.
     fn take_held(&mut self, near: &Cells, out: &mut [Vec<Parcel>; 2]) {
         let Self { fine, coarse, .. } = self;
         let is_near = |[x, z]: [usize; 2]| near[0].contains(&x) && near[1].contains(&z);
@@ -83,7 +84,7 @@ impl Detail {
         coarse.remap.held.take_out(|cell| is_near(grid.position(cell)), |parcel| held.push(parcel));
     }
 
-    /// Lets it wait in the other liquid's cells.
+    /// Adds the held liquid to the other liquid's cells.
     fn give_held(&mut self, [fine_held, held]: &[Vec<Parcel>; 2]) {
         let Self { fine, coarse, rest, .. } = self;
         let (fine_grid, grid) = (fine.columns.grid, coarse.columns.grid);
@@ -93,7 +94,7 @@ impl Detail {
             coarse.remap.held.add(cell, parcel.height, whole.units, whole.amounts);
         }
         for parcel in held {
-            // A coarse unit is one of each of the four.
+            // A coarse unit is one unit in each of the four.
             for cell in quarters(grid.position(parcel.cell as usize)) {
                 fine.remap.held.add(fine_grid.index(cell), parcel.height, parcel.units, parcel.amounts);
             }
@@ -102,7 +103,7 @@ impl Detail {
         coarse.remap.held.unite();
     }
 
-    /// Takes what is in the fine columns of coarse cells.
+    /// Takes the contents of the fine columns of coarse cells.
     fn take_fine(&mut self, cells: &Cells, out: &mut Vec<Moving>) {
         let fine = &mut self.fine;
         for [x, z] in each(cells) {
@@ -122,7 +123,7 @@ impl Detail {
         }
     }
 
-    /// Finds what is in coarse columns, and how its surface leans.
+    /// Finds the contents of coarse columns, and the slopes of their surface.
     fn find_coarse(&self, cells: &Cells, out: &mut Vec<Moving>) {
         let coarse = &self.coarse;
         for cell in each(cells) {
@@ -175,7 +176,7 @@ impl Detail {
     }
 }
 
-/// Makes depths add up to some units, but for what cannot be shared equally.
+/// Makes depths add up to `units`, except for what cannot be shared equally.
 fn share(depths: &mut [i64; 4], columns: &[Option<usize>; 4], units: i64) {
     for _ in 0..4 {
         let missing = units - depths.iter().sum::<i64>();
@@ -185,7 +186,7 @@ fn share(depths: &mut [i64; 4], columns: &[Option<usize>; 4], units: i64) {
         if missing == 0 || count == 0 {
             return;
         }
-        // Less than a unit each is not shared; what is too much is taken from all.
+        // A remainder of less than a unit each is not shared; an excess is taken from all.
         let each = missing.div_euclid(count);
         for (at, depth) in depths.iter_mut().enumerate() {
             if takes(at, *depth) {
@@ -196,7 +197,7 @@ fn share(depths: &mut [i64; 4], columns: &[Option<usize>; 4], units: i64) {
             return;
         }
     }
-    // Never more than there is.
+    // Never more than is available.
     if depths.iter().sum::<i64>() > units {
         *depths = [0; 4];
     }
@@ -224,14 +225,14 @@ fn surface(liquid: &Shallow, column: usize) -> i64 {
     i64::from(liquid.columns.bases()[column]) + i64::from(liquid.flow.depths()[column])
 }
 
-/// Takes all of a column.
+/// Empties a column and returns what was in it.
 fn take(liquid: &mut Shallow, column: usize) -> Load {
     let load = of_column(liquid, column);
     change(liquid, column, &Load::default().without(&load));
     load
 }
 
-/// Gives liquid to a column of a cell; what finds no room waits there.
+/// Gives liquid to a column of a cell; what does not fit waits there.
 fn give(liquid: &mut Shallow, cell: [usize; 2], column: Option<usize>, load: &Load) {
     match column {
         Some(column) => change(liquid, column, load),
@@ -259,7 +260,7 @@ fn quarters([x, z]: [usize; 2]) -> [[usize; 2]; 4] {
     [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[dx, dz]| [2 * x + dx, 2 * z + dz])
 }
 
-/// The boxes of fine cells that are near in one of two boxes only; some may be empty.
+/// The boxes of fine cells that are near in only one of two boxes; some may be empty.
 pub(super) fn changed(old: &Cells, new: &Cells) -> impl Iterator<Item = Cells> {
     beyond(old, new).into_iter().chain(beyond(new, old))
 }

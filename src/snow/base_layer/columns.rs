@@ -1,8 +1,8 @@
 //! Heights of the snow's columns: what compression is measured against.
 //!
-//! A column of cells (8 x 8 of them make a column block) remembers how much snow stood in it before
-//! anything touched it: nothing is stored for untouched snow. The current height is computed from the snow itself,
-//! so that a layer resumed from its grids has the same numbers as one that never stopped.
+//! A column of cells (8 x 8 columns make a column block) stores how much snow it held before anything touched it; nothing is stored for
+//! untouched snow. The current height is computed from the snow itself, so that a layer resumed from its grids has the same numbers as one
+//! that never stopped.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
@@ -16,7 +16,7 @@ use crate::vdb::{FloatGrid, Probe};
 /// Cells of a column block, at `x << 3 | z`.
 pub const CELLS: usize = 64;
 
-/// Snow (cells) that stands in each column of a block.
+/// Height of snow (cells) in each column of a block.
 #[derive(Clone, Copy, PartialEq)]
 pub struct Heights([f32; CELLS]);
 
@@ -39,14 +39,14 @@ impl Heights {
         add_by_cell(&mut self.0, |index| filled(values[index], cell));
     }
 
-    /// Adds a block that is all snow or none.
+    /// Adds a block that is all snow or has none.
     pub fn add_constant(&mut self, value: f32) {
         if value < 0.0 {
             self.0.iter_mut().for_each(|height| *height += 8.0);
         }
     }
 
-    /// Adds what a grid holds at a block.
+    /// Adds the snow of a grid at a block.
     pub fn add_probe(&mut self, probe: &Probe<'_>, cell: f32) {
         match probe {
             Probe::Leaf(leaf) => self.add(leaf.values, cell),
@@ -56,7 +56,7 @@ impl Heights {
 }
 
 impl Column {
-    /// Fraction of the original height that is gone, 0..=1, in each cell, when `now` is left.
+    /// Fraction 0..=1 of the original height that is gone in each cell, when `now` is left.
     pub fn compression(&self, now: &Heights) -> [f32; CELLS] {
         std::array::from_fn(|cell| {
             let (original, now) = (self.original.0[cell], now.0[cell]);
@@ -83,7 +83,7 @@ pub fn add_by_cell(sums: &mut [f32; CELLS], number: impl Fn(usize) -> f32) {
     }
 }
 
-/// Cell of the column block that voxel `index` of a block stands in.
+/// Cell of the column block that contains voxel `index` of a block.
 pub fn cell_of(index: usize) -> usize {
     index >> 3 & !7 | index & 7
 }
@@ -93,7 +93,7 @@ pub fn levels(low: i32, high: i32) -> impl Iterator<Item = i32> + Clone {
     (low.div_euclid(8)..=high.div_euclid(8)).map(|block| block * 8)
 }
 
-/// Snow that stands in a column block now, between two heights (voxels).
+/// Current height of the snow in a column block, between two heights (voxels).
 pub fn heights(surface: &FloatGrid, [x, z]: [i32; 2], low: i32, high: i32) -> Result<Heights> {
     let origins: Vec<Origin> = levels(low, high).map(|y| [x, y, z]).collect();
     let mut heights = Heights::default();
@@ -120,7 +120,7 @@ pub fn changed(initial: &FloatGrid, now: &FloatGrid) -> Result<HashSet<Origin>> 
     Ok(positions)
 }
 
-/// The column blocks of blocks that changed.
+/// The column blocks that contain changed blocks.
 pub fn touched(initial: &FloatGrid, changed: &HashSet<Origin>, low: i32, high: i32) -> Result<Columns> {
     let positions: BTreeSet<[i32; 2]> = changed.iter().map(|[x, _, z]| [*x, *z]).collect();
     positions
@@ -129,8 +129,8 @@ pub fn touched(initial: &FloatGrid, changed: &HashSet<Origin>, low: i32, high: i
         .collect()
 }
 
-/// Volume of a level set's solid (m3): filled parts of cells, summed leaf by leaf in the tree's order, and whole blocks
-/// without a leaf inside it, as far as they lie in the blocks from one voxel to another.
+/// Volume of a level set's solid (m3): filled fractions of cells, summed leaf by leaf in the tree's order, plus full blocks without a leaf,
+/// within the blocks from one voxel to another.
 pub fn volume(surface: &FloatGrid, low: [i32; 3], high: [i32; 3]) -> Result<f64> {
     let cell = surface.voxel_size() as f32;
     let leaves = surface.leaves()?;

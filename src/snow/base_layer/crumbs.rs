@@ -1,7 +1,7 @@
-//! Crumbs: islands of few voxels, left by ragged edges and thin walls, and removed in the step that made them.
+//! Crumbs: islands of few voxels that ragged edges and thin walls leave; they are removed in the step that made them.
 //!
-//! Only snow that is connected to a block that the step changed can have become an island. An island is removed as if it
-//! were pressed out: its snow goes into `removed` and its columns.
+//! Only snow that is connected to a block changed by the step can have become an island. An island is removed as if it were pressed out:
+//! its snow goes into `removed` and is subtracted from its columns.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -16,7 +16,7 @@ use crate::error::Result;
 use crate::numeric::blocks::{BlockEdit, Mask, Origin, VOXELS, Values, offset};
 use crate::vdb::FloatGrid;
 
-/// Voxels around an island whose distances may be to it: a band of three cells, and one more.
+/// Distance (voxels) around an island within which distances may refer to it: a band of three cells, and one more.
 const REACH: i32 = 4;
 
 type Voxel = [i32; 3];
@@ -37,7 +37,7 @@ impl After<'_> {
         }
     }
 
-    /// All voxels of the island around a voxel of the snow; none when there are `least` or more.
+    /// All voxels of the island around a voxel of the snow; none if there are `least` or more.
     fn island(&self, seed: Voxel, least: usize) -> Option<Vec<Voxel>> {
         let (mut voxels, mut seen) = (vec![seed], HashSet::from([seed]));
         let mut next = 0;
@@ -117,10 +117,10 @@ pub fn remove(
     Ok(islands.len())
 }
 
-/// A voxel of each connected part of the snow within a block that has fewer than `least` voxels.
+/// A voxel of each connected component of the snow within a block that has fewer than `least` voxels.
 fn small_parts(block: &BlockEdit, least: usize) -> Vec<Voxel> {
     let BlockEdit::Dense(block) = block else {
-        // All snow: 512 voxels at least, or none.
+        // All snow (at least 512 voxels), or no snow.
         return match block {
             BlockEdit::Constant(origin, value) if *value < 0.0 && least > VOXELS => vec![*origin],
             _ => Vec::new(),
@@ -153,7 +153,7 @@ fn small_parts(block: &BlockEdit, least: usize) -> Vec<Voxel> {
     seeds
 }
 
-/// A part with its neighbours in a mask of voxels: a slab of a mask is one x, with y and z in its bits.
+/// A component with its neighbours within a mask of voxels: a word of a mask is one x, with y and z in its bits.
 fn grown(part: &Mask, within: &Mask) -> Mask {
     const FIRST_Z: u64 = 0x0101_0101_0101_0101;
     std::array::from_fn(|x| {
@@ -165,7 +165,7 @@ fn grown(part: &Mask, within: &Mask) -> Mask {
     })
 }
 
-/// Values (m), once all islands are gone, of the voxels of an island and those whose nearest surface it is.
+/// Values (m), after all islands are removed, of the voxels of an island and of those whose nearest surface it is.
 fn without(after: &After<'_>, island: &[Voxel], gone: &HashSet<Voxel>, scale: Scale) -> Vec<(Voxel, f32)> {
     let low = island.iter().fold(island[0], |low, v| [0, 1, 2].map(|axis| low[axis].min(v[axis])));
     let high = island.iter().fold(island[0], |high, v| [0, 1, 2].map(|axis| high[axis].max(v[axis])));
@@ -179,14 +179,14 @@ fn without(after: &After<'_>, island: &[Voxel], gone: &HashSet<Voxel>, scale: Sc
         if value < 0.0 && !near.gone[near.position(voxel)] {
             return None;
         }
-        // At least half a cell outside, so that no part of its cell counts as filled.
+        // At least half a cell outside, so that no part of the cell counts as filled.
         let outside = to_rest.max(0.5 * scale.cell).max(value).min(scale.background);
         (to_gone < to_rest && outside != value).then_some((voxel, outside))
     };
     around.into_iter().filter_map(cleared).collect()
 }
 
-/// The voxels in reach of one.
+/// The voxels within reach of a voxel.
 fn cube([x, y, z]: Voxel) -> impl Iterator<Item = Voxel> {
     let along = move |middle: i32| middle - REACH..=middle + REACH;
     along(x).flat_map(move |x| along(y).flat_map(move |y| along(z).map(move |z| [x, y, z])))
@@ -218,8 +218,8 @@ impl Near {
         self.values[self.position(voxel)]
     }
 
-    /// Upper bounds on a voxel's distances (m) to islands and to the rest, from the snow in reach: a distance field
-    /// changes no faster than the position.
+    /// Upper bounds on a voxel's distances (m) to islands and to the rest, from the snow within reach: a distance field changes no faster
+    /// than the position.
     fn bounds(&self, voxel: Voxel, scale: Scale) -> [f32; 2] {
         let mut bounds = [f32::INFINITY; 2];
         for other in cube(voxel) {
@@ -236,13 +236,13 @@ impl Near {
     }
 }
 
-/// An edit that changes nothing yet.
+/// An edit without changes.
 fn untouched(origin: Origin, surface: &FloatGrid) -> Result<Edit> {
     let surface = surface.probe(&[origin])?[0].to_edit(origin);
     Ok(Edit { surface, removed: None, changed: [0; 8], heights: [0.0; CELLS] })
 }
 
-/// Puts values (m) of cleared voxels into an edit; the previous values go into `removed`.
+/// Writes the values (m) of cleared voxels into an edit; the previous values go into `removed`.
 fn clear(edit: &mut Edit, cleared: &BTreeMap<usize, f32>, scale: Scale) {
     let origin = edit.surface.origin();
     let mut after = values_of(Some(&edit.surface), scale);
@@ -277,7 +277,7 @@ mod tests {
     #[test]
     fn parts_of_a_block_are_found_by_their_size() {
         let mut values = Box::new([1.0; VOXELS]);
-        // A bar of three along z, one voxel beside it over a corner, and a plate of 16.
+        // A bar of three along z, one voxel diagonally adjacent to it, and a plate of 16.
         for at in [offset(1, 1, 1), offset(1, 1, 2), offset(1, 1, 3), offset(2, 2, 4)] {
             values[at] = -1.0;
         }

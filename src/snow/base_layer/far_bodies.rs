@@ -1,6 +1,6 @@
-//! Bodies far from the snow: the exact arithmetic of a sweep reaches 131,072 cells from the snow's middle.
+//! Bodies far from the snow: the exact arithmetic of a sweep reaches 131,072 cells from the centre of the snow.
 //!
-//! Motion out there does not change the snow: only the parts of a step in which a body may touch it are swept.
+//! Motion beyond that does not change the snow: only the parts of a step in which a body may touch it are swept.
 
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -9,40 +9,39 @@ use crate::sweep::{Body, Lattice, REACH, UNITS, Window, too_far};
 
 /// Fractions of an interval at which poses are sampled; no steady rotation looks the same at all of them.
 const MOMENTS: [f64; 12] = [0.0, 0.07, 0.19, 0.26, 0.38, 0.45, 0.57, 0.64, 0.76, 0.83, 0.95, 1.0];
-/// How often an interval between two breaks of a motion is halved.
+/// Maximum number of times that an interval between two breaks of a motion is halved.
 const HALVINGS: u32 = 16;
 
 /// The extent of the snow, for bodies that may be far from it.
 pub struct Reach {
     lattice: Lattice,
-    /// Cells from the lattice's origin voxel.
+    /// Relative to the lattice's origin voxel (cells).
     low: DVec3,
     high: DVec3,
 }
 
 impl Reach {
-    /// Of a sweep that is wanted in a window.
+    /// For a sweep that is wanted in a window.
     pub(super) fn new(lattice: Lattice, window: &Window) -> Self {
         let cells = |p: [i32; 3]| DVec3::from(p.map(|value| f64::from(value) / f64::from(UNITS)));
         Self { lattice, low: cells(window.min), high: cells(window.max) }
     }
 
-    /// Of snow between two corners (m) with cells of `cell` m.
+    /// For snow between two corners (m) with cells of `cell` m.
     ///
     /// # Errors
     /// Snow that is too far from the world's origin.
     pub fn of_snow(cell: f64, low: DVec3, high: DVec3) -> Result<Self> {
         let lattice = Lattice::near(cell, (low + high) * 0.5)?;
-        // As far as noise and the band reach.
+        // The maximum reach of noise and the band.
         let margin = DVec3::repeat(64.0);
         Ok(Self { lattice, low: lattice.to_cells(low) - margin, high: lattice.to_cells(high) + margin })
     }
 
-    /// The parts of `from..=to` (s), in order, in which a body may touch the snow; the whole of it when the body stays in
-    /// reach.
+    /// The parts of `from..=to` (s), in order, in which a body may touch the snow; the whole interval if the body stays in range.
     ///
     /// # Errors
-    /// A body, named, that touches the snow while a part of it is out of reach; a pose that cannot be computed; cancel.
+    /// A body, named, that touches the snow while a part of it is out of range; a pose that cannot be computed; cancel.
     pub fn spans(&self, ctx: &Context, body: &Body, from: f64, to: f64) -> Result<Vec<(f64, f64)>> {
         let mut ends = vec![from];
         ends.extend(body.motion().breaks(from, to));
@@ -54,7 +53,7 @@ impl Reach {
         Ok(out)
     }
 
-    /// Adds the parts of an interval, joined to those before where they meet.
+    /// Adds the parts of an interval, merged with the preceding ones where they meet.
     fn parts(
         &self,
         ctx: &Context,
@@ -80,7 +79,7 @@ impl Reach {
                 .fold((low, high), |(low, high), position| (low.inf(position), high.sup(position)));
             std::mem::swap(&mut pose, &mut before);
         }
-        // Between two samples nothing is farther from both than it moves from one to the other.
+        // Between two samples nothing is farther from both than its motion from one to the other.
         let misses =
             (0..3).any(|axis| low[axis] - moved > self.high[axis] || high[axis] + moved < self.low[axis]);
         let farthest = low.abs().sup(&high.abs()).max();

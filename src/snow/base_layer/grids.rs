@@ -1,4 +1,4 @@
-//! The grids of a layer, whole or as the blocks that a step changed.
+//! The grids of a layer: complete, or only the blocks that a step changed.
 
 use super::empty_removed;
 use crate::context::Context;
@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::numeric::blocks::{Block, BlockEdit, VOXELS};
 use crate::vdb::{FloatGrid, Leaf, MetaValue, Ready};
 
-/// Metadata of `surface`: the snow's volume (m3), exactly as the layer counts it.
+/// Metadata of `surface`: the snow's volume (m3), exactly as the layer computes it.
 const VOLUME: &str = "volume_m3";
 
 /// The grids of a layer: everything that its next step depends on, besides the layer before the first step.
@@ -19,7 +19,7 @@ pub struct Grids {
     pub touched: FloatGrid,
 }
 
-/// The changes of a step, block by block: applied to the grids before the step they give those after it.
+/// The changes of a step, block by block: applied to the grids before the step, they give those after it.
 pub struct Changes {
     pub(super) surface: Vec<BlockEdit>,
     pub(super) compression: Vec<BlockEdit>,
@@ -56,7 +56,7 @@ impl Grids {
         })
     }
 
-    /// Takes the grids out of those of a file, by name.
+    /// Extracts the grids from those of a file, by name.
     ///
     /// # Errors
     /// Names the grid that is missing or has no volume.
@@ -91,12 +91,12 @@ impl Grids {
         }
     }
 
-    /// Puts a step's changes in place.
+    /// Applies a step's changes.
     ///
     /// # Errors
     /// When memory runs out.
     pub fn apply(&mut self, ctx: &Context, changes: &Changes) -> Result<()> {
-        // All memory is allocated before anything is put in place.
+        // All memory is allocated before any change is applied.
         let surface = Ready::new(ctx, &changes.surface)?;
         let compression = Ready::new(ctx, &changes.compression)?;
         let touched = Ready::new(ctx, &changes.touched)?;
@@ -106,7 +106,7 @@ impl Grids {
         self.surface.set_metadata(VOLUME, MetaValue::Double(changes.volume))
     }
 
-    /// A step's changes as grids that hold a leaf for every block that changed, and nothing else.
+    /// A step's changes as grids that have a leaf for every block that changed, and nothing else.
     ///
     /// # Errors
     /// When memory runs out.
@@ -117,7 +117,7 @@ impl Grids {
             (&mut delta.compression, &changes.compression),
             (&mut delta.touched, &changes.touched),
         ] {
-            // A constant block becomes a leaf without active voxels: a tile looks the same as nothing stored.
+            // A constant block becomes a leaf without active voxels: a tile could not be told from an absent block.
             let (constant, dense): (Vec<&BlockEdit>, Vec<&BlockEdit>) =
                 edits.iter().partition(|edit| matches!(edit, BlockEdit::Constant(..)));
             let as_leaf = |edit: &&BlockEdit| match edit {
@@ -134,7 +134,7 @@ impl Grids {
         Ok(delta)
     }
 
-    /// Puts a delta's blocks in place.
+    /// Applies a delta's blocks.
     ///
     /// # Errors
     /// Another cell size; no volume; when memory runs out.
@@ -155,7 +155,7 @@ impl Grids {
 }
 
 impl Changes {
-    /// Nothing changed.
+    /// No changes.
     pub(super) fn none(grids: &Grids, half_width: f32) -> Result<Self> {
         let removed = empty_removed(grids.surface.voxel_size(), half_width)?;
         let (surface, compression, touched, before) = Default::default();

@@ -1,8 +1,8 @@
 //! The snow before anything moves: from a vertical depth, or from its top surface (thesis section 3.2).
 //!
-//! Each upward triangle of the ground and of static objects carries a prism of snow. Prisms are layers of
-//! a chain that count +1, solids count so far below zero that no prism fills them: one pass of winding
-//! numbers then gives the layer, without the ghost surfaces that CSG of coincident faces leaves.
+//! Each upward triangle of the ground and of static objects carries a prism of snow. Prisms are layers of a chain that count +1; solids
+//! have such a large negative weight that no prism fills them. A single pass of winding numbers then gives the layer, without the ghost
+//! surfaces that CSG of coincident faces leaves.
 
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -26,7 +26,7 @@ pub enum Ground {
     Mesh(TriMesh),
 }
 
-/// How much snow there is.
+/// Amount of snow.
 pub enum Cover {
     /// Vertical depth above the ground and above static objects (m).
     Depth(f64),
@@ -34,18 +34,17 @@ pub enum Cover {
     Top(TriMesh),
 }
 
-/// Cosine of the steepest slope that holds snow, 89 degrees. A vertical wall whose corners are rounded leans outward by a little: the
-/// snow on it would be a film far thinner than a cell.
+/// Cosine of the steepest slope that holds snow, 89 degrees. A vertical wall with rounded corner coordinates leans outward slightly: snow
+/// on it would be a film far thinner than a cell.
 const STEEPEST: f64 = 0.01745;
-/// Layers that a solid subtracts: more than prisms can overlap.
+/// Weight of a solid: a larger magnitude than the number of prisms that can overlap.
 const SOLID: i32 = -(1 << 20);
 const EVERYWHERE: Window = Window { min: [i32::MIN; 3], max: [i32::MAX; 3] };
 
 /// Level set of the snow on a ground and on static objects.
 ///
 /// # Errors
-/// A depth or an area that is not positive or less than a cell, an empty mesh, no snow at all, a layer too large,
-/// cancel.
+/// A depth or an area that is not positive or less than a cell, an empty mesh, no snow at all, a layer that is too large, cancel.
 pub fn layer(
     ctx: &Context,
     ground: &Ground,
@@ -102,13 +101,13 @@ pub fn layer(
     Ok(layer)
 }
 
-/// Whether cells can hold a layer: below a cell a level set has no true volume.
+/// Checks that cells can represent a layer: below a cell a level set has no true volume.
 ///
 /// # Errors
-/// A depth, or a plane, that is less than a cell; the message names it.
+/// A depth or a plane of less than a cell; the message names it.
 pub fn fits(ground: &Ground, cover: &Cover, cell: f64) -> Result<()> {
     let least = |name: &str, size: f64| {
-        // Values that are not positive are refused where they are used.
+        // Values that are not positive are rejected where they are used.
         if size > 0.0 && size < cell {
             return Err(Error::argument(format!(
                 "{name} = {size} m is less than a cell of {cell} m, which cannot hold it: take cells of {} m or less",
@@ -146,12 +145,12 @@ pub fn thin(depth: f64, cell: f64) -> Option<String> {
     })
 }
 
-/// The warning for a layer without deep voxels.
+/// The warning for a layer that is thin everywhere.
 fn nowhere_thick(layer: &FloatGrid) -> Result<Option<String>> {
     let cell = layer.voxel_size() as f32;
     let least = |values: &[f32; 512]| values.iter().copied().fold(f32::INFINITY, f32::min);
     let deepest = layer.leaves()?.iter().map(|leaf| least(leaf.values)).fold(f32::INFINITY, f32::min);
-    // A layer of three cells has voxels a cell or more below its surface, wherever the voxels lie.
+    // A layer of three cells has voxels at least a cell below its surface, at any position of the voxels.
     Ok((deepest > -(THICK as f32 - 1.0) / 2.0 * cell).then(|| {
         format!(
             "the snow is nowhere {THICK} cells of {cell} m thick: its volume and its prints are rough; take smaller cells"
@@ -159,7 +158,7 @@ fn nowhere_thick(layer: &FloatGrid) -> Result<Option<String>> {
     }))
 }
 
-/// A mesh with 64-bit positions: the corners of a plane are exact, however far from the origin. Vertices that are one corner are at one
+/// A mesh with 64-bit positions: the corners of a plane are exact, however far from the origin. Vertices of the same corner have the same
 /// position.
 struct Sheet {
     positions: Vec<DVec3>,
@@ -168,7 +167,7 @@ struct Sheet {
 
 impl Sheet {
     fn of(mesh: &TriMesh) -> Self {
-        // Vertices that no triangle names are not part of the snow.
+        // Vertices that no triangle uses are not part of the snow.
         let mesh = mesh.clone().without_unused();
         let mut positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
         Weld::of(&positions, &mesh.triangles).unify(&mut positions);
@@ -230,8 +229,8 @@ fn centre(sheet: &Sheet) -> Result<DVec3> {
     Ok(sheet.positions.iter().sum::<DVec3>() / sheet.positions.len() as f64)
 }
 
-/// A mesh with its intended orientation: closed parts with their faces outward, sheets with their faces upward; what of that is not
-/// decided, the context is told.
+/// A mesh with its intended orientation: closed components with their faces outward, sheets with their faces upward. The context is warned
+/// of what remains ambiguous.
 fn upright(ctx: &Context, mut sheet: Sheet) -> Sheet {
     let same = coincident(sheet.positions.iter().copied());
     let mut orientation = Orientation::of(&sheet.positions, &sheet.triangles, &same, Closing::Caps);

@@ -1,4 +1,4 @@
-//! Data on the snow besides its shape: when its surface last changed, and how far its columns are pressed.
+//! Data on the snow besides its shape: when its surface last changed, and how far its columns are compressed.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::numeric::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::vdb::Probe;
 
-/// The new snow of one block, and where it differs from the old.
+/// The new snow of one block, and where it differs from the old snow.
 pub struct Mark<'a> {
     /// The snow.
     pub surface: &'a BlockEdit,
@@ -53,8 +53,8 @@ impl BaseLayer {
         Ok(marks.par_iter().zip(&before).map(edit_one).collect())
     }
 
-    /// Compression at every touched surface voxel of the columns in which blocks change: `surfaces` and `touched`
-    /// are those blocks after the change, one for one; `fresh` are the columns that are touched for the first time.
+    /// Compression at every touched surface voxel of the columns in which blocks change: `surfaces` and `touched` are those blocks after
+    /// the change, in the same order; `fresh` are the columns that are touched for the first time.
     pub(super) fn compression_edits(
         &self,
         ctx: &Context,
@@ -103,12 +103,12 @@ impl BaseLayer {
     }
 }
 
-/// x and z of the column block that a block stands in.
+/// x and z of the column block that contains a block.
 fn column_of([x, _, z]: Origin) -> [i32; 2] {
     [x, z]
 }
 
-/// A block whose inactive values are 0; constant when no voxel is active.
+/// A block whose inactive values are 0; constant if no voxel is active.
 fn masked(origin: Origin, mut values: Box<Values>, mask: Mask) -> BlockEdit {
     if mask == [0; 8] {
         return BlockEdit::Constant(origin, 0.0);

@@ -1,6 +1,6 @@
-//! The base layer: snow that nothing has moved yet, a level set that objects press into (thesis section 3.2).
+//! The base layer: snow that has not moved yet, a level set that objects press into (thesis section 3.2).
 //!
-//! The cost of a step grows with what moves: only blocks that hold snow and lie near the swept volume are processed.
+//! The cost of a step depends on the motion: only blocks that hold snow and are near the swept volume are processed.
 
 mod columns;
 mod crumbs;
@@ -44,12 +44,12 @@ use sweep_region::snow_masks;
 pub struct Params {
     /// Ragged edges; without them imprints are exact.
     pub noise: Option<NoiseParams>,
-    /// Largest error of the swept volume (cells), 0.001..=1.
+    /// Maximum error of the swept volume (cells), 0.001..=1.
     pub tolerance: f64,
 }
 
 impl Params {
-    /// The thesis' look: noise of two cells.
+    /// The thesis' look: noise with an amplitude of two cells.
     pub fn for_cell(cell: f64) -> Self {
         Self { noise: Some(NoiseParams::for_cell(cell)), tolerance: TOLERANCE }
     }
@@ -65,7 +65,7 @@ impl Params {
     }
 }
 
-/// What a step did.
+/// Results of a step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepReport {
     /// Snow removed in this step (m3).
@@ -76,20 +76,20 @@ pub struct StepReport {
     pub touched_blocks: usize,
     /// Triangles of the swept volume's boundary near the snow.
     pub sweep_faces: usize,
-    /// Islands that were removed: see [`BaseLayer::set_min_crumb`].
+    /// Number of islands removed: see [`BaseLayer::set_min_crumb`].
     pub crumbs: usize,
     /// Wall-clock time of each phase.
     pub phases: Vec<PhaseTime>,
 }
 
-/// A layer of snow and what has happened to it.
+/// A layer of snow and its history.
 pub struct BaseLayer {
     params: Params,
     grids: Grids,
-    /// The last step's, the removed level set among them.
+    /// The changes of the last step, including the removed level set.
     changes: Changes,
     columns: Columns,
-    /// Blocks that changed since before the first step.
+    /// Blocks that differ from the layer before the first step.
     changed: HashSet<Origin>,
     /// Fingerprint of the layer before the first step.
     initial: u128,
@@ -105,8 +105,7 @@ impl BaseLayer {
     /// A layer whose snow is the inside of a level set.
     ///
     /// # Errors
-    /// When `surface` is not a level set, is empty or not world-fixed, its values are no distances in metres, or a parameter is out of
-    /// range.
+    /// When `surface` is not a level set, is empty or not world-fixed, its values are not distances in metres, or a parameter is out of range.
     pub fn new(ctx: &Context, surface: FloatGrid, params: Params) -> Result<Self> {
         if let Some(what) = distances::warning(&surface)? {
             return Err(Error::argument(format!("the snow's grid {what}")));
@@ -154,7 +153,7 @@ impl BaseLayer {
         Ok(layer)
     }
 
-    /// How objects press into the snow from the next step on.
+    /// Sets how objects press into the snow from the next step on.
     ///
     /// # Errors
     /// A parameter out of range; the old ones are then kept.
@@ -164,8 +163,8 @@ impl BaseLayer {
         Ok(())
     }
 
-    /// From the next step on, islands of fewer voxels than this that a step leaves where it changed the snow are removed
-    /// too: crumbs of ragged edges and thin walls. Initially 0: all stay.
+    /// From the next step on, removes islands with fewer voxels than this, crumbs of ragged edges and thin walls, where a step changed the
+    /// snow. Initially 0: all islands stay.
     pub fn set_min_crumb(&mut self, voxels: usize) {
         self.min_crumb = voxels;
     }
@@ -180,7 +179,7 @@ impl BaseLayer {
         self.half_width
     }
 
-    /// Least and greatest corner (m) of the box of voxels that can hold snow.
+    /// Minimum and maximum corner (m) of the box of voxels that can hold snow.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let cell = self.grids.surface.voxel_size();
         let corner = |voxel: [i32; 3], half: f64| DVec3::from(voxel.map(|at| (f64::from(at) + half) * cell));
@@ -192,13 +191,13 @@ impl BaseLayer {
         &self.grids
     }
 
-    /// Takes what the last step changed; [`BaseLayer::removed`] and [`BaseLayer::before`] are empty afterwards.
+    /// Takes the changes of the last step; [`BaseLayer::removed`] and [`BaseLayer::before`] are empty afterwards.
     ///
     /// # Errors
     /// When memory runs out.
     pub fn take_changes(&mut self) -> Result<Changes> {
         let none = Changes::none(&self.grids, self.half_width)?;
-        // Whoever takes the changes has the grids before them.
+        // A caller that takes the changes has the grids before them.
         Ok(Changes { before: Vec::new(), ..std::mem::replace(&mut self.changes, none) })
     }
 
@@ -207,9 +206,9 @@ impl BaseLayer {
         &self.grids.surface
     }
 
-    /// Blocks (their least corners) that the last step changed, in any of the grids.
+    /// Blocks (their minimum corners) that the last step changed, in any of the grids.
     pub fn dirty(&self) -> impl Iterator<Item = Origin> {
-        // Frames change where the snow changes; compression in the whole columns there.
+        // Frames change where the snow changes, compression in the whole columns there.
         self.changes
             .surface
             .iter()
@@ -219,8 +218,8 @@ impl BaseLayer {
             .into_iter()
     }
 
-    /// Blocks of the snow that the last step changed, as they were before it: grains are made from the difference. None before
-    /// the first step and after a restore.
+    /// Blocks of the snow that the last step changed, as they were before it: the difference becomes grains. None before the first step and
+    /// after a restore.
     pub fn before(&self) -> &[BlockEdit] {
         &self.changes.before
     }
@@ -245,11 +244,11 @@ impl BaseLayer {
         self.changes.volume
     }
 
-    /// Removes what bodies sweep from `from` to `to` (s), or their pose where the two are equal.
-    /// A step that fails or is cancelled leaves the layer as it was.
+    /// Removes what bodies sweep from `from` to `to` (s), or their pose if the two are equal. A step that fails or is cancelled leaves the
+    /// layer unchanged.
     ///
     /// # Errors
-    /// A pose that cannot be computed, a body too far away, cancel, memory.
+    /// A pose that cannot be computed, a body that is too far away, cancel, memory.
     pub fn step(
         &mut self,
         ctx: &Context,
@@ -292,7 +291,7 @@ impl BaseLayer {
         Scale { cell: self.grids.surface.voxel_size() as f32, background: self.grids.surface.background() }
     }
 
-    /// Distances of the volume that bodies sweep, with noise, in the blocks that hold snow; and the number of its faces.
+    /// Distances of the volume that bodies sweep, with noise, in the blocks that hold snow, and the number of its faces.
     fn sweep(
         &self,
         ctx: &Context,
@@ -328,8 +327,8 @@ impl BaseLayer {
         let middle = [0, 1, 2].map(|a| (f64::from(self.low[a]) + f64::from(self.high[a])) * 0.5 * cell);
         let lattice = Lattice::near(cell, DVec3::from(middle))?;
         let outside = self.half_width + noise.map_or(0.0, |noise| noise.amplitude);
-        // Whether a face is open is decided from the winding numbers of the voxels around it; blocks are inside by their first
-        // voxel, which may lie outside of the snow.
+        // Whether a face is open depends on the winding numbers of the voxels around it; blocks are inside by their first voxel, which may
+        // lie outside the snow.
         let margin = outside.ceil() as i32 + 3 + DIM as i32;
         let relative = |voxel: [i32; 3], grow: i32| [0, 1, 2].map(|a| voxel[a] - lattice.origin[a] + grow);
         let fixed = |voxel: [i32; 3]| voxel.map(|cells| cells.saturating_mul(UNITS));
@@ -368,7 +367,7 @@ impl BaseLayer {
     ) -> Result<Vec<Face>> {
         let faces = |from: f64, to: f64| body.faces(ctx, from, to, lattice, self.params.tolerance, window);
         match faces(from, to) {
-            // A vertex may be out of reach: only the times near the snow then.
+            // A vertex may be out of range: then only the times near the snow are swept.
             Err(Error::Argument(_)) => {
                 let spans = Reach::new(*lattice, window).spans(ctx, body, from, to)?;
                 let parts: Vec<Vec<Face>> =
@@ -396,7 +395,7 @@ impl BaseLayer {
         Ok(pieces)
     }
 
-    /// The snow without the pieces; nothing is put in place yet.
+    /// The snow minus the pieces; nothing is applied yet.
     fn edits(&self, ctx: &Context, pieces: &[Piece]) -> Result<Vec<Edit>> {
         let origins: Vec<Origin> = pieces.iter().map(Piece::origin).collect();
         let snow: Vec<Probe<'_>> = self.grids.surface.probe(&origins)?;
@@ -412,7 +411,7 @@ impl BaseLayer {
             .collect())
     }
 
-    /// Everything that the commit puts in place, and the volume removed (m3).
+    /// Everything that the commit applies, and the volume removed (m3).
     fn changes(&self, ctx: &Context, edits: Vec<Edit>, frame: i32) -> Result<(Changes, Columns, f64)> {
         let cell = self.grids.surface.voxel_size();
         let mut removed = empty_removed(cell, self.half_width)?;
@@ -436,7 +435,7 @@ impl BaseLayer {
         Ok((Changes { surface, touched, compression, before, removed, volume: left }, fresh, volume))
     }
 
-    /// Puts a step's changes in place.
+    /// Applies a step's changes.
     fn commit(&mut self, ctx: &Context, changes: Changes, columns: Columns) -> Result<()> {
         ctx.commit(|| self.grids.apply(ctx, &changes))?;
         self.columns.extend(columns);
@@ -446,7 +445,7 @@ impl BaseLayer {
     }
 }
 
-/// Phases that [`BaseLayer::sweep`] has for these bodies.
+/// Number of phases of [`BaseLayer::sweep`] for these bodies.
 fn sweep_phases(bodies: &[(usize, &Body)], noise: bool) -> usize {
     if bodies.is_empty() { 0 } else { ["sweep", "distance"].len() + usize::from(noise) }
 }

@@ -1,8 +1,8 @@
 //! Ragged edges: the swept volume is displaced outward by noise that is fixed in world space
 //! (thesis section 3.2: v = grad phi / |grad phi| max(noise, 0)).
 //!
-//! Instead of an advection: phi -= max(noise, 0) in the band. Along a normal phi rises with slope 1, so
-//! as long as the noise is less steep, everything it removes is connected to the sweep: no islands.
+//! No advection is needed: phi -= max(noise, 0) in the band. Along a normal phi rises with slope 1, so as long as the noise is less steep,
+//! everything that it removes is connected to the sweep: no islands.
 
 use std::collections::HashMap;
 
@@ -18,7 +18,7 @@ use crate::snow::NoiseParams;
 use crate::sweep::{Piece, Settings};
 use crate::vdb::{FloatGrid, Leaf, level_set};
 
-/// Strength of an octave over that of the one before it.
+/// Strength of an octave relative to the one before it.
 const GAIN: f32 = 0.25;
 /// Noise cells after which the pattern repeats: the library indexes them with 32 bits.
 const PERIOD: f64 = 4_294_967_296.0;
@@ -27,14 +27,14 @@ const PERIOD: f64 = 4_294_967_296.0;
 pub struct Displacement {
     /// Each octave with its weight in the sum.
     octaves: Vec<(FastNoiseLite, f32)>,
-    /// Greatest displacement (cells).
+    /// Maximum displacement (cells).
     pub amplitude: f32,
     /// Noise cells of the largest octave per voxel.
     step: f64,
 }
 
 impl Displacement {
-    /// A field for parameters that were validated.
+    /// A field for validated parameters.
     pub fn new(params: &NoiseParams, cell: f64) -> Self {
         let mut strengths = vec![1.0; params.octaves as usize];
         (1..strengths.len()).for_each(|octave| strengths[octave] = strengths[octave - 1] * GAIN);
@@ -52,8 +52,8 @@ impl Displacement {
 
     /// Outward displacement (cells) at a voxel of the world's lattice, 0..=amplitude.
     ///
-    /// Voxels are integers, and the noise takes the integer part of a position and its fraction separately, both from
-    /// 64 bits: the pattern is as fine 100 km from the origin as near it.
+    /// Voxels are integers, and the noise takes the integer part and the fraction of a position separately, both from 64 bits: the pattern
+    /// is as fine 100 km from the origin as near it.
     fn at(&self, voxel: [i32; 3]) -> f32 {
         let mut position = voxel.map(|index| f64::from(index) * self.step);
         let mut sum = 0.0;
@@ -65,14 +65,14 @@ impl Displacement {
         self.amplitude * sum.clamp(0.0, 1.0)
     }
 
-    /// Displaces pieces outward, then scales their values back to distances (first order): the work of a phase, which a
-    /// cancel leaves half done.
+    /// Displaces pieces outward, then scales their values back to distances (first order): the work of one phase, which a cancel leaves
+    /// incomplete.
     pub fn apply(&self, ctx: &Context, pieces: &mut [Piece], half_width: f32) {
         if self.amplitude == 0.0 {
             return;
         }
         let reach = half_width + self.amplitude;
-        // The last piece of work scales them all.
+        // The last work unit scales all of them.
         ctx.expect(pieces.len() + 1);
         pieces.par_iter_mut().for_each(|piece| {
             ctx.advance();
@@ -91,7 +91,7 @@ impl Displacement {
     }
 }
 
-/// Displaces a whole level set outward by noise; its band must be as wide as the amplitude and a cell.
+/// Displaces a whole level set outward by noise; its band must be at least as wide as the amplitude plus a cell.
 ///
 /// # Errors
 /// Parameters out of range; cancel.
@@ -100,8 +100,8 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
     params.validate(cell)?;
     let noise = Displacement::new(params, cell);
     let half_width = (f64::from(grid.background()) / cell) as f32;
-    // Rebuilt with a band that contains the displaced surface and three cells around it; from a mesh, whose positions
-    // are 32-bit, and therefore near the world's origin.
+    // Rebuilt with a band that contains the displaced surface and three cells around it; from a mesh, whose positions are 32-bit, and
+    // therefore near the world's origin.
     let (near, moved) = near_origin(ctx, grid)?;
     let mesh = level_set::to_mesh(ctx, near.as_ref().unwrap_or(grid), 0.0, 0.0)?;
     let settings = Settings { half_width: half_width + noise.amplitude.ceil(), ..Settings::new(cell) };
@@ -131,8 +131,8 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
     Ok(())
 }
 
-/// A level set of the world's lattice moved by whole blocks so that its middle lies at the origin, and its former distance
-/// from there (voxels); none when it need not be moved, or lies on another lattice.
+/// A level set on the world's lattice, moved by whole blocks so that its centre is at the origin, and its former offset from there
+/// (voxels); none if it need not be moved or is on another lattice.
 fn near_origin(ctx: &Context, grid: &FloatGrid) -> Result<(Option<FloatGrid>, [i32; 3])> {
     let nothing = (None, [0; 3]);
     let Some((low, high)) = grid.active_bbox().filter(|_| grid.is_world_fixed()) else { return Ok(nothing) };
@@ -239,7 +239,7 @@ mod tests {
         assert!(f64::from(steepest) > STEEPEST * 0.6, "the bound is far from tight: {steepest}");
     }
 
-    /// Values along x at voxels around a position, of clumps of 100 cells: neighbours differ by little, and always.
+    /// Values along x at voxels around a position, of clumps of 100 cells: neighbours always differ, but only slightly.
     fn line(at: i32) -> Vec<f32> {
         let cell = 0.0075;
         let params = NoiseParams { amplitude: 2.0 * cell, size: 100.0 * cell, octaves: 1, seed: 0 };
@@ -249,7 +249,7 @@ mod tests {
 
     #[test]
     fn the_noise_is_as_smooth_far_away_as_near_the_origin() {
-        // 0, 1.2 km, 100 km and as far as voxels have numbers.
+        // 0, 1.2 km, 100 km and the limit of voxel indices.
         for at in [0, 160_000, 13_333_333, i32::MAX / 2, -i32::MAX / 2] {
             let line = line(at);
             let bent = line.windows(3).map(|v| (v[0] - 2.0 * v[1] + v[2]).abs());

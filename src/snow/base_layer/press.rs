@@ -1,7 +1,7 @@
 //! Pressing a sweep into the snow, block by block: snow = max(snow, -sweep), removed = max(snow, sweep).
 //!
-//! The intersection is taken before the subtraction: base(t) minus base(t + dt) would leave a ghost
-//! surface of no thickness wherever nothing moved.
+//! The intersection is taken before the subtraction: base(t) minus base(t + dt) would leave a ghost surface of zero thickness wherever
+//! nothing moved.
 
 use super::columns::{CELLS, add_by_cell, filled};
 use super::removed_volume;
@@ -28,7 +28,7 @@ impl Edit {
     }
 }
 
-/// Cell and band of the snow.
+/// Cell size and band of the snow.
 #[derive(Debug, Clone, Copy)]
 pub struct Scale {
     /// Cell (m).
@@ -45,7 +45,7 @@ pub fn has_snow(probe: &Probe<'_>) -> bool {
     }
 }
 
-/// Subtracts a piece of the sweep from the snow there; none when nothing changes.
+/// Subtracts a piece of the sweep from the snow there; none if nothing changes.
 pub fn subtract(piece: &Piece, snow: &Probe<'_>, scale: Scale) -> Option<Edit> {
     let tile;
     let (before, mask) = match snow {
@@ -85,8 +85,8 @@ fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) ->
     for index in 0..VOXELS {
         let (snow, sweep) = (before[index], cells[index] * scale.cell);
         let mut left = if -sweep > snow { (-sweep).min(scale.background) } else { snow };
-        // Faces that coincide, as a sole's and the ground's under it, leave a shell of no thickness that the distances beside it
-        // show as snow: at least as far outside as what is really left.
+        // Coincident faces, such as those of a sole and the ground under it, leave a shell of zero thickness that the adjacent distances
+        // show as snow: move the value at least as far outside as the snow that is really left.
         let is_thin = (0.0..0.5 * scale.cell).contains(&left) && sweep < 0.5 * scale.cell;
         if is_thin && is_along(before, cells, index) {
             let rest = (filled(snow, scale.cell) - filled(sweep, scale.cell)).max(0.0);
@@ -112,7 +112,7 @@ fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) ->
     })
 }
 
-/// Least cosine of the angle between surfaces that face the same way.
+/// Minimum cosine of the angle between surfaces that face the same way.
 const ALONG: f32 = 0.9;
 
 /// Whether the snow and a sweep face the same way at a voxel.
@@ -126,7 +126,7 @@ pub fn from_cells(origin: Origin, cells: Box<Values>, scale: Scale) -> BlockEdit
     packed(Block::of_cells(origin, cells, scale.cell, scale.background), scale)
 }
 
-/// A leaf, or a constant where no value lies within the band.
+/// A leaf, or a constant if no value lies within the band.
 pub fn pack(origin: Origin, values: Box<Values>, scale: Scale) -> BlockEdit {
     packed(Block::of_band(origin, values, scale.background), scale)
 }

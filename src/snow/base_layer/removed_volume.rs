@@ -1,29 +1,29 @@
-//! Which part of each voxel of a block a level set's solid fills.
+//! The fraction of each voxel of a block that a level set's solid fills.
 //!
-//! The distance at a voxel's centre gives it exactly where the surface is flat. At an edge it is wrong by up to a quarter of a cell.
-//! There the level set is reconstructed inside the voxel, on each axis in turn: between two voxels it goes on from either side at
-//! that side's slope up to where both meet (subcell resolution: Harten 1989). Where two planes meet that is exact.
+//! The distance at a voxel's centre gives the fraction exactly if the surface is flat. At an edge it is off by up to a quarter of a cell.
+//! There the level set is reconstructed inside the voxel, on each axis in turn: between two voxels it is extrapolated from either side with
+//! that side's slope up to where both meet (subcell resolution: Harten 1989). This is exact where two planes meet.
 
 use super::columns::filled;
 use crate::numeric::blocks::Values;
 
-/// Distance (cells) from the centre beyond which next to nothing of a surface at an edge is in a voxel.
+/// Distance (cells) from the centre beyond which a surface with an edge fills a negligible part of a voxel.
 const FAR: f32 = 0.75;
 /// Second difference (cells) along an axis from which on there is an edge.
 const EDGE: f32 = 0.1;
-/// Parts of a voxel's edge, and their centres (cells from the voxel's).
+/// Parts of a voxel's edge, and their centres (cells from the centre of the voxel).
 const PARTS: usize = 4;
 const CENTRES: [f32; PARTS] = [-0.375, -0.125, 0.125, 0.375];
-/// By how much the slope is taken to change behind the border of a block, where an edge may be that the block does not show: so that
-/// errors of edges at random positions have a mean near 0.
+/// Assumed change of slope beyond the border of a block, where there may be an edge outside the block: chosen so that the errors for edges
+/// at random positions have a mean near 0.
 const UNSEEN: f32 = 0.15;
-/// How far (of a slope's square) a plane's gradient may be from 1.
+/// Tolerance for the squared gradient of a plane, which should be 1.
 const STEEP: f32 = 0.05;
-/// A value that is not known.
+/// Sentinel: a value that is not known.
 const UNKNOWN: f32 = f32::NAN;
 
-/// The filled part 0..=1 of each voxel, from distances (m) with cells of `cell` m. It depends on the block alone, so that what a
-/// step removes is the difference of what was there before and after it.
+/// The filled fraction 0..=1 of each voxel, from distances (m) with cells of `cell` m. It depends only on the block, so that a step removes
+/// exactly the difference of the fractions before and after it.
 pub(in crate::snow) fn parts(values: &Values, cell: f32) -> Values {
     let mut out = values.map(|value| filled(value, cell));
     for (index, part) in out.iter_mut().enumerate() {
@@ -43,8 +43,8 @@ pub(in crate::snow) fn volume(values: &Values, cell: f32) -> f64 {
     parts(values, cell).iter().map(|part| f64::from(*part)).sum()
 }
 
-/// Second differences (m) around a voxel, in the block: the sum of the three axes', positive where the solid is convex, and the
-/// greatest size.
+/// Second differences (m) around a voxel, within the block: the sum over the three axes, positive where the solid is convex, and the
+/// maximum magnitude.
 fn bends(values: &Values, at: [usize; 3]) -> [f32; 2] {
     let (mut sum, mut most) = (0.0f32, 0.0f32);
     for axis in 0..3 {
@@ -59,9 +59,9 @@ fn bends(values: &Values, at: [usize; 3]) -> [f32; 2] {
     [sum, most]
 }
 
-/// The part of a voxel that is filled, from the level set inside it. `unseen`: by how much its slope changes behind the border.
+/// The filled fraction of a voxel, from the level set inside it. `unseen`: the assumed change of slope beyond the border.
 fn reconstructed(values: &Values, at: [usize; 3], cell: f32, unseen: f32) -> f32 {
-    // Axes on which one side is behind the border come last: what is known on the others helps there.
+    // Axes with one side beyond the border come last: the known values on the others then help.
     let mut axes = [0usize, 1, 2];
     let is_border = |axis: usize| at[axis] == 0 || at[axis] == 7;
     axes.sort_by_key(|axis| is_border(*axis));
@@ -77,7 +77,7 @@ fn reconstructed(values: &Values, at: [usize; 3], cell: f32, unseen: f32) -> f32
         values[index] / cell
     };
     let all = [0, 1, 2, 3, 4];
-    // Refined on the first axis, then on the second one: at `[last][second]`, then at `[last]`.
+    // Refined on the first axis, then on the second: at `[last][second]`, then at `[last]`.
     let once = all.map(|last| all.map(|second| refined(all.map(|first| value([first, second, last])))));
     let layer = |last: usize| -> [[f32; PARTS]; PARTS] {
         std::array::from_fn(|first| refined(all.map(|second| once[last][second][first])))
@@ -109,8 +109,8 @@ fn reconstructed(values: &Values, at: [usize; 3], cell: f32, unseen: f32) -> f32
     sum / (PARTS * PARTS * PARTS) as f32
 }
 
-/// The slope (1) behind the border from the values of the voxel's layer there: the gradient of distances is 1 long. None where the
-/// slope before the border fits.
+/// The slope (1) beyond the border, from the values in the voxel's layer there: the gradient of distances has length 1. None if the slope
+/// before the border is consistent.
 fn behind_border(layer: &[[f32; PARTS]; PARTS], [first, second]: [usize; 2], slope: f32) -> Option<f32> {
     if slope.abs() < 0.02 {
         return None;
@@ -134,7 +134,7 @@ fn behind_border(layer: &[[f32; PARTS]; PARTS], [first, second]: [usize; 2], slo
     Some(slope.signum() * sum / count)
 }
 
-/// Values at [`CENTRES`] beside the middle one of five, of which some may be unknown.
+/// Values at [`CENTRES`] around the middle of five values, some of which may be unknown.
 fn refined([far_below, below, own, above, far_above]: [f32; 5]) -> [f32; PARTS] {
     let [a, b, c, d] = CENTRES;
     [
@@ -145,7 +145,7 @@ fn refined([far_below, below, own, above, far_above]: [f32; 5]) -> [f32; PARTS] 
     ]
 }
 
-/// The value at a distance (cells) from a voxel towards the next one, behind which there is another one, as one is on the other side.
+/// The value at a distance (cells) from a voxel towards the next one; `far` is the one beyond that, and `back` the one on the other side.
 fn beside(own: f32, [next, far]: [f32; 2], back: f32, distance: f32) -> f32 {
     if next.is_nan() {
         return if back.is_nan() { own } else { own + (own - back) * distance };
@@ -163,7 +163,7 @@ fn beside(own: f32, [next, far]: [f32; 2], back: f32, distance: f32) -> f32 {
     }
 }
 
-/// The direction in which distances of a block grow at a voxel, of length 1; none where they do not change.
+/// The direction of increasing distance at a voxel of a block, normalised; none where the distances are constant.
 pub fn direction(values: &Values, index: usize) -> Option<[f32; 3]> {
     let at = [index >> 6, index >> 3 & 7, index & 7];
     let slope = |axis: usize| {
@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn edges_that_a_block_shows_whole_are_right() {
-        // The edge of a layer, and of a pit with vertical walls, at random positions; some of them turned about y.
+        // The edge of a layer, and of a pit with vertical walls, at random positions; some of them rotated about y.
         let (mut worst, mut worst_of_centres) = (0.0f32, 0.0f32);
         for n in 0..90 {
             let random = |factor: f32| (factor * (n + 1) as f32).fract();
@@ -208,7 +208,7 @@ mod tests {
             let across = |[x, _, z]: [f32; 3]| turn.cos() * (x - wall) + turn.sin() * (z - 4.0);
             let layer = block(1.0, |at| across(at).max(at[1] - top));
             let pit = block(1.0, |at| across(at).min(at[1] - top));
-            // In the middle of the block: 4 cells of edge, along which the wall moves from one side to the other.
+            // In the centre of the block: 4 cells of edge, along which the wall moves from one side to the other.
             let layer_area = (wall - 2.0) * (top - 2.0);
             let pit_area = 16.0 - (6.0 - wall) * (6.0 - top);
             for (values, area) in [(layer, layer_area), (pit, pit_area)] {

@@ -1,8 +1,8 @@
-//! A layer as bytes, for a host's own cache: what differs from the layer before the first step, packed.
+//! A layer as bytes, for a host's own cache: the difference from the layer before the first step, packed.
 //!
-//! Blocks go in groups that are packed and unpacked in parallel. Of each block the narrow band's values are kept
-//! bit for bit, their bytes sorted by significance before LZ4; what can be computed from the snow itself
-//! (compression, heights, tiles) is not kept. The bytes are the same on any number of threads.
+//! Blocks are packed and unpacked in groups, in parallel. The narrow band's values of each block are stored exactly, with their bytes
+//! sorted by significance before LZ4; data that can be computed from the snow itself (compression, heights, tiles) is not stored. The bytes
+//! are the same for any number of threads.
 
 use rayon::prelude::*;
 use xxhash_rust::xxh3::{Xxh3, xxh3_64, xxh3_128};
@@ -19,10 +19,10 @@ const VERSION: u32 = 1;
 const HEADER: usize = 80;
 /// Blocks packed together.
 const GROUP: usize = 256;
-/// Most bytes of a block before packing: values and frames of every voxel, three masks, origin, kind.
+/// Maximum bytes of a block before packing: values and frames of every voxel, three masks, origin, kind.
 const BLOCK: usize = 2 * 4 * VOXELS + 3 * 64 + 16;
 
-/// How a block is stored; [`TOUCHED`] is added where it has frames of its last change.
+/// How a block is stored; [`TOUCHED`] is added if it has frames of its last change.
 const CONSTANT: u8 = 0;
 /// The narrow band's values; all others are the background, with a sign.
 const BAND: u8 = 1;
@@ -62,7 +62,7 @@ impl BaseLayer {
         })
     }
 
-    /// Bytes that suffice for [`BaseLayer::save`].
+    /// Upper bound on the bytes of [`BaseLayer::save`].
     pub fn save_bound(&self) -> usize {
         let groups = self.changed.len().div_ceil(GROUP);
         HEADER + groups * (12 + lz4_flex::block::get_maximum_output_size(GROUP * BLOCK))
@@ -74,7 +74,7 @@ impl BaseLayer {
     /// # Errors
     /// As [`BaseLayer::new`]; bytes that are damaged, of another version, or of another initial layer.
     pub fn restore(ctx: &Context, initial: FloatGrid, params: Params, state: &[u8]) -> Result<Self> {
-        // Too few bytes are refused below.
+        // Too few bytes are rejected below.
         let volume = state.get(44..52).map(|bytes| f64::from_le_bytes(array(bytes)));
         let mut layer = Self::with_volume(ctx, initial, params, volume)?;
         let (surface, touched) = ctx.phase("unpack", || layer.unpack(ctx, state))?;
@@ -91,8 +91,8 @@ impl BaseLayer {
         Ok(layer)
     }
 
-    /// 0 magic, 8 version, 12 blocks, 16 cell, 24 background, 28 initial layer, 44 volume, 52 bytes that follow,
-    /// 60 nothing, 64 seal.
+    /// Offsets: 0 magic, 8 version, 12 blocks, 16 cell, 24 background, 28 initial layer, 44 volume, 52 number of bytes that follow, 60
+    /// unused, 64 checksum.
     fn header(&self, following: &usize) -> Vec<u8> {
         let mut out = Vec::with_capacity(HEADER + following);
         out.extend(MAGIC);
@@ -172,7 +172,7 @@ pub fn fingerprint(surface: &FloatGrid) -> Result<u128> {
     Ok(xxh3_128(&leaves.iter().flat_map(|hash| hash.to_le_bytes()).collect::<Vec<u8>>()))
 }
 
-/// Hash of everything but its own bytes.
+/// Hash of everything except the hash itself.
 fn seal(state: &[u8]) -> [u8; 16] {
     let mut hash = Xxh3::new();
     hash.update(&state[..HEADER - 16]);
@@ -180,7 +180,7 @@ fn seal(state: &[u8]) -> [u8; 16] {
     hash.digest128().to_le_bytes()
 }
 
-/// A group with its number of blocks and its length before it.
+/// A group, preceded by its number of blocks and its length.
 fn pack(origins: &[Origin], surface: &[Probe<'_>], touched: &[Probe<'_>], background: f32) -> Vec<u8> {
     let packed = lz4_flex::block::compress(&write_group(origins, surface, touched, background));
     let mut out = Vec::with_capacity(8 + packed.len());
@@ -232,12 +232,12 @@ fn write_group(origins: &[Origin], surface: &[Probe<'_>], touched: &[Probe<'_>],
     out
 }
 
-/// A bit where an inactive value is negative.
+/// Bits of inactive values that are negative.
 fn negative(leaf: &Leaf<'_>, x: usize, at: usize) -> u64 {
     u64::from(leaf.mask[x] >> at & 1 == 0 && leaf.values[x << 6 | at] < 0.0) << at
 }
 
-/// Whether all inactive values are the background, with a sign.
+/// Whether all inactive values are plus or minus the background.
 fn is_band(leaf: &Leaf<'_>, background: f32) -> bool {
     leaf.mask.iter().zip(leaf.values.chunks_exact(64)).all(|(&word, values)| {
         let other = |at: usize| u64::from(values[at].abs() != background) << at;
@@ -255,7 +255,7 @@ fn active(mask: &Mask) -> impl Iterator<Item = usize> + '_ {
     })
 }
 
-/// What [`write_group`] wrote; none where the bytes do not hold it.
+/// Reads what [`write_group`] wrote; none if the bytes are invalid.
 fn read_group(
     reader: &mut Reader<'_>,
     blocks: usize,
@@ -330,7 +330,7 @@ fn count(mask: &Mask) -> usize {
     mask.iter().map(|word| word.count_ones() as usize).sum()
 }
 
-/// Bytes that are taken from the front.
+/// Bytes that are consumed from the front.
 struct Reader<'a>(&'a [u8]);
 
 impl<'a> Reader<'a> {

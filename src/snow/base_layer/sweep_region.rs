@@ -1,4 +1,4 @@
-//! Where a sweep can change the snow: its distances are computed only there.
+//! The region in which a sweep can change the snow: its distances are computed only there.
 
 use rayon::prelude::*;
 
@@ -6,8 +6,8 @@ use crate::error::Result;
 use crate::numeric::blocks::{Mask, Origin};
 use crate::vdb::{FloatGrid, Probe};
 
-/// Voxels of each block whose value is below the background: what lies farther outside cannot lose snow.
-/// With `rim`, their neighbours along the axes too, for derivatives.
+/// Voxels of each block with a value below the background: those farther outside cannot lose snow. With `rim`, also their neighbours along
+/// the axes, for derivatives.
 pub fn snow_masks(surface: &FloatGrid, blocks: &[Origin], rim: bool) -> Result<Vec<Mask>> {
     let background = surface.background();
     let own = |probe: &Probe<'_>| -> Mask {
@@ -41,7 +41,7 @@ const LOW_Z: u64 = 0x0101_0101_0101_0101;
 /// Bits of y = 0 in a plane of constant x.
 const LOW_Y: u64 = 0xff;
 
-/// A block's mask grown by one voxel along each axis, also from its six neighbours.
+/// A block's mask dilated by one voxel along each axis, including voxels of its six neighbours.
 fn dilated([own, below_x, above_x, below_y, above_y, below_z, above_z]: &[Mask; 7]) -> Mask {
     std::array::from_fn(|x| {
         let bits = own[x];

@@ -1,4 +1,4 @@
-//! Grains and their motion: sub-steps of [`super::solver::solve`], in which pairs are found again where grains have moved.
+//! Grains and their motion: sub-steps of [`super::solver::solve`]; pairs are found again where grains have moved.
 
 use rayon::prelude::*;
 
@@ -30,7 +30,7 @@ pub struct Floor {
 /// Writes the positions (m) of a mesh's vertices at a share 0..=1 of a step.
 pub type Pose<'a> = Box<dyn Fn(f64, &mut Vec<DVec3>) -> Result<()> + Send + Sync + 'a>;
 
-/// What grains cannot move.
+/// Colliders: grains cannot move them.
 #[derive(Default)]
 pub struct Colliders<'a> {
     /// A level plane.
@@ -140,7 +140,7 @@ impl Heap {
         self.rows.iter().zip(&self.at).map(|(row, at)| world(*at, row.position, self.diameter))
     }
 
-    /// Bounding box (m) of all positions, plus a diameter; least over greatest if there are none.
+    /// Bounding box (m) of all positions, plus a diameter; minimum above maximum if there are none.
     pub fn bounds(&self) -> [DVec3; 2] {
         let room = DVec3::repeat(self.diameter);
         let none = || [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
@@ -240,7 +240,7 @@ impl Heap {
         layout
     }
 
-    /// Keeps what the next step needs of a layout; removes the grains that have left its range.
+    /// Stores the data of a layout that the next step needs; removes the grains that have left its range.
     fn take_back(&mut self, mut layout: Layout) -> Result<()> {
         self.held = layout.take_held();
         self.touches = layout.blocks.iter().flat_map(|block| block.touches.iter().copied()).collect();
@@ -306,7 +306,7 @@ impl Heap {
                 block.is_awake |= !fresh.is_empty();
             });
         }
-        // Blocks at rest need no touches, but are due if their grains changed: those that left take their touches along.
+        // Blocks at rest need no touches, but are due if their grains changed: grains that left take their touches along.
         layout.blocks.par_iter_mut().for_each(|block| {
             block.is_due = block.lacks_touches && (block.is_awake || block.is_stirred);
             block.lacks_touches &= !block.is_due;

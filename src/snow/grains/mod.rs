@@ -10,12 +10,12 @@
 //! | slot | index of a grain in the heap's arrays; it changes from step to step, the identity (`id`) never does |
 //! | pair | two grains in contact or close to it; one of them owns the pair |
 //! | batch | eight pairs that share no grain, solved together |
-//! | collider | what grains cannot move: the floor, the base layer, the mesh of an object |
+//! | collider | an obstacle that grains cannot move: the floor, the base layer, the mesh of an object |
 //! | shell | a mesh as a collider |
 //! | touch | a contact between a grain and a collider, as a plane |
 //! | impulse | the change of velocity that a contact causes; kept from sub-step to sub-step |
 //! | push | a displacement that removes overlap and never becomes velocity |
-//! | block, column | a cube of 8 x 8 x 8 diameters; the blocks above each other, the unit of work |
+//! | block, column | a cube of 8 x 8 x 8 diameters; a stack of blocks, the unit of work |
 //! | colour | one of four sets of columns; no two columns of a set share a grain |
 //! | anchor | the position of a grain that its pairs are found from, slightly ahead of the grain |
 //! | rest | a grain that has lain still stops and supports others like the ground, until something wakes it |
@@ -94,7 +94,7 @@ pub struct StepReport {
     pub owed: f64,
     /// Count of grains removed below the lowest height, outside [`Params::keep_box`] or beyond the range of coordinates.
     pub dropped: usize,
-    /// Count of those of them that fell below the lowest height, beyond the edge of ground.
+    /// Of these, count of grains that fell below the lowest height, beyond the edge of ground.
     pub fell: usize,
     /// Count of grains that reached [`Params::lifetime`].
     pub expired: usize,
@@ -275,7 +275,7 @@ impl Grains {
                 let left = self.limit(around.lowest, to - from, frame);
                 Ok((left, self.heap.resting(), self.heap.fastest()))
             })?;
-            // A sum of nothing is -0.
+            // An empty sum is -0.
             let (count, owed) = (self.heap.count(), self.owed.values().sum::<f64>() + 0.0);
             let (dropped, phases) = (all - count - expired, Vec::new());
             Ok(StepReport {

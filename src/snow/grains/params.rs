@@ -37,17 +37,17 @@ pub struct Params {
     pub sub_steps: Option<u32>,
     /// Age (s) at which a grain is removed, at the end of a frame; none: never.
     pub lifetime: Option<f64>,
-    /// Least and greatest corner (m) of a box; grains outside are removed; none: no box.
+    /// Minimum and maximum corner (m) of a box; grains outside are removed; none: no box.
     pub keep_box: Option<[DVec3; 2]>,
-    /// Most grains; more are an error.
+    /// Maximum number of grains; more are an error.
     pub most: usize,
     /// Seed of the positions of new grains.
     pub seed: u64,
 }
 
-/// Largest g dt^2 / d of a sub-step: a grain at rest falls by this part of its diameter.
+/// Maximum g dt^2 / d of a sub-step: a grain at rest falls by this fraction of its diameter.
 const FALL: f64 = 0.02;
-/// Largest displacement of an object in a sub-step (diameters).
+/// Maximum displacement of an object in a sub-step (diameters).
 const WAY: f64 = 2.0;
 /// Fast objects multiply the count of sub-steps by at most this.
 const MOST_OF_FALL: usize = 8;
@@ -159,10 +159,10 @@ impl Params {
 
 /// Friction between loose grains that slide over each other, as a share of that between grains that do not yet.
 const SLIDING: f64 = 0.8;
-/// Square of the speed above which a grain slides, in diameters times gravity: a tenth of the speed at which it could rise by half a
-/// diameter.
+/// Square of the speed above which a grain slides, in diameters times gravity: the speed is a tenth of that at which it could rise by half
+/// a diameter.
 const SLIDES: f64 = 0.01;
-/// Least speed that bounces, in sub-steps of gravity.
+/// Minimum speed of a bounce, in sub-steps of gravity.
 const BOUNCING: f64 = 4.0;
-/// Largest gap (diameters) at which grains attract each other.
+/// Maximum gap (diameters) at which grains attract each other.
 const BAND: f32 = 0.05;

@@ -1,4 +1,4 @@
-//! Where grains were at the beginning of the last step: mist is raised along the paths from there.
+//! State of grains at the beginning of the last step: mist is raised along their paths from there.
 
 use rayon::prelude::*;
 
@@ -14,12 +14,12 @@ pub type Start = (DVec3, [f32; 3]);
 pub(super) struct Starts {
     /// By identity, ascending.
     grains: Vec<(u32, Start)>,
-    /// Identities of the grains that the step created: from the first one up to the second one, without it.
+    /// Identities of the grains that the step created: first and end (exclusive).
     born: [u32; 2],
 }
 
 impl Starts {
-    /// Those of a step that begins now, with the next identity to be given.
+    /// The state at the beginning of a step, given the next identity to be assigned.
     pub fn of(heap: &Heap, next_id: u32) -> Self {
         let all = heap.ids().iter().copied().zip(heap.positions().zip(heap.velocities()));
         let mut grains: Vec<(u32, Start)> = all.collect();
@@ -27,7 +27,7 @@ impl Starts {
         Self { grains, born: [next_id; 2] }
     }
 
-    /// The step has ended, with the next identity to be given.
+    /// Records the end of the step, given the next identity to be assigned.
     pub fn end(&mut self, next_id: u32) {
         self.born[1] = next_id;
     }
@@ -38,8 +38,8 @@ impl Starts {
 }
 
 impl Grains {
-    /// Where each was at the beginning of the last step, and how fast; of those that the step created the position of birth, at rest.
-    /// None before the first step, and of those that were emitted since.
+    /// Position and velocity of each grain at the beginning of the last step; for grains that the step created, the position of birth, at
+    /// rest. None before the first step, and for grains that were emitted since.
     pub fn starts(&self) -> impl Iterator<Item = Option<Start>> + '_ {
         let [first, end] = self.starts.born;
         self.ids().iter().zip(self.rests()).map(move |(id, rest)| {
@@ -83,7 +83,7 @@ mod tests {
                 grains.ids().iter().copied().zip(grains.starts().map(Option::unwrap)).collect();
             starts.sort_by_key(|(id, _)| *id);
             assert_eq!(starts, before);
-            // A step that fails is none.
+            // A failed step does not count.
             ctx.cancel();
             assert!(grains.step(&ctx, &around, times, frame).is_err());
             ctx.reset();

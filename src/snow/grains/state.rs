@@ -16,7 +16,7 @@ use crate::numeric::packed::Magic;
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzgrn06";
-/// What messages call it.
+/// Name in messages.
 const NOUN: &str = "grains";
 
 /// The state as bytes, the same for any number of threads.
@@ -133,7 +133,7 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// Count of bytes that a packed state holds; 0 if it is invalid.
+/// Unpacked size (bytes) of a state; 0 if it is invalid.
 pub fn unpacked(packed: &[u8]) -> u64 {
     packed::unpacked(packed, MAGIC, NOUN)
 }

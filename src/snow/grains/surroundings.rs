@@ -49,7 +49,7 @@ impl<'a> Object<'a> {
     }
 }
 
-/// Least and greatest corner (m) of a box.
+/// Minimum and maximum corner (m) of a box.
 pub type Bounds = [DVec3; 2];
 
 /// The colliders of a step.
@@ -64,13 +64,12 @@ pub struct Obstacles<'a> {
 
 /// Largest jump (diameters) of a mesh's box between two steps; a larger one wakes all grains.
 const JUMP: f64 = 0.1;
-/// Holes of less than this share of an object's area are closed; an object with larger ones, such as a bowl, collides on both
-/// sides.
+/// Holes of less than this share of an object's area are closed; an object with larger holes, such as a bowl, collides on both sides.
 pub const HOLES: f64 = 0.1;
-/// Speed (m/s) over which an object does not move through a step but stands where it ends: it jumps from one shot, or from one
-/// side of a set, to the next.
+/// Speed (m/s) above which an object does not move through a step but is at its final position throughout: it jumps from one shot, or from
+/// one side of a set, to the next.
 pub const FASTEST_OBJECT: f64 = 100.0;
-/// Count of numbers in [`Surroundings::ties`].
+/// Number of values in [`Surroundings::ties`].
 pub const TIES: usize = 6;
 
 impl<'a> Surroundings<'a> {
@@ -156,7 +155,7 @@ impl<'a> Surroundings<'a> {
     }
 }
 
-/// Greatest speed (m/s) of a vertex between two poses (m) that lie `dt` (s) apart.
+/// Largest speed (m/s) of a vertex between two poses (m) that are `dt` (s) apart.
 fn speed(first: &[DVec3], last: &[DVec3], dt: f64) -> f64 {
     first.iter().zip(last).map(|(a, b)| (b - a).norm_squared()).fold(0.0, f64::max).sqrt() / dt
 }
@@ -167,7 +166,7 @@ pub fn bounds(positions: &[DVec3]) -> Bounds {
     positions.iter().fold(none, |[low, high], position| [low.inf(position), high.sup(position)])
 }
 
-/// Displacement of a vertex if it may come near a box, else 0; its path may bend aside by as much as the displacement.
+/// Displacement of a vertex if it may come near a box, else 0; its path may deviate sideways by as much as the displacement.
 fn way_near(from: DVec3, to: DVec3, [low, high]: &Bounds) -> f64 {
     let way = (to - from).norm();
     let room = DVec3::repeat(way);
@@ -178,7 +177,7 @@ fn way_near(from: DVec3, to: DVec3, [low, high]: &Bounds) -> f64 {
     if (0..3).any(is_off) { 0.0 } else { way }
 }
 
-/// Whether boxes agree within a small part of a diameter (m).
+/// Whether the boxes agree to within a small part of a diameter (m).
 pub fn have_stayed(boxes: &[Bounds], others: &[Bounds], diameter: f64) -> bool {
     let differ = |(a, b): (&Bounds, &Bounds)| a.iter().zip(b).any(|(a, b)| (a - b).amax() > JUMP * diameter);
     boxes.len() == others.len() && !boxes.iter().zip(others).any(differ)

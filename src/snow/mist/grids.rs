@@ -10,9 +10,9 @@ use crate::geometry::DVec3;
 use crate::numeric::blocks::{Block, BlockEdit, Mask};
 use crate::vdb::{FloatGrid, GridClass, VectorEdit, VectorGrid};
 
-/// Grids of mist, whose voxels are its cells: their centres lie half a cell off multiples of it.
+/// Grids of mist, whose voxels are its cells: their centres are offset by half a cell from multiples of the cell size.
 pub struct Grids {
-    /// `density`: that of the mist; active where there is some.
+    /// `density`: the density of the mist; active where there is mist.
     pub density: FloatGrid,
     /// `vel`: velocity (m/s) of the air at the cells' centres; active in the blocks that hold mist.
     pub velocity: VectorGrid,
@@ -25,7 +25,7 @@ struct Piece {
 }
 
 impl Grids {
-    /// Those of mist.
+    /// The grids of some mist.
     ///
     /// # Errors
     /// When memory runs out; cancel.
@@ -51,7 +51,7 @@ impl Grids {
     }
 }
 
-/// The grids' values of a tile; none where it holds no mist.
+/// The grids' values for a tile; none if it holds no mist.
 fn piece(mist: &Mist, slot: usize, tile: &Tile) -> Option<Piece> {
     let mut mask: Mask = [0; 8];
     for (cell, value) in tile.iter().enumerate() {

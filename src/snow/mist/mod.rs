@@ -1,8 +1,7 @@
 //! Mist: powder that fast grains raise into the air (thesis section 3.4).
 //!
-//! The air flows as an incompressible gas ([`crate::flow`]) where there is mist and some way around it. Where there is mist it is
-//! heavier than the air around, so that gravity acts there alone. Mist reads grains and never changes them; what it holds is not
-//! taken from theirs, and dissipates.
+//! The air flows as an incompressible gas ([`crate::flow`]) in and around the mist. Air with mist is heavier than the air around it, so
+//! gravity acts only there. Mist reads grains and never changes them; its mass is not taken from theirs, and dissipates.
 
 mod forces;
 #[cfg(feature = "vdb")]
@@ -28,62 +27,61 @@ pub use sources::{Source, Start};
 #[cfg(feature = "vdb")]
 pub use surroundings::{Surroundings, Walls};
 
-/// Share of the faces whose air may be faster than a sub-step allows, where it is pressed through gaps as narrow as a cell: its path
-/// is then cut off at [`FARTHEST`] cells. A dozen such cells of two million would nearly double the sub-steps of a sleigh's mist.
+/// Share of the faces whose air may be faster than a sub-step allows, because it is pressed through gaps as narrow as a cell: its path is
+/// then clamped to [`FARTHEST`] cells. Otherwise a dozen such cells among two million would nearly double the sub-steps of a sleigh's mist.
 const JETS: f64 = 1.0e-4;
-/// Density under which there is no mist.
+/// Density below which there is no mist.
 pub const LEAST: f32 = 2.0e-3;
-/// Density from which on a tile gets air around it, so that its mist may spread there. What is thinner cannot be seen, and goes on
-/// in the tiles that are there: a few fast grains would else open hundreds of tiles for a litre of mist.
+/// Density from which a tile is padded with air, so that its mist may spread there. Thinner mist is invisible and only moves on in existing
+/// tiles: otherwise a few fast grains would open hundreds of tiles for a litre of mist.
 const DENSE: f32 = 0.02;
-/// Longest sub-step (s). Its length decides how far mist spreads, and how often grains fill the cells that they cross: frames of 1/24,
+/// Maximum length (s) of a sub-step. It affects how far mist spreads, and how often grains fill the cells that they cross: frames of 1/24,
 /// 1/48 and 1/96 s have the same sub-steps.
 const LONGEST: f64 = 1.0 / 96.0;
-/// Most sub-steps of a step, and most parts of a sub-step.
+/// Maximum number of sub-steps of a step, and of parts of a sub-step.
 const MOST: usize = 1000;
 
-/// What a step did.
+/// Results of a step.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StepReport {
-    /// Count of active cells after it.
+    /// Number of active cells after it.
     pub cells: usize,
     /// Sum of the density, times the volume of a cell (m3).
     pub mass: f64,
-    /// Count of grains that raised mist.
+    /// Number of grains that raised mist.
     pub sources: usize,
-    /// Count of sub-steps.
+    /// Number of sub-steps.
     pub sub_steps: usize,
-    /// Iterations of all its projections.
+    /// Total iterations of its projections.
     pub iterations: usize,
-    /// Greatest divergence times the cell that a projection left, over the greatest speed before.
+    /// Largest divergence, times the cell, that a projection left, relative to the largest speed before.
     pub divergence: f32,
-    /// Greatest speed (m/s) on any axis.
+    /// Largest speed (m/s) on any axis.
     pub fastest: f32,
     /// Wall-clock time of each phase.
     pub phases: Vec<PhaseTime>,
 }
 
-/// Bytes that a step takes for each active cell at most, with the air around and solids.
+/// Maximum bytes that a step takes for each active cell, including the surrounding air and solids.
 const BYTES_PER_CELL: u64 = 220;
 
-/// Memory (bytes) that a step with so many active tiles, of 512 cells each, is taken to need: one that would need more than its
-/// context allows is refused.
+/// Estimated memory (bytes) of a step with this many active tiles of 512 cells; a step that would exceed the context's limit is refused.
 pub fn memory(tiles: usize) -> u64 {
     512 * tiles as u64 * BYTES_PER_CELL
 }
 
-/// Open shares and speeds of faces for tiles with cells of an edge (m), at a share 0..=1 of a step.
+/// Open fractions and speeds of faces, for tiles and the edge (m) of their cells, at a share 0..=1 of a step.
 pub type Boundary<'a> = dyn Fn(&Tiles, f32, f64) -> Result<Solids> + Sync + 'a;
 
-/// What acts on mist in a step.
+/// The surroundings that act on mist in a step.
 pub struct Around<'a> {
-    /// Grains, of which the fast ones raise mist.
+    /// Grains; the fast ones raise mist.
     pub sources: &'a [Source],
-    /// What it flows around.
+    /// Obstacles that it flows around.
     pub boundary: &'a Boundary<'a>,
-    /// Greatest speed (m/s) of what it flows around.
+    /// Largest speed (m/s) of these obstacles.
     pub fastest: f64,
-    /// Wind that differs from place to place; none: that of [`Params::wind`] is everywhere.
+    /// Wind that varies in space; none: [`Params::wind`] everywhere.
     pub wind: Option<&'a Wind<'a>>,
 }
 
@@ -92,12 +90,12 @@ pub struct Around<'a> {
 pub struct Mist {
     params: Params,
     flow: Flow,
-    /// The flow as it was before the step, for one that fails.
+    /// The flow before the step, to restore if the step fails.
     before: Kept,
 }
 
 impl Clone for Mist {
-    /// A copy of what is carried from step to step.
+    /// A copy of the state that is carried from step to step.
     fn clone(&self) -> Self {
         Self { params: self.params.clone(), flow: self.flow.copy(), before: Kept::default() }
     }
@@ -124,7 +122,7 @@ impl Mist {
         Ok(mist)
     }
 
-    /// Count of bytes of a saved state before it was packed; 0 if it is not one.
+    /// Unpacked size (bytes) of a saved state; 0 if it is invalid.
     pub fn unpacked(bytes: &[u8]) -> u64 {
         state::unpacked(bytes)
     }
@@ -142,7 +140,7 @@ impl Mist {
     /// Sets the parameters from the next step on.
     ///
     /// # Errors
-    /// A parameter out of range, another cell or another wind; the old parameters are then kept.
+    /// A parameter out of range, another cell size or another wind; the old parameters are then kept.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
         params.validate()?;
         let old = &self.params;
@@ -164,19 +162,18 @@ impl Mist {
         &self.flow
     }
 
-    /// Adds mist: density and velocity (m/s) at a cell, none where the density is 0.
+    /// Adds mist: `of` returns the density and velocity (m/s) at a cell; a density of 0 adds none.
     pub fn add(&mut self, tiles: &[Coord], of: impl Fn([i32; 3]) -> (f32, [f32; 3])) {
         let seeds = sources::new_mist::seeds(tiles, of);
         self.flow.resize(&self.wanted(&seeds));
         self.sow(&seeds);
     }
 
-    /// Moves the mist from `from` to `to` (s), while grains raise more of it. A step that fails or is cancelled leaves it as it
-    /// was.
+    /// Moves the mist from `from` to `to` (s), while grains raise more. A step that fails or is cancelled leaves it unchanged.
     ///
     /// # Errors
-    /// Times that do not ascend; a grain that is not finite or too large; air that moves too fast for its cells; more memory than
-    /// the context allows; cancel; errors of the boundary.
+    /// Times that do not ascend; a grain that is not finite or is too large; air that moves too fast for its cells; more memory than the
+    /// context allows; cancel; errors of the boundary.
     pub fn step(&mut self, ctx: &Context, around: &Around<'_>, times: [f64; 2]) -> Result<StepReport> {
         let [from, to] = times;
         if !(to > from && (to - from).is_finite()) {
@@ -198,7 +195,7 @@ impl Mist {
         }
     }
 
-    /// Moves the mist in sub-steps, in each of which grains raise more along their way.
+    /// Moves the mist in sub-steps; in each of them grains raise more along their paths.
     fn carry(&mut self, ctx: &Context, around: &Around<'_>, [from, to]: [f64; 2]) -> Result<StepReport> {
         let sub_steps = self.sub_steps(around, to - from)?;
         let part = (to - from) / sub_steps as f64;
@@ -216,7 +213,7 @@ impl Mist {
             }
             self.flow.clear_covered();
             self.follow_air(ctx, part)?;
-            // Last, so that new mist is where its grains were, and begins to move in the next sub-step.
+            // Last, so that new mist is where its grains were and begins to move in the next sub-step.
             self.raise(ctx, around.sources, to - from, shares)?;
             ctx.advance();
         }
@@ -226,22 +223,22 @@ impl Mist {
         Ok(report)
     }
 
-    /// Count of sub-steps in which neither the air nor a grain nor an object moves farther than [`FARTHEST`] cells.
+    /// Number of sub-steps such that neither the air nor a grain nor an object moves farther than [`FARTHEST`] cells in one.
     fn sub_steps(&self, around: &Around<'_>, dt: f64) -> Result<usize> {
         let speeds = around.sources.iter().map(Source::fastest);
         let fastest = speeds.fold(self.bulk(), |most, speed| most.max(speed));
         let speed = f64::from(fastest).max(around.fastest) + self.params.gravity.abs() * dt;
-        // Whole parts of the longest ones, so that frames of other lengths have the same sub-steps.
+        // Integer divisions of the longest sub-steps, so that frames of other lengths have the same sub-steps.
         let least = ((dt / LONGEST * (1.0 - 1.0e-9)).ceil() as usize).clamp(1, MOST);
         Ok(self.parts(speed, dt)?.div_ceil(least) * least)
     }
 
-    /// Speed (m/s) that the air keeps within, but for jets.
+    /// Speed (m/s) that the air does not exceed, except in jets.
     fn bulk(&self) -> f32 {
         self.flow.fastest_but(JETS).min(self.flow.fastest())
     }
 
-    /// Into how many parts a time (s) is divided for a speed (m/s).
+    /// Number of parts into which a time (s) is divided for a speed (m/s).
     fn parts(&self, speed: f64, dt: f64) -> Result<usize> {
         let count = (speed * dt / (f64::from(FARTHEST) * self.params.cell)).ceil();
         if count.is_nan() || count > MOST as f64 {
@@ -253,7 +250,7 @@ impl Mist {
         Ok((count as usize).max(1))
     }
 
-    /// Puts the mist that grains raise along a part, two shares 0..=1, of their way in a step of `dt` (s) into the air.
+    /// Adds the mist that grains raise along a part, two shares 0..=1, of their paths in a step of `dt` (s).
     fn raise(&mut self, ctx: &Context, sources: &[Source], dt: f64, shares: [f64; 2]) -> Result<()> {
         let ways = sources::ways(sources, &self.params, dt, shares);
         let seeds = sources::seeds(ctx, &ways, &self.params)?;
@@ -265,7 +262,7 @@ impl Mist {
         Ok(())
     }
 
-    /// Forces act on the air for `dt` (s) from a time (s) on.
+    /// Applies the forces to the air for `dt` (s) from a time (s) on.
     fn push(&mut self, ctx: &Context, wind: Option<&Wind<'_>>, time: f64, dt: f64) -> Result<()> {
         forces::fall(&mut self.flow, (self.params.gravity * dt) as f32);
         if let Some(wind) = wind {
@@ -278,7 +275,7 @@ impl Mist {
         Ok(())
     }
 
-    /// The air carries itself and the mist along for `dt` (s); some of it dissipates.
+    /// Advects the air and the mist for `dt` (s); some of the mist dissipates.
     fn follow_air(&mut self, ctx: &Context, dt: f64) -> Result<()> {
         // The boundary may have made the air faster than it was when the sub-steps were chosen.
         let parts = self.parts(f64::from(self.bulk()), dt)?;
@@ -294,7 +291,7 @@ impl Mist {
         (sums.iter().sum::<f64>() + 0.0) * self.params.cell.powi(3)
     }
 
-    /// The tiles that hold mist or will get some, and around those with a density that can be seen the padding.
+    /// The tiles that hold mist or will receive some, and padding around those whose density is visible.
     fn wanted(&self, seeds: &[Seed]) -> Vec<Coord> {
         let most = |tile: &crate::flow::Tile| tile.iter().fold(0.0f32, |most, density| most.max(*density));
         let held = self.flow.tiles().coords().iter().zip(self.flow.density());

@@ -1,10 +1,10 @@
-//! What a user chooses about mist.
+//! User parameters of mist.
 
 use std::ops::RangeInclusive;
 
 use crate::error::{Error, Result};
 
-/// Fastest wind (m/s) along an axis.
+/// Maximum wind speed (m/s) along an axis.
 pub const FASTEST_WIND: f64 = 1000.0;
 
 /// Parameters of mist (thesis section 3.4).
@@ -12,7 +12,7 @@ pub const FASTEST_WIND: f64 = 1000.0;
 pub struct Params {
     /// Edge of a cell (m).
     pub cell: f64,
-    /// Least speed (m/s) of grains that raise mist: the thesis' v_mist.
+    /// Minimum speed (m/s) of grains that raise mist: the thesis' v_mist.
     pub from_speed: f64,
     /// Whether falling grains raise mist too.
     pub falling: bool,
@@ -26,9 +26,9 @@ pub struct Params {
     pub turbulence: f64,
     /// Size (m) of the eddies, at least 8 cells.
     pub turbulence_size: f64,
-    /// Strength (1/s) with which small eddies are kept alive; 0: not at all.
+    /// Strength (1/s) with which small eddies are sustained; 0: not at all.
     pub confinement: f64,
-    /// Share 0..=1 of the new density that noise takes away at most.
+    /// Maximum share 0..=1 of the new density that noise removes.
     pub noise: f64,
     /// Size (m) of that noise.
     pub noise_size: f64,
@@ -36,12 +36,12 @@ pub struct Params {
     pub seed: i32,
     /// Tiles of air (8 cells wide) that are computed around the mist.
     pub padding: u32,
-    /// Divergence times the cell that a projection leaves, over the greatest speed.
+    /// Maximum divergence, times the cell, that a projection leaves, relative to the largest speed.
     pub tolerance: f64,
 }
 
 impl Params {
-    /// The thesis' values, for cells of an edge (m).
+    /// The thesis' values, for cells with the edge `cell` (m).
     pub fn for_cell(cell: f64) -> Self {
         Self {
             cell,

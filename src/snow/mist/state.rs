@@ -8,7 +8,7 @@ use crate::numeric::packed::Magic;
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzmst01";
-/// What messages call it.
+/// Name in messages.
 const NOUN: &str = "mist";
 
 /// The state as bytes, the same for any number of threads.
@@ -20,15 +20,15 @@ pub fn save(mist: &Mist) -> Vec<u8> {
     packed::pack(&to.0, MAGIC)
 }
 
-/// Count of bytes before they were packed; 0 for those of no state.
+/// Unpacked size (bytes); 0 if the bytes are not a state.
 pub fn unpacked(bytes: &[u8]) -> u64 {
     packed::unpacked(bytes, MAGIC, NOUN)
 }
 
-/// Reads a state into mist that has none yet.
+/// Loads a state into mist that has none yet.
 ///
 /// # Errors
-/// Bytes that are not a valid state, or one of other cells or another wind.
+/// Bytes that are not a valid state, or a state with other cells or another wind.
 pub fn load(mist: &mut Mist, bytes: &[u8]) -> Result<()> {
     let bytes = packed::unpack(bytes, MAGIC, NOUN)?;
     let mut from = Reader::new(&bytes);

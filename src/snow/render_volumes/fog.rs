@@ -1,7 +1,7 @@
 //! Densities (thesis section 3.5): 1 in snow, 0 outside.
 //!
-//! Each part of the snow has a grid of its own, on voxels of its own: those of the base are as large as its cells, those of
-//! grains at most half of their radius. One grid for both would hold the base's surface on the voxels of the grains.
+//! Each part of the snow has its own grid with its own voxel size: the base's voxels are as large as its cells, those of grains at most
+//! half their radius. A single grid would store the base's surface on the voxels of the grains.
 
 use super::fill;
 use super::spheres::{Spheres, Squares};
@@ -11,7 +11,7 @@ use crate::geometry::DVec3;
 use crate::numeric::blocks::{Block, BlockEdit, DIM, VOXELS, Values};
 use crate::vdb::{DENSITY_SCALE_KEY, FloatGrid, GridClass, Leaf, MetaValue, Tile};
 
-/// What the thesis multiplies the density of base and grains by when it renders them (1/m, as renderers take a density).
+/// Factor by which the thesis multiplies the density of base and grains for rendering (1/m, the unit that renderers use).
 pub const DENSITY_SCALE: f32 = 100.0;
 /// Width of the falloff around a sphere (radii).
 pub const FALLOFF: f64 = 0.5;
@@ -20,8 +20,8 @@ pub const VOXEL: f64 = 0.5;
 /// Blocks along a cube's edge.
 const EDGE: usize = 4;
 
-/// Density of the snow in a level set, on its own voxels: 1 inside, 0 outside, and linear across the voxel that the surface
-/// passes through, so that the sum of the densities is the snow's volume. Where all is snow it consists of tiles.
+/// Density of the snow in a level set, on its own voxels: 1 inside, 0 outside, and linear across the voxel that the surface passes through,
+/// so that the sum of the densities is the snow's volume. Regions full of snow are stored as tiles.
 ///
 /// # Errors
 /// A grid that is not world-fixed; cancel; when memory runs out.
@@ -42,8 +42,8 @@ pub fn base(ctx: &Context, surface: &FloatGrid) -> Result<FloatGrid> {
     finished(grid)
 }
 
-/// Density of grains of a radius (m) around `centres` (m): 1 in the union of their spheres, and falling smoothly to 0 over half
-/// a radius outside of it. `voxel` (m) is at most half of the radius.
+/// Density of grains of a radius (m) around `centres` (m): 1 in the union of their spheres, falling smoothly to 0 over half a radius
+/// outside it. `voxel` (m) is at most half of the radius.
 ///
 /// # Errors
 /// A radius that is not above 0; a voxel that is not above 0 or too large; centres that are not finite or too far from the
@@ -52,7 +52,7 @@ pub fn grains(ctx: &Context, centres: &[DVec3], radius: f64, voxel: f64) -> Resu
     if !(radius > 0.0 && radius.is_finite()) {
         return Err(Error::argument(format!("the radius of grains must be above 0, not {radius} m")));
     }
-    // A product of a radius may be off by its last bit.
+    // A product with a radius may be off in its last bit.
     if !(voxel > 0.0 && voxel <= VOXEL * radius * (1.0 + 1.0e-9)) {
         let what = format!(
             "voxels of {voxel} m are not above 0 and at most half of the grains' radius of {radius} m"
@@ -73,13 +73,13 @@ pub fn grains(ctx: &Context, centres: &[DVec3], radius: f64, voxel: f64) -> Resu
     finished(grid)
 }
 
-/// The density at a distance outside of the spheres (widths of the falloff).
+/// The density at a distance outside the spheres (in widths of the falloff).
 fn falling(outside: f32) -> f32 {
     let left = (1.0 - outside).clamp(0.0, 1.0);
     left * left * (3.0 - 2.0 * left)
 }
 
-/// A block of densities, active where they are over 0; none where all are 0.
+/// A block of densities, active where they are above 0; none if all are 0.
 fn dense(origin: [i32; 3], values: Box<Values>) -> Option<BlockEdit> {
     let mut mask = [0u64; DIM];
     for index in 0..VOXELS {
@@ -88,7 +88,7 @@ fn dense(origin: [i32; 3], values: Box<Values>) -> Option<BlockEdit> {
     (mask != [0; DIM]).then_some(BlockEdit::Dense(Block { origin, values, mask }))
 }
 
-/// The grid with its class and factor, tiles where all of a block is snow.
+/// The grid with its class and density scale; blocks full of snow become tiles.
 fn finished(mut grid: FloatGrid) -> Result<FloatGrid> {
     grid.prune(0.0)?;
     grid.set_class(GridClass::Fog)?;

@@ -1,13 +1,13 @@
-//! Snow as renderers want it (thesis section 3.5): densities of the base layer and of grains ([`fog`]), and one surface around
-//! the base and the grains that rest on it ([`united`]).
+//! Snow for renderers (thesis section 3.5): densities of the base layer and of grains ([`fog`]), and one surface around the base and the
+//! grains that rest on it ([`united`]).
 //!
-//! All grids are sparse and world-fixed, made block by block in parallel, the same from any number of threads.
+//! All grids are sparse and world-fixed. They are built block by block in parallel, with the same result for any number of threads.
 //!
 //! | word | meaning |
 //! |---|---|
 //! | fog | a density: 1 where there is snow, 0 where there is none |
 //! | falloff | the shell around a sphere in which its density falls from 1 to 0 |
-//! | cube | the blocks that are made together: the unit of work |
+//! | cube | the blocks that are built together: the unit of work |
 
 pub mod fog;
 mod spheres;
@@ -19,10 +19,10 @@ use crate::numeric::blocks::BlockEdit;
 use crate::vdb::FloatGrid;
 use rayon::prelude::*;
 
-/// Blocks in memory at once, besides the grid that they are put into: 64 MB.
+/// Blocks in memory at once, in addition to the grid that they are put into: 64 MB.
 const AT_ONCE: usize = 1 << 15;
 
-/// Makes the blocks of some cubes, `edge` blocks wide, in parallel and puts them into a grid.
+/// Builds the blocks of some cubes, `edge` blocks wide, in parallel and puts them into a grid.
 fn fill<T: Sync>(
     ctx: &Context,
     grid: &mut FloatGrid,

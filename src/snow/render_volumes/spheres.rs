@@ -1,4 +1,4 @@
-//! Spheres of one size, and the distances of voxels from the nearest centre.
+//! Spheres of equal size, and the distances of voxels from the nearest centre.
 
 use rayon::prelude::*;
 
@@ -7,24 +7,24 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::numeric::blocks::{DIM, Origin, VOXELS, Values, offset};
 
-/// Farthest voxel from the origin.
+/// Maximum coordinate of a voxel.
 const FARTHEST: f64 = (1 << 30) as f64;
 
 /// Centres of spheres, sorted into cubes of blocks.
 pub struct Spheres {
     /// Blocks along a cube's edge.
     edge: usize,
-    /// Greatest distance (voxels) that is needed.
+    /// Maximum distance (voxels) that is needed.
     reach: f32,
-    /// The cubes that a centre is within reach of, ascending: their indices, and the index after their last member.
+    /// The cubes within reach of a centre, ascending: their indices, and the index after their last member.
     cubes: Vec<([i32; 3], usize)>,
-    /// Positions (voxels) relative to the least voxel of the cube, one cube after another.
+    /// Positions (voxels) relative to the minimum voxel of the cube, one cube after another.
     members: Vec<[f32; 3]>,
 }
 
 /// Squared distances (voxels) of a block's voxels from the nearest centre; beyond the reach they may be too large.
 pub struct Squares {
-    /// Least corner, in voxels.
+    /// Minimum corner, in voxels.
     pub origin: Origin,
     /// The distances.
     pub values: Box<Values>,
@@ -34,7 +34,7 @@ impl Spheres {
     /// Sorts centres (m) into cubes of `edge` blocks of a grid with voxels of `voxel` m; distances up to `reach` voxels count.
     ///
     /// # Errors
-    /// A centre that is not finite, or too far from the origin for voxels of this size; cancel.
+    /// A centre that is not finite, or is too far from the origin for voxels of this size; cancel.
     pub fn new(ctx: &Context, centres: &[DVec3], voxel: f64, reach: f64, edge: usize) -> Result<Self> {
         ctx.check()?;
         let is_near = |centre: &DVec3| centre.iter().all(|x| (x / voxel).abs() < FARTHEST);
@@ -60,7 +60,7 @@ impl Spheres {
         ctx.pool().install(|| {
             let of = |(index, centre): (usize, &DVec3)| spans(centre).map(move |cube| (cube, index as u32));
             let mut pairs: Vec<([i32; 3], u32)> = centres.par_iter().enumerate().flat_map_iter(of).collect();
-            // No two pairs are the same: the order is.
+            // No two pairs are equal, so the order is unique.
             pairs.par_sort_unstable();
             let position = |(cube, index): &([i32; 3], u32)| {
                 let at: [f64; 3] = (centres[*index as usize] / voxel).into();
@@ -78,12 +78,12 @@ impl Spheres {
         })
     }
 
-    /// The cubes that a centre is within reach of, ascending.
+    /// The cubes within reach of a centre, ascending.
     pub fn cubes(&self) -> impl Iterator<Item = [i32; 3]> + '_ {
         self.cubes.iter().map(|(cube, _)| *cube)
     }
 
-    /// The blocks of a cube that a centre is within reach of, by position.
+    /// The blocks of a cube within reach of a centre, by position.
     pub fn squares(&self, cube: [i32; 3]) -> Vec<Squares> {
         let Ok(index) = self.cubes.binary_search_by_key(&cube, |(cube, _)| *cube) else { return Vec::new() };
         let begin = if index == 0 { 0 } else { self.cubes[index - 1].1 };
@@ -99,7 +99,7 @@ impl Spheres {
         there.filter_map(|(index, values)| Some(Squares { origin: origin(index), values: values? })).collect()
     }
 
-    /// Brings the blocks of a cube nearer to a centre.
+    /// Lowers the distances in the blocks of a cube to those from a centre.
     fn add(&self, blocks: &mut [Option<Box<Values>>], centre: [f32; 3]) {
         let last = (self.edge * DIM) as f32 - 1.0;
         let low = centre.map(|at| (at - self.reach).ceil().clamp(0.0, last) as usize);
@@ -117,7 +117,7 @@ impl Spheres {
     }
 }
 
-/// Brings the voxels of a block, from `low` to `high`, nearer to a centre; all in voxels of the cube.
+/// Lowers the distances of a block's voxels, from `low` to `high`, to those from a centre; all in voxels of the cube.
 fn nearer(
     values: &mut Values,
     origin: [usize; 3],

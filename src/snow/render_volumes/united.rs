@@ -1,8 +1,8 @@
 //! One surface around the base layer and the grains that rest on it.
 //!
-//! A grid has voxels of one size: where grains rest they must be fine, and so they are everywhere. The base's distances are
-//! interpolated on them, in the narrow band of the fine grid only. Voxels are cells divided by a whole number, so that each
-//! leaf of the base becomes a cube of whole blocks.
+//! A grid has voxels of one size: they must be fine where grains rest, and so they are fine everywhere. The base's distances are
+//! interpolated on them, only in the narrow band of the fine grid. A cell is a whole number of voxels wide, so that each leaf of the base
+//! becomes a cube of whole blocks.
 
 use super::fill;
 use super::spheres::{Spheres, Squares};
@@ -12,20 +12,20 @@ use crate::geometry::DVec3;
 use crate::numeric::blocks::{Block, BlockEdit, DIM, Origin, VOXELS, Values, offset};
 use crate::vdb::{FloatGrid, Probe};
 
-/// Largest voxel (radii of a grain): what is smaller than one and a half voxels is lost between them.
+/// Maximum voxel size (radii of a grain): spheres of less than one and a half voxels are lost between the voxels.
 const VOXEL: f64 = 1.0 / 1.5;
-/// Radius with which a grain becomes part of the surface (radii): grains touch in points, which no grid shows. Grown by a
-/// quarter, two that touch share a neck of three quarters of a radius, and what lies a tenth of a diameter above the base is
-/// joined to it.
+/// Radius with which a grain becomes part of the surface (radii): grains touch only in points, which no grid can represent. Grown by a
+/// quarter, two touching grains share a neck of three quarters of a radius, and a grain a tenth of a diameter above the base is joined to
+/// it.
 const GROWN: f64 = 1.25;
 /// Half width of the narrow band (voxels).
 const HALF_WIDTH: f32 = 3.0;
-/// Values of a leaf along an axis, with those of the next one that lie beside it.
+/// Values of a leaf along an axis, plus the adjacent one of the next leaf.
 const SIDE: usize = DIM + 1;
 
-/// Voxels of the united surface along an edge of a base's cell (m), for grains of a radius (m).
+/// Number of voxels of the united surface along the edge of a base cell (m), for grains of a radius (m).
 pub fn division(cell: f64, radius: f64) -> usize {
-    // A quotient may be off by its last bit.
+    // A quotient may be off in its last bit.
     ((cell / (VOXEL * radius)) * (1.0 - 1.0e-9)).ceil().max(1.0) as usize
 }
 
@@ -33,8 +33,8 @@ pub fn division(cell: f64, radius: f64) -> usize {
 /// see [`division`].
 ///
 /// # Errors
-/// A base that is no level set on world-fixed cells with a band of at least two cells; a radius that is not above 0, or less than
-/// a hundredth of a cell; centres that are not finite or too far from the origin; cancel; when memory runs out.
+/// A base that is not a level set on world-fixed cells with a band of at least two cells; a radius that is not above 0, or is less than a
+/// hundredth of a cell; centres that are not finite or are too far from the origin; cancel; when memory runs out.
 pub fn unite(ctx: &Context, base: &FloatGrid, centres: &[DVec3], radius: f64) -> Result<FloatGrid> {
     let cell = base.voxel_size();
     if !base.is_world_fixed() || f64::from(base.background()) < 2.0 * cell {
@@ -67,7 +67,7 @@ pub fn unite(ctx: &Context, base: &FloatGrid, centres: &[DVec3], radius: f64) ->
     Ok(grid)
 }
 
-/// The origins of a leaf and of the seven that follow it along the axes.
+/// The origins of a leaf and of the seven adjacent leaves in the positive directions.
 fn around(leaf: [i32; 3]) -> impl Iterator<Item = Origin> {
     (0..DIM as i32)
         .map(move |corner| [0, 1, 2].map(|axis| (leaf[axis] + (corner >> (2 - axis) & 1)) * DIM as i32))
@@ -75,7 +75,7 @@ fn around(leaf: [i32; 3]) -> impl Iterator<Item = Origin> {
 
 /// The fine grid.
 struct Fine {
-    /// Voxels along a cell's edge, and blocks along that of a cube.
+    /// Voxels along a cell's edge; equally, blocks along a cube's edge.
     division: usize,
     /// Edge of a voxel (m).
     voxel: f32,
@@ -84,7 +84,7 @@ struct Fine {
 }
 
 impl Fine {
-    /// The blocks of a cube that the surface comes near to: `probes` are the base's leaf there and the seven after it.
+    /// The blocks of a cube that are near the surface: `probes` are the base's leaf there and the seven after it.
     fn blocks(&self, cube: [i32; 3], probes: &[Probe<'_>], squares: Vec<Squares>) -> Vec<BlockEdit> {
         let cells = Cells::of(probes);
         let mut squares = squares.into_iter().peekable();
@@ -102,7 +102,7 @@ impl Fine {
         out
     }
 
-    /// A block of the surface; none where it is not near.
+    /// A block of the surface; none if it is not near.
     fn block(
         &self,
         origin: Origin,
@@ -127,11 +127,11 @@ impl Fine {
     }
 }
 
-/// Values (m) of a base's leaf, with those beside it toward greater coordinates.
+/// Values (m) of a leaf of the base, plus the adjacent ones in the positive directions.
 struct Cells(Box<[f32; SIDE * SIDE * SIDE]>);
 
 impl Cells {
-    /// Those of a leaf and the seven after it.
+    /// From a leaf and the seven after it.
     fn of(probes: &[Probe<'_>]) -> Self {
         let mut values = Box::new([0.0; SIDE * SIDE * SIDE]);
         for (index, value) in values.iter_mut().enumerate() {
@@ -151,7 +151,7 @@ impl Cells {
         &self.0[(x * SIDE + y) * SIDE..][..SIDE]
     }
 
-    /// Least and greatest value that a fine block is interpolated from.
+    /// Minimum and maximum of the values that a fine block is interpolated from.
     fn range(&self, division: usize, block: [usize; 3]) -> (f32, f32) {
         let [xs, ys, zs] = block.map(|block| block * DIM / division..=(block * DIM + DIM - 1) / division + 1);
         let rows = xs.flat_map(|x| ys.clone().map(move |y| (x, y)));
@@ -183,7 +183,7 @@ impl Cells {
     }
 }
 
-/// The cell below each voxel of a block along an axis, and the share of the way to the next one.
+/// The cell below each voxel of a block along an axis, and the fraction of the distance to the next cell.
 struct Steps([(usize, f32); DIM]);
 
 impl Steps {

@@ -1,5 +1,5 @@
-//! Signed distances from where the implicit function is 0, in a narrow band (thesis 2.3.1). The thesis measures the cells at the
-//! surface and lets a fast marching method carry distances on; here they are exact in the whole band.
+//! Signed distances from the zero set of the implicit function, in a narrow band (thesis 2.3.1). The thesis measures distances in the cells
+//! at the surface and extends them by a fast marching method; here they are exact in the whole band.
 
 use std::collections::HashMap;
 
@@ -20,7 +20,7 @@ use crate::surface::track::deep_detail::reach_in;
 pub struct Distances {
     /// Edge of a cell (m).
     cell: f64,
-    /// How far from the surface they are known (cells); beyond, they have that size.
+    /// How far from the surface distances are known (cells); beyond, they are clamped to this.
     reach: f32,
     /// Blocks in which they are known farther.
     deep: Vec<(Coord, f32)>,
@@ -29,13 +29,13 @@ pub struct Distances {
     /// Distances (cells), negative inside.
     values: Vec<Values>,
     slots: HashMap<Coord, u32>,
-    /// Slots of the 27 blocks around each, itself in the middle; [`Distances::NONE`]: there is none.
+    /// Slots of the 27 blocks around each one, itself in the middle; [`Distances::NONE`]: there is none.
     around: Vec<[u32; 27]>,
 }
 
 /// Patches along the edge of a block.
 const PARTS: i32 = DIM as i32 / SIDE;
-/// Bytes of a block: its distances while they are made and then, its neighbours.
+/// Bytes of a block: its distances, while they are computed and afterwards, and its neighbours.
 const BYTES: usize = 2 * 4 * VOXELS + 200;
 /// What needs the memory, for messages.
 const WHAT: &str = "the distances from the particles' surface (larger cells need less)";
@@ -43,7 +43,7 @@ const WHAT: &str = "the distances from the particles' surface (larger cells need
 const ALL: [u64; DIM] = [u64::MAX; DIM];
 
 impl Distances {
-    /// No block.
+    /// Sentinel: no block.
     pub const NONE: u32 = u32::MAX;
 
     /// Distances up to `reach` (cells) from a surface.
@@ -54,7 +54,7 @@ impl Distances {
         Self::deeper(ctx, phi, surface, reach, Vec::new())
     }
 
-    /// Distances up to `reach` (cells) from a surface, and farther in some blocks, ascending, with how far (cells) in each.
+    /// Distances up to `reach` (cells) from a surface, and farther in some blocks, ascending, each with its reach (cells).
     ///
     /// # Errors
     /// As [`Distances::new`].
@@ -66,7 +66,7 @@ impl Distances {
         deep: Vec<(Coord, f32)>,
     ) -> Result<Self> {
         let runs: Vec<(Coord, &[[u32; 3]])> = surface.runs().collect();
-        // The blocks whose nodes triangles of a run may be near to.
+        // The blocks that may have nodes near triangles of a run.
         let around = |patch: &Coord, reach: f32| {
             let margin = reach.ceil() as i32;
             let low = patch.map(|at| (at * SIDE - margin).div_euclid(DIM as i32));
@@ -169,7 +169,7 @@ impl Distances {
         self.slots.get(&block).map(|slot| *slot as usize)
     }
 
-    /// Slots of the 27 blocks around one.
+    /// Slots of the 27 blocks around a block.
     pub fn around(&self, slot: usize) -> &[u32; 27] {
         &self.around[slot]
     }

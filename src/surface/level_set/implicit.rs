@@ -1,7 +1,7 @@
 //! Where the implicit function of the particles is evaluated: in patches of 4 x 4 x 4 nodes around its zeros, and nowhere else.
 //!
-//! Patches near particles are evaluated, but for those deep among them, which are inside. Where the surface leaves what was
-//! evaluated, the next patch is evaluated too, until it closes.
+//! Patches near particles are evaluated, except those deep among particles, which are inside. Where the surface leaves the evaluated
+//! patches, the next patch is evaluated too, until the surface closes.
 
 use std::collections::HashMap;
 
@@ -20,13 +20,13 @@ use crate::surface::particles::grid::Cells;
 pub const SIDE: i32 = 4;
 /// Nodes of a patch; node (x, y, z) lies at `x << 4 | y << 2 | z`.
 pub const NODES: usize = 64;
-/// Particles in a cube of two spacings, of which there are 8 in a liquid, from which on it is full.
+/// A cube of two spacings is full from this many particles on; in a liquid it holds 8.
 const FULL: u32 = 4;
-/// Bytes of an evaluated patch: its values while they are made and then, and its positions in lists and tables.
+/// Bytes of an evaluated patch: its values, while they are computed and afterwards, and its entries in lists and tables.
 const BYTES: usize = 2 * 4 * NODES + 100;
 /// What needs the memory, for messages.
 const WHAT: &str = "the particles' surface (larger cells need less)";
-/// Rounding of coordinates (spacings).
+/// Tolerance for rounding of coordinates (spacings).
 const SLACK: f64 = 1e-6;
 
 /// The implicit function of particles at the nodes around its zeros, in cells; negative inside.
@@ -34,10 +34,10 @@ const SLACK: f64 = 1e-6;
 pub struct Implicit {
     /// Edge of a cell (m); node (i, j, k) lies at (i, j, k) cells.
     cell: f64,
-    /// Evaluated patches, ascending: those of one call after those of the one before.
+    /// Evaluated patches, ascending within each pass of the evaluation; passes follow each other.
     patches: Vec<Coord>,
     values: Vec<[f32; NODES]>,
-    /// What is known of patches; of others, that they are outside.
+    /// Known states of patches; all others are outside.
     states: HashMap<Coord, State>,
 }
 
@@ -52,7 +52,8 @@ impl Implicit {
     /// Evaluates the function of particles at positions (m), whose spacing is `spacing` (m), on cells of `cell` (m).
     ///
     /// # Errors
-    /// A spacing that is not positive, a cell that is not within 1/8 to 2 spacings; particles too far apart; more memory than the context allows; cancel.
+    /// A spacing that is not positive, a cell that is not within 1/8 to 2 spacings; particles too far apart; more memory than the context
+    /// allows; cancel.
     pub fn new(ctx: &Context, positions: &[DVec3], spacing: f64, cell: f64) -> Result<Self> {
         if !(spacing > 0.0 && spacing.is_finite()) {
             return Err(Error::argument(format!(
@@ -117,7 +118,7 @@ impl Implicit {
         self.states.get(&patch) == Some(&State::Inside)
     }
 
-    /// Patches next to those from `first` on in which the surface goes on, ascending.
+    /// Patches next to those from `first` on into which the surface continues, ascending.
     fn open_sides(&self, first: usize) -> Vec<Coord> {
         let sides = |index: usize| {
             let (patch, values) = (self.patches[index], &self.values[index]);
@@ -142,7 +143,7 @@ impl Implicit {
     }
 }
 
-/// Working memory of one thread.
+/// Scratch buffers of one thread.
 #[derive(Default)]
 struct Scratch {
     of_patch: Near,
@@ -164,7 +165,7 @@ impl Around<'_> {
         f64::from(SIDE) * self.cell
     }
 
-    /// The box of a patch's nodes, grown by a margin (m), as units of a length (m) on each axis.
+    /// The box of a patch's nodes, grown by a margin (m), in units of a length (m) on each axis.
     fn extent(&self, patch: Coord, margin: f64, unit: f64) -> [Coord; 2] {
         let low = patch.map(|at| f64::from(at) * self.edge());
         let high = low.map(|at| at + self.edge() - self.cell + margin);
@@ -203,7 +204,7 @@ impl Around<'_> {
         (open, inside)
     }
 
-    /// Whether there is no room for the surface within a spacing of a patch: each cube of two spacings holds enough particles.
+    /// Whether the surface cannot be within a spacing of a patch: each cube of two spacings holds enough particles.
     fn is_full(&self, patch: Coord, counts: &mut Vec<u32>) -> bool {
         let [low, high] = self.extent(patch, self.spacing, self.spacing);
         let size = [0, 1, 2].map(|axis| (high[axis] - low[axis] + 1) as usize);
@@ -229,7 +230,7 @@ impl Around<'_> {
         let radius = SUPPORT * self.spacing;
         let [low, high] = self.extent(patch, radius, self.cells.edge());
         let from = low;
-        // Edges of cells to cells of the grid, from the patch's first node.
+        // Converts edges of the grid's cells to cells, from the patch's first node.
         let scale = self.cells.edge() / self.cell;
         let shift = [0, 1, 2].map(|axis| {
             ((f64::from(from[axis]) * self.cells.edge() - f64::from(patch[axis]) * self.edge()) / self.cell)

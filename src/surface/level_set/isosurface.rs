@@ -7,12 +7,12 @@ use crate::geometry::Coord;
 use crate::geometry::marching_cubes::cases;
 use crate::geometry::{DVec3, TriMesh};
 
-/// No vertex.
+/// Sentinel: no vertex.
 const NONE: u8 = u8::MAX;
-/// Values along a line are smooth if their second differences are at most the lesser share of the first, and a kink from the greater
-/// on; between them the surface goes over from the one to the other, or it would flicker.
+/// Values along a line are smooth if their second differences are at most the smaller share of the first, and a kink from the larger share
+/// on; between the two shares both cases are blended, or the surface would flicker.
 const SMOOTH: [f32; 2] = [0.3, 0.5];
-/// Steps to the zero of a cubic; each leaves less than half of the error.
+/// Iterations to the zero of a cubic; each leaves less than half of the error.
 const STEPS: usize = 6;
 
 /// The surface's triangles.
@@ -73,7 +73,7 @@ impl Isosurface {
         self.positions.len()
     }
 
-    /// Each patch in which cubes with triangles begin, with these, ascending.
+    /// Each patch with cubes that have triangles, and these triangles, ascending.
     pub fn runs(&self) -> impl Iterator<Item = (Coord, &[[u32; 3]])> {
         let starts = std::iter::once(0).chain(self.runs.iter().map(|(_, end)| *end));
         self.runs
@@ -82,7 +82,7 @@ impl Isosurface {
             .map(|((patch, end), start)| (*patch, &self.triangles[start as usize..*end as usize]))
     }
 
-    /// The position of a vertex: cells from the first node of a patch, which it gives too.
+    /// The position of a vertex: a patch, and cells from its first node.
     pub fn position(&self, phi: &Implicit, vertex: u32) -> (Coord, [f32; 3]) {
         let owner = self.owners[vertex as usize];
         (phi.patches()[owner as usize], self.positions[vertex as usize])
@@ -126,7 +126,7 @@ fn crossings(phi: &Implicit, patch: usize) -> Crossings {
         let step = 16 >> (2 * axis);
         for node in 0..NODES {
             let at = node >> (4 - 2 * axis) & 3;
-            // The value so many nodes farther on the line.
+            // The value this many nodes farther on the line.
             let value = |by: usize| match at + by {
                 to @ 0..4 => Some(values[node + to * step - at * step]),
                 to => next.map(|next| next[node + (to - 4) * step - at * step]),
@@ -150,8 +150,8 @@ fn crossings(phi: &Implicit, patch: usize) -> Crossings {
     out
 }
 
-/// Where values on a line are 0 between two that differ in sign (0..=1): the cubic through them and those outside of them decides if
-/// the values are smooth, else the straight line.
+/// Where values on a line are 0 between two that differ in sign (0..=1): by the cubic through these two and those beyond them if the values
+/// are smooth, else by the straight line.
 fn zero(outside: [Option<f32>; 2], here: f32, there: f32) -> f32 {
     let fall = here - there;
     let straight = here / fall;
@@ -160,7 +160,7 @@ fn zero(outside: [Option<f32>; 2], here: f32, there: f32) -> f32 {
     let (first, second) = (last - here - fall, fall - there + next);
     let share = |bend: f32| (SMOOTH[1] - (bend / fall).abs()) / (SMOOTH[1] - SMOOTH[0]);
     let shares = [share(first), share(second), 1.0];
-    // What is not a number is a kink too.
+    // NaN counts as a kink too.
     if !shares.iter().all(|share| *share > 0.0) {
         return straight;
     }
@@ -232,7 +232,7 @@ mod tests {
             let at = zero([Some(-value(-1.0)), Some(-value(2.0))], -value(0.0), -value(1.0));
             assert!((at - root).abs() < 1e-4, "{at} for {root}");
         }
-        // From the cubic to the straight line without a jump.
+        // The transition from the cubic to the straight line is continuous.
         let root = |bend: f32| zero([Some(bend - 1.4), Some(bend + 1.6)], -0.4, 0.6);
         let roots: Vec<f32> = (0..=600).map(|n| root(n as f32 * 1e-3)).collect();
         assert!(roots.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 1e-3), "{roots:?}");

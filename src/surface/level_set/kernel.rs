@@ -1,7 +1,7 @@
-//! The implicit function of Solenthaler, Schläfli and Pajarola (2007; thesis 2.3.1) at single nodes: phi(x) = |x - a(x)| - r f,
-//! where a is the weighted mean of the positions of the particles around x and r their spacing. f is 1, and less where the mean moves
-//! too fast with x: between particles far apart, where there is no liquid. Where liquid is thinner than 2 r, half of its
-//! thickness is the most that r f can be (`level_set/thickness.rs`).
+//! The implicit function of Solenthaler, Schläfli and Pajarola (2007; thesis 2.3.1) at single nodes: phi(x) = |x - a(x)| - r f, where a is
+//! the weighted mean of the positions of the particles around x and r their spacing. f is 1, and less where the mean moves too fast with x:
+//! between particles far apart, where there is no liquid. Where liquid is thinner than 2 r, r f is at most half of its thickness
+//! (`level_set/thickness.rs`).
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -10,7 +10,7 @@ use super::thickness::Spread;
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::{LANES, Lanes};
 
-/// Greatest rate at which the mean may move with the position, and that from which on nothing is inside (Solenthaler et al., 2007).
+/// Maximum rate at which the mean may move with the position, and the rate from which on nothing is inside (Solenthaler et al., 2007).
 const RATES: [f64; 2] = [0.4, 3.5];
 
 /// Particles around some nodes, in cells from a common corner.
@@ -66,7 +66,7 @@ fn sums_body(positions: &[[f32; 3]], nodes: &[[f32; LANES]; 3], inverse: f32) ->
     out
 }
 
-/// The function at eight nodes, in cells; `spacing` is r in cells. Where no particle is near, it is [`SUPPORT`] spacings.
+/// The function at eight nodes, in cells; `spacing` is r in cells. If no particle is near, it is [`SUPPORT`] spacings.
 pub fn values(near: &Near, nodes: &[[f32; LANES]; 3], spacing: f32) -> [f32; LANES] {
     let radius = SUPPORT as f32 * spacing;
     let sums = sums(&near.positions, nodes, 1.0 / (radius * radius));
@@ -86,7 +86,7 @@ fn value(sums: &Sums, lane: usize, spacing: f64) -> f64 {
     let scale = 6.0 / (radius * radius * weight);
     let mut rate = Matrix3::zeros();
     for (sum, [a, b]) in sums.square.iter().zip(PAIRS) {
-        // Its symmetric part: what turns with the position does not spread.
+        // Its symmetric part: a rotation of the mean with the position is no spreading.
         let entry = scale * (of(sum) - 0.5 * (mean[a] * slope[b] + mean[b] * slope[a]));
         (rate[(a, b)], rate[(b, a)]) = (entry, entry);
     }
@@ -94,7 +94,7 @@ fn value(sums: &Sums, lane: usize, spacing: f64) -> f64 {
     away - offset.min(spacing * share(&rate))
 }
 
-/// How the particles around a node lie.
+/// The spread of the particles around a node.
 fn spread(sums: &Sums, lane: usize, radius: f64) -> Spread {
     let of = |lanes: &Lanes| f64::from(lanes.0[lane]);
     let mut square = Matrix3::zeros();
@@ -110,7 +110,7 @@ fn spread(sums: &Sums, lane: usize, radius: f64) -> Spread {
 /// The factor f for a rate at which the mean moves.
 fn share(rate: &Matrix3<f64>) -> f64 {
     let [low, high] = RATES;
-    // No eigenvalue is greater than this norm.
+    // This norm bounds all eigenvalues.
     if rate.norm_squared() < low * low {
         return 1.0;
     }
@@ -122,7 +122,7 @@ fn share(rate: &Matrix3<f64>) -> f64 {
     g * (3.0 + g * (g - 3.0))
 }
 
-/// Greatest eigenvalue of a symmetric matrix, in closed form (Smith 1961).
+/// Largest eigenvalue of a symmetric matrix, in closed form (Smith 1961).
 fn greatest_eigenvalue(m: &Matrix3<f64>) -> f64 {
     let mean = m.trace() / 3.0;
     let rest = m - Matrix3::from_diagonal_element(mean);

@@ -1,4 +1,4 @@
-//! The particles' surface: an implicit function of them, signed distances from where it is 0, and its triangles.
+//! The particles' surface: their implicit function, signed distances from its zero set, and the triangles of that set.
 
 pub(in crate::surface) mod band;
 pub(in crate::surface) mod implicit;

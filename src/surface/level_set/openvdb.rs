@@ -9,10 +9,10 @@ use crate::vdb::FloatGrid;
 /// Half width of the narrow band (cells).
 pub const HALF_WIDTH: f32 = 3.0;
 
-/// The level set (m) of a surface whose distances are known up to [`HALF_WIDTH`] cells at least.
+/// The level set (m) of a surface whose distances are known up to at least [`HALF_WIDTH`] cells.
 ///
 /// # Errors
-/// Cancel; when memory runs out.
+/// Cancel; out of memory.
 pub fn level_set(ctx: &Context, distances: &Distances) -> Result<FloatGrid> {
     let cell = distances.cell();
     let width = HALF_WIDTH * cell as f32;

@@ -4,10 +4,10 @@ use super::band::Distances;
 use crate::geometry::Coord;
 use crate::geometry::DVec3;
 
-/// Reads distances near one position after the other; nodes are kept while the position stays in its cell.
+/// Samples distances at one position after another; nodes are cached while positions stay in a cell.
 pub struct Sampler<'a> {
     distances: &'a Distances,
-    /// The cell whose nodes are kept.
+    /// The cell whose nodes are cached.
     cell: Coord,
     /// Block of the last cell, and its slot.
     block: (Coord, Option<usize>),
@@ -15,7 +15,7 @@ pub struct Sampler<'a> {
     nodes: [[[f32; 4]; 4]; 4],
 }
 
-/// Weights of four nodes, and their derivatives, at a part 0..1 of the way from the second to the third.
+/// Weights of four nodes, and their derivatives, at a fraction 0..1 of the distance from the second to the third.
 fn weights(t: f32) -> [[f32; 4]; 2] {
     let (t2, t3) = (t * t, t * t * t);
     [
@@ -77,7 +77,7 @@ impl<'a> Sampler<'a> {
     fn gather(&mut self) {
         let Some(slot) = self.block.1 else { return };
         let around = self.distances.around(slot);
-        // Where there is no block, distances go on with the sign of the cell's own first node.
+        // Where there is no block, the distance is the reach, with the sign of the cell's own first node.
         let own = self.distances.values(slot)
             [((self.cell[0] & 7) << 6 | (self.cell[1] & 7) << 3 | (self.cell[2] & 7)) as usize];
         let far = self.distances.reach_in(self.block.0).copysign(own);

@@ -1,8 +1,8 @@
-//! Smoothing that keeps volume (Taubin 1995, "A signal processing approach to fair surface design"): vertices go toward the mean of
-//! their neighbours, then a little farther back. Lumps a few edges long go first, shapes that are longer stay.
+//! Smoothing that preserves volume (Taubin 1995, "A signal processing approach to fair surface design"): vertices move toward the mean of
+//! their neighbours, then slightly farther back. Lumps a few edges long are removed first, longer shapes stay.
 //!
-//! That pair of steps still shrinks drops of a few triangles, so each connected part gets its volume back after every pass. A small
-//! one may lose some of its axes faster than others, and would become a needle or a plate by that: it stops before.
+//! This pair of steps still shrinks drops of a few triangles, so each connected part is scaled back to its volume after every pass. A small
+//! part may shrink faster along some axes than along others, and would become a needle or a plate: its smoothing stops before that.
 
 use rayon::prelude::*;
 
@@ -11,22 +11,21 @@ use crate::error::Result;
 use crate::geometry::{DVec3, TriMesh};
 use crate::surface::particles::specks::root;
 
-/// Frequency (0 to 2; 0 is a constant) up to which a pass takes nothing away: k_PB.
+/// Frequency (0 to 2; 0 is a constant) up to which a pass removes nothing: k_PB.
 const PASS_BAND: f64 = 0.01;
-/// Share of the way to the mean of the neighbours: lambda.
+/// Fraction of the displacement to the mean of the neighbours: lambda.
 const SHRINK: f64 = 0.63;
-/// The way back: mu, of 1 / lambda + 1 / mu = k_PB.
+/// The step back: mu, from 1 / lambda + 1 / mu = k_PB.
 const GROW: f64 = 1.0 / (PASS_BAND - 1.0 / SHRINK);
-/// Largest factor by which a pass may stretch a part; one that lost more is degenerate.
+/// Largest factor by which a pass may rescale a part; one that would need more is degenerate.
 const MOST: f64 = 4.0;
-/// How far from its centre a part may reach, of how far it did at the start.
+/// How far a part may reach from its centre, relative to its initial reach.
 const FARTHEST: f64 = 1.1;
 /// Vertices of a task.
 const PIECE: usize = 1024;
 
-/// Smooths a closed mesh in `passes` passes; each of its connected parts keeps its volume. A part that a pass would
-/// take farther from its centre than 1.1 times what it reached at the start stays as it was before that pass: it is as smooth as it
-/// gets. Triangles stay as they are.
+/// Smooths a closed mesh in `passes` passes; each of its connected parts keeps its volume. A part that a pass would take farther from its
+/// centre than 1.1 times its initial reach stays as it was before that pass: it is as smooth as possible. Triangles do not change.
 ///
 /// # Errors
 /// Cancel.
@@ -58,7 +57,7 @@ struct Rings {
 }
 
 impl Rings {
-    /// In a closed mesh each edge is run along both ways: every vertex has each of its neighbours once.
+    /// A closed mesh uses each edge once in each direction: every vertex has each of its neighbours once.
     fn of(mesh: &TriMesh) -> Self {
         let edges = || mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
         let mut starts = vec![0u32; mesh.positions.len() + 1];
@@ -76,7 +75,7 @@ impl Rings {
         Self { starts, neighbours }
     }
 
-    /// Positions after a step of a share of the way toward the means of the neighbours.
+    /// Positions after a step by a fraction of the displacement toward the means of the neighbours.
     fn moved(&self, positions: &[DVec3], share: f64) -> Vec<DVec3> {
         let step = |(vertex, here): (usize, &DVec3)| {
             let ring = &self.neighbours[self.starts[vertex] as usize..self.starts[vertex + 1] as usize];
@@ -92,7 +91,7 @@ impl Rings {
 
 /// The connected parts of a mesh.
 struct Parts {
-    /// The part of each vertex, counted in the order of their first vertices.
+    /// The part of each vertex, numbered in the order of the parts' first vertices.
     of: Vec<u32>,
     count: usize,
 }
@@ -103,7 +102,7 @@ impl Parts {
         for &[a, b, c] in &mesh.triangles {
             for other in [b, c] {
                 let [one, two] = [a, other].map(|vertex| root(&mut parent, vertex));
-                // The lesser is the root: it comes first.
+                // The lower one is the root: it comes first.
                 parent[one.max(two) as usize] = one.min(two);
             }
         }
@@ -128,7 +127,7 @@ impl Parts {
         sums.into_iter().map(|(sum, count)| sum / count).collect()
     }
 
-    /// Greatest distance (m) of each part's vertices from its centre.
+    /// Largest distance (m) of each part's vertices from its centre.
     fn reaches(&self, positions: &[DVec3]) -> Vec<f64> {
         let centres = self.centres(positions);
         let mut squares = vec![0.0f64; centres.len()];
@@ -148,7 +147,7 @@ impl Parts {
         }
     }
 
-    /// Volume that each part encloses (m3), by the divergence theorem about its centre; that of a cavity is below 0.
+    /// Volume that each part encloses (m3), by the divergence theorem about its centre; negative for a cavity.
     fn volumes(&self, positions: &[DVec3], triangles: &[[u32; 3]], centres: &[DVec3]) -> Vec<f64> {
         let mut volumes = vec![0.0; self.count];
         for triangle in triangles {
@@ -181,7 +180,7 @@ mod tests {
     use crate::context::Pool;
     use crate::geometry::Vec3;
 
-    /// An octahedron with its corners so far from a centre (m).
+    /// An octahedron with its corners at a distance `size` (m) from a centre.
     fn octahedron(centre: [f32; 3], size: f32) -> TriMesh {
         let corners = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]];
         let position =
@@ -254,7 +253,7 @@ mod tests {
         for (before, after) in before.into_iter().zip(after) {
             assert!((after / before - 1.0).abs() < 1e-3, "{after} is not {before}");
         }
-        // What stuck out has gone: opposite corners are about as far from the middle.
+        // It no longer does: opposite corners are about as far from the middle.
         let far = |vertex: usize| {
             let middle = mesh.positions[6..].iter().sum::<Vec3>() / 6.0;
             (mesh.positions[vertex] - middle).norm()

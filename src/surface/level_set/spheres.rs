@@ -1,4 +1,4 @@
-//! The union of spheres around particles: what surfacers made before there were smooth ones, and the fastest look at a liquid.
+//! The union of spheres around particles: the classic surface before smooth ones, and the fastest preview of a liquid.
 
 use rayon::prelude::*;
 
@@ -10,11 +10,11 @@ use crate::numeric::blocks::{DIM, VOXELS};
 use crate::vdb::FloatGrid;
 use crate::vdb::level_set::from_particles;
 
-/// Least radius (cells): OpenVDB leaves smaller spheres out, as they may lie between nodes.
+/// Minimum radius (cells): OpenVDB leaves smaller spheres out, as they may lie between nodes.
 const LEAST: f64 = 1.5;
-/// Greatest radius (cells): the inside of each sphere is filled node by node.
+/// Maximum radius (cells): the inside of each sphere is filled node by node.
 const MOST: f64 = 100.0;
-/// Room for rounding: OpenVDB gets radii of 32 bits.
+/// Tolerance for rounding: OpenVDB takes radii of 32 bits.
 const ROUNDING: f64 = 1e-6;
 /// Farthest node from the origin, on each axis.
 const FARTHEST: f64 = (1 << 29) as f64;
@@ -23,13 +23,13 @@ const BYTES: u64 = 2 * (4 * VOXELS as u64 + 100);
 /// What needs the memory, for messages.
 const WHAT: &str = "the spheres around particles (larger cells need less)";
 
-/// Whether spheres of a radius (m) can be made on cells of an edge (m): 1.5 to 100 cells are.
+/// Whether spheres of a radius (m) can be made on cells of an edge (m): 1.5 to 100 cells are allowed.
 pub fn is_sphere_radius(radius: f64, cell: f64) -> bool {
     (LEAST * (1.0 - ROUNDING)..=MOST).contains(&(radius / cell))
 }
 
-/// Level set (m) of the union of spheres of a radius (m) around positions (m), on cells of `cell` (m), with a band of three of them on
-/// each side. Where spheres overlap, values inside are nearer to 0 than the true distance.
+/// Level set (m) of the union of spheres of a radius (m) around positions (m), on cells of `cell` (m), with a band of three cells on each
+/// side. Where spheres overlap, values inside are nearer to 0 than the true distance.
 ///
 /// # Errors
 /// A radius that is not within 1.5 to 100 cells; a position that is not finite or too far from the origin; more memory than the
@@ -55,7 +55,7 @@ pub fn spheres(ctx: &Context, positions: &[DVec3], radius: f64, cell: f64) -> Re
     Ok(grid)
 }
 
-/// At most so many blocks are within `reach` (cells) of positions (m): cubes of whole blocks that are as long as that, and those
+/// Upper bound on the count of blocks within `reach` (cells) of positions (m): counts cubes of whole blocks at least that long, and those
 /// beside them.
 fn most_blocks(positions: &[DVec3], reach: f64, cell: f64) -> u64 {
     let blocks = (reach / DIM as f64).ceil();
@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn the_least_sphere_is_there_and_what_is_out_of_range_is_refused() {
         let ctx = context();
-        // A quotient of 1.5 that rounding takes below it.
+        // Rounding takes a quotient of 1.5 below that.
         for cell in [0.05, 0.0333, 0.7] {
             let grid = spheres(&ctx, &[DVec3::zeros()], 1.5 * cell, cell).unwrap();
             assert!(grid.value([0; 3]) < 0.0, "{cell}");

@@ -1,36 +1,37 @@
-//! How thick the liquid is around a node, so that sheets and threads thinner than particles are apart keep their volume.
+//! How thick the liquid is around a node, so that sheets and threads thinner than the particle spacing keep their volume.
 //!
-//! Solenthaler et al. (2007) put the surface where the particles' mean is one spacing r away. That is right above a body, whose mean lies
-//! r deep. The mean of a sheet lies in its middle, and its surface would be r from there however thin the sheet is. Half of its
-//! thickness takes the place of r where that is less.
+//! Solenthaler et al. (2007) put the surface one spacing r from the particles' mean. That is right at the surface of a large body, where the
+//! mean lies r deep. The mean of a sheet lies in its middle, so that its surface would be r from there however thin the sheet is. Half of
+//! its thickness replaces r where it is less.
 //!
-//! The thickness follows from the particles' mass, r^3 each, and from their spread: in a sheet of thickness w the sum of q^2 (q = 1 - d^2 / R^2)
-//! is w pi R^2 Q^3 / 3 / r^3, Q being q at the sheet's middle, and the variance along the sheet is R^2 Q / 8. Where they spread less than that,
-//! at rims, in ribbons and threads, they fill less of the sheet, and it is thicker by as much.
+//! The thickness follows from the particles' mass, r^3 each, and from their spread: in a sheet of thickness w the sum of q^2
+//! (q = 1 - d^2 / R^2) is w pi R^2 Q^3 / 3 / r^3, Q being q at the sheet's middle, and the variance along the sheet is R^2 Q / 8. Where they
+//! spread less, at rims, in ribbons and threads, they fill less of the sheet, and it is thicker by the same factor.
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use super::SUPPORT;
 
-/// The least distance of a surface from a sheet's middle (cells). Nodes inside of a sheet must be neighbours along edges of the grid, or
-/// marching cubes cut it to pieces: whatever its direction, its sides must be apart by a diagonal of a cell's face.
+/// Minimum distance of a surface from a sheet's middle (cells). Nodes inside a sheet must be neighbours along edges of the grid, or marching
+/// cubes break it up: whatever its orientation, its sides must be apart by the diagonal of a cell's face.
 const LEAST: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Sums over the particles around a node, weighted by q^2; lengths are in cells.
 #[derive(Debug)]
 pub struct Spread {
-    /// Of weights.
+    /// Sum of weights.
     pub weight: f64,
     /// Variances and covariances of positions (cells^2).
     pub covariance: Matrix3<f64>,
 }
 
 impl Spread {
-    /// How far from the mean the surface lies, and how far the node is from the mean; `mean` is the displacement to it, `spacing` is r (all in cells).
-    /// In a sheet the part of the displacement across it counts in full, and the part along it less: the rim is where that is r.
+    /// How far from the mean the surface lies, and how far the node is from the mean; `mean` is the displacement to it, `spacing` is r (all
+    /// in cells). In a sheet the component of the displacement across it counts in full, and the component along it less: the rim is where
+    /// the latter is r.
     pub fn offset(&self, mean: Vector3<f64>, spacing: f64) -> (f64, f64) {
         let thick = (spacing, mean.norm());
-        // Farther than a cell from where a surface can be, or no sheet.
+        // More than a cell from where a surface can be, or no sheet.
         if mean.norm() > spacing + 1.0 || self.is_thick(mean, spacing) {
             return thick;
         }
@@ -58,7 +59,7 @@ impl Spread {
         (half, half * (across + libm::pow(along, spacing / half)).sqrt())
     }
 
-    /// Whether the liquid is thicker than twice the spacing without doubt.
+    /// Whether the liquid is clearly thicker than twice the spacing.
     fn is_thick(&self, mean: Vector3<f64>, spacing: f64) -> bool {
         let trace = self.covariance.trace();
         // The smallest variance is the determinant over the product of the others, which is at most (trace / 2)^2. NaN: a single particle.
@@ -67,11 +68,11 @@ impl Spread {
             || self.thickness(mean, spacing, 0.5 * trace, 0.5 * trace) >= 2.0 * spacing
     }
 
-    /// The thickness of a sheet along which variances are these (cells).
+    /// The thickness of a sheet along which the variances are these (cells).
     fn thickness(&self, mean: Vector3<f64>, spacing: f64, a: f64, b: f64) -> f64 {
         let square = (SUPPORT * spacing).powi(2);
         let q = 1.0 - mean.norm_squared() / square;
-        // Not less than that of one particle's cube.
+        // At least that of one particle's cube.
         let own = spacing * spacing / 12.0;
         let filled = (a.max(own) * b.max(own)).sqrt() / (square * q / 8.0);
         let area = std::f64::consts::PI * square * q.powi(3) / 3.0;
@@ -83,7 +84,7 @@ impl Spread {
 mod tests {
     use super::*;
 
-    /// What a node sees of particles at these displacements from it, each of volume 1: their spread, and the displacement to their mean.
+    /// The spread of particles at these displacements from a node, each of volume 1, and the displacement to their mean.
     fn seen(positions: impl Iterator<Item = Vector3<f64>>) -> (Spread, Vector3<f64>) {
         let (mut weight, mut heavy) = (0.0, 0.0);
         let (mut mean, mut middle, mut square) = (Vector3::zeros(), Vector3::zeros(), Matrix3::zeros());
@@ -99,14 +100,14 @@ mod tests {
         (Spread { weight, covariance: square / weight - middle * middle.transpose() }, mean / heavy)
     }
 
-    /// What [`seen`] gives, with lengths in half spacings.
+    /// The result of [`seen`], with lengths in half spacings.
     fn in_half_spacings((spread, mean): (Spread, Vector3<f64>)) -> (Spread, Vector3<f64>) {
         (Spread { weight: spread.weight, covariance: spread.covariance * 4.0 }, mean * 2.0)
     }
 
-    /// Half of the thickness that a node finds `height` off the middle of a sheet of so many layers, over what it is.
+    /// Half of the thickness found by a node `height` off the middle of a sheet of this many layers, over the true one.
     fn found(thick: f64, layers: i32, height: f64) -> f64 {
-        // Drawn out until each particle has a volume of 1.
+        // Stretched until each particle has a volume of 1.
         let apart = (f64::from(layers) / thick).sqrt();
         let layer = move |n: i32| ((f64::from(n) + 0.5) / f64::from(layers) - 0.5) * thick - height;
         let at = move |n: i32, shift: f64| (f64::from(n) + 0.31) * apart + shift;
@@ -128,7 +129,7 @@ mod tests {
     fn a_sheet_of_any_thickness_is_as_thick_as_its_mass() {
         for thick in [0.5, 0.8, 1.0, 1.3, 1.7] {
             for height in [0.0, 0.2, 0.5, 1.0] {
-                // Particles of one layer have no spread across it: their mass alone says how thick it is.
+                // Particles of one layer have no spread across it: their thickness follows from their mass alone.
                 for layers in [1, 2, 8] {
                     let ratio = found(thick, layers, height);
                     assert!((ratio - 1.0).abs() < 0.06, "{thick} in {layers} layers at {height}: {ratio}");

@@ -1,14 +1,14 @@
-//! Ways of particles around a position: their weighted sums, and the affine map that fits them best.
+//! Displacements of particles around a position: their weighted sums, and the affine map that fits them best.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::{LANES, Lanes};
 
-/// Spread of the positions, over that on all axes, below which the map does not follow the ways in that direction.
+/// Spread of the positions, over that on all axes, below which the map is constant in that direction.
 const FLAT: f64 = 0.004;
 
-/// Particles from a common corner (spacings): their positions and ways, in whole lanes.
+/// Particles from a common corner (spacings): their positions and displacements, padded to whole lanes.
 #[derive(Default)]
 pub struct Near {
     position: [Vec<[f32; LANES]>; 3],
@@ -26,7 +26,7 @@ impl Near {
     pub fn push(&mut self, position: [f32; 3], way: [f32; 3]) {
         let lane = self.count % LANES;
         if lane == 0 {
-            // What fills no lane is too far to count.
+            // Padding lies too far away to count.
             self.position.iter_mut().for_each(|lanes| lanes.push([1.0e6; LANES]));
             self.way.iter_mut().for_each(|lanes| lanes.push([0.0; LANES]));
         }
@@ -39,7 +39,7 @@ impl Near {
     }
 }
 
-/// Weighted sums over the particles around a position, d being the way to a particle and u its own: 1, d, d d, u, and u d.
+/// Weighted sums over the particles around a position, d being the vector to a particle and u its displacement: 1, d, d d, u, and u d.
 pub struct Sums {
     weight: f64,
     d: Vector3<f64>,
@@ -48,8 +48,8 @@ pub struct Sums {
     ud: Matrix3<f64>,
 }
 
-/// Sums over the particles within a radius (spacings) of a position, with the weights (1 - (d / radius)^2)^3 (poly6: Müller, Charypar
-/// and Gross 2003); none where there are none.
+/// Sums over the particles within a radius (spacings) of a position, with the weights (1 - (d / radius)^2)^3 (poly6: Müller, Charypar and
+/// Gross 2003); none if there are no particles.
 pub fn sums(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums> {
     dispatch!(sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<Sums>)
 }
@@ -112,31 +112,31 @@ fn sums_body(near: &Near, room: &mut Near, at: [f32; 3], radius: f32) -> Option<
     })
 }
 
-/// An affine map from places, seen from where it was fitted (spacings), to ways (spacings).
+/// An affine map from positions relative to where it was fitted (spacings) to displacements (spacings).
 #[derive(Debug, Clone, Copy)]
 pub struct Map {
     /// Sum of the weights of the particles that it was fitted to.
     pub weight: f64,
-    /// The way at the position itself.
+    /// The displacement at the fitted position itself.
     way: Vector3<f64>,
-    /// How ways change with the position.
+    /// Gradient of the displacement.
     change: Matrix3<f64>,
 }
 
 impl Map {
-    /// The way at a position seen from where the map was fitted.
+    /// The displacement at a position relative to where the map was fitted.
     pub fn at(&self, position: Vector3<f64>) -> Vector3<f64> {
         self.way + self.change * position
     }
 }
 
 impl Sums {
-    /// The mean way.
+    /// The mean displacement.
     pub fn mean(&self) -> Vector3<f64> {
         self.u / self.weight
     }
 
-    /// The map that fits best.
+    /// The best-fitting affine map.
     pub fn map(&self) -> Map {
         let (d, u) = (self.d / self.weight, self.u / self.weight);
         let spread = self.dd / self.weight - d * d.transpose();

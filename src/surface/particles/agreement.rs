@@ -1,4 +1,4 @@
-//! Whether ids, velocities and positions of two frames of particles agree: ids may be row numbers, which name other particles in
+//! Checks whether ids, velocities and positions of two frames of particles agree: ids may be row numbers, which denote other particles in
 //! every frame, and velocities may be in another unit.
 
 use std::collections::{HashMap, HashSet};
@@ -13,40 +13,40 @@ use crate::surface::report::StepReport;
 
 /// Particles that are sampled.
 const SAMPLES: usize = 2000;
-/// Particles beside each other that go apart by more than this in a frame (spacings), in the median, are not the same ones: in a dam
-/// break that splashes it is 0.2.
+/// Neighbouring particles whose median relative displacement in a frame is over this (spacings) are not the same ones: in a splashing dam
+/// break it is 0.2.
 const TORN: f64 = 1.0;
-/// Particles beside each other (spacings).
+/// Distance (spacings) up to which particles are neighbours.
 const BESIDE: f64 = 1.5;
-/// Share of particles without another where their velocities take them, from which on velocities are not right.
+/// Share of particles without another where their velocities take them, from which on velocities are wrong.
 const MISSED: f64 = 0.5;
-/// Share from which on another factor is looked for, and how much better it must be.
+/// Share from which on another factor is tried, and by how many times that must reduce it.
 const SOME_MISSED: [f64; 2] = [0.05, 4.0];
-/// Factors between units: feet, ten, inches, centimetres and millimetres. The first of those that miss as few: with velocities that are
-/// too small, particles stay within the liquid too.
+/// Factors between units: feet, ten, inches, centimetres and millimetres. The first of those that miss as few is taken: particles with too
+/// small velocities stay within the liquid too.
 const FACTORS: [f64; 10] =
     [0.3048, 1.0 / 0.3048, 0.1, 10.0, 0.0254, 1.0 / 0.0254, 0.01, 100.0, 0.001, 1000.0];
 
-/// Where the particles of a frame go by their ids, and where by their velocities (m, medians over the particles).
+/// Displacements of the particles of a frame by their ids and by their velocities (m, medians over the particles).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mismatch {
-    /// How far they go by their ids.
+    /// Length of the displacements by ids.
     pub by_ids: f64,
-    /// How far by their velocities.
+    /// Length of the displacements by velocities.
     pub by_velocities: f64,
-    /// How far apart both ends are.
+    /// Distance between their end points.
     pub apart: f64,
     /// Cosine of the angle between both.
     pub cosine: f64,
 }
 
 impl Mismatch {
-    /// Displacements shorter than this (spacings) are the trembling of particles at rest.
+    /// Displacements shorter than this (spacings) are jitter of particles at rest.
     const STILL: f64 = 0.5;
-    /// Both point the same way from this cosine on.
+    /// Minimum cosine at which both have the same direction.
     const ALIGNED: f64 = 0.9;
 
-    /// A warning for particles of a spacing (m); none where both agree closely enough.
+    /// A warning for particles of a spacing (m); none if both agree closely enough.
     pub fn sentence(&self, spacing: f64) -> Option<String> {
         if self.apart <= Self::STILL * spacing {
             return None;
@@ -67,8 +67,8 @@ impl Mismatch {
     }
 }
 
-/// What contradicts itself in the particles, of a spacing (m), of two frames that are `dt` (s) apart: a sentence. None where nothing
-/// does, and where a frame has no particles.
+/// A sentence that describes how the particles, of a spacing (m), of two frames that are `dt` (s) apart contradict each other. None if they
+/// do not, or if a frame has no particles.
 ///
 /// # Errors
 /// Neither ids in both frames nor velocities in the first.
@@ -91,8 +91,8 @@ pub fn disagreement(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> 
     }))
 }
 
-/// Adds to a step's report that over half of the mesh was lost or made anew, and what in the particles may be the reason: `lost` of its
-/// vertices, of `all`, did not find the particles' surface. Where much of the liquid itself is gone or new, the mesh is right to be.
+/// Adds a warning to a step's report if over half of the mesh was lost or rebuilt, with a possible reason in the particles: `lost` of its
+/// `all` vertices did not find the particles' surface. There is no warning where much of the liquid itself is gone or new.
 ///
 /// # Errors
 /// As [`disagreement`].
@@ -119,7 +119,7 @@ pub(in crate::surface) fn warn_of_tears(
     Ok(())
 }
 
-/// By how much (spacings) particles beside each other go apart, in the median.
+/// Median relative displacement (spacings) of neighbouring particles.
 fn torn(paths: &Paths, spacing: f64) -> Option<f64> {
     let (mut from, mut to) = (Vec::new(), Vec::new());
     paths.at(0.0, &mut from);
@@ -151,12 +151,12 @@ fn torn(paths: &Paths, spacing: f64) -> Option<f64> {
     Some(*all.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// A warning that velocities take particles to where no others are.
+/// A warning that velocities take particles to where there are no others.
 fn velocities_miss(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> Option<String> {
     let bin = |position: &DVec3| cell_of(&(position / spacing));
     let filled = |frame: &Particles| -> HashSet<Coord> { frame.positions.iter().map(bin).collect() };
     let (old, new) = (filled(from), filled(to));
-    // Where the liquid goes there must be some, and where it is some must have come from.
+    // There must be liquid where velocities take it, and liquid where it must have come from.
     let missed = |frame: &Particles, other: &HashSet<Coord>, time: f64| {
         let goes = |at: usize| frame.positions[at] + DVec3::from(frame.velocities[at].map(f64::from)) * time;
         let is_missed = |at: &usize| !around(bin(&goes(*at))).iter().any(|cell| other.contains(cell));
@@ -190,12 +190,12 @@ fn velocities_miss(from: &Particles, to: &Particles, dt: f64, spacing: f64) -> O
     })
 }
 
-/// Some of so many particles, evenly.
+/// A subset of `count` particles, evenly spaced.
 fn samples(count: usize) -> impl Iterator<Item = usize> + Clone {
     (0..count).step_by(count.div_ceil(SAMPLES).max(1))
 }
 
-/// A cell and those beside it.
+/// A cell and the 26 around it.
 fn around(cell: Coord) -> [Coord; 27] {
     std::array::from_fn(|n| {
         let n = n as i32;
@@ -210,7 +210,7 @@ mod tests {
 
     const DT: f64 = 1.0 / 24.0;
 
-    /// A ball of particles, 0.1 m apart, that falls and turns at a frame, with its velocities times a factor.
+    /// A ball of particles, 0.1 m apart, that falls and rotates at a frame, with its velocities times a factor.
     fn ball(frame: i32, factor: f64) -> Particles {
         let time = f64::from(frame) * DT;
         let (turn, fall) = (2.0 * time, DVec3::new(0.3, -1.0 - 4.9 * time, 0.0) * time);
@@ -256,7 +256,7 @@ mod tests {
             let what = warning(&from, &to).unwrap();
             let (before, _) = what.split_once(" times as large").unwrap();
             let factor_found: f64 = before.rsplit(' ').next().unwrap().parse().unwrap();
-            // Paths of particles that turn are curved.
+            // Paths of rotating particles are curved.
             assert!(
                 (factor_found / factor - 1.0).abs() < 1e-3 || (factor_found - factor).abs() < 6e-4,
                 "{what}"
@@ -270,7 +270,7 @@ mod tests {
 
     #[test]
     fn ids_that_are_rows_are_reported() {
-        // Those in the first rows go, so that all others move up, or rows come in any order.
+        // The particles in the first rows are removed, so that all others move up, or rows come in any order.
         let rows = |from: &Particles, to: &Particles| {
             let shifted = |frame: &Particles, by: usize| {
                 let count = frame.positions.len() - by;

@@ -1,4 +1,4 @@
-//! Particles sorted into cells, so that those near a position are found fast.
+//! Particles sorted into cells, for fast neighbour search.
 
 use rayon::prelude::*;
 
@@ -10,30 +10,30 @@ pub fn cell_of(position: &DVec3) -> Coord {
     [0, 1, 2].map(|axis| position[axis].floor() as i32)
 }
 
-/// With this begins what is said of particles too far apart.
+/// Messages about particles too far apart begin with this.
 pub const TOO_FAR: &str = "particles reach";
 /// Bits of each axis in a key.
 const BITS: u32 = 21;
-/// Greatest distance of two cells on an axis.
+/// Maximum distance between two cells on an axis.
 const FARTHEST: i64 = 1 << BITS;
 
-/// Particles in the order of the cells that hold them. What order they come in makes no difference: within a cell they are sorted
-/// by position, then by what else tells them apart.
+/// Particles in the order of the cells that hold them. Their input order makes no difference: within a cell they are sorted by position,
+/// then by rank.
 #[derive(Debug, Default)]
 pub struct Cells {
     /// Edge of a cell (m).
     edge: f64,
-    /// Least coordinates.
+    /// Minimum coordinates.
     low: Coord,
-    /// Keys of the cells that hold particles, ascending: x, y, z above each other.
+    /// Keys of the cells that hold particles, ascending: x in the highest bits, then y, then z.
     keys: Vec<u64>,
     /// `start[n]..start[n + 1]` are the particles of cell `n`.
     start: Vec<u32>,
-    /// The index of each particle in the order that they came in.
+    /// Input index of each particle.
     pub order: Vec<u32>,
-    /// Position of each in its cell (edges, 0..1).
+    /// Position of each particle in its cell (edges, 0..1).
     offsets: Vec<[f32; 3]>,
-    /// Particles in each octant of a cell.
+    /// Count of particles in each octant of a cell.
     octants: Vec<[u16; 8]>,
 }
 
@@ -41,13 +41,13 @@ pub struct Cells {
 #[derive(Clone, Copy)]
 struct Item {
     key: u64,
-    /// Bits of the offset: not negative, so that they ascend as the numbers do.
+    /// Bits of the offset: as it is not negative, they order as the numbers do.
     offset: [u32; 3],
     index: u32,
 }
 
 impl Cells {
-    /// Sorts particles at positions (m) into cells of an edge (m); `rank` tells those at the same position apart.
+    /// Sorts particles at positions (m) into cells of an edge (m); `rank` orders those at the same position.
     ///
     /// # Errors
     /// Particles so far apart that there are more than two million cells between them.
@@ -119,12 +119,12 @@ impl Cells {
         })
     }
 
-    /// The particles of each of these cells, by the order in which they came in.
+    /// Input indices of the particles of each of these cells.
     pub fn runs(&self) -> impl Iterator<Item = &[u32]> {
         self.start.windows(2).map(|ends| &self.order[ends[0] as usize..ends[1] as usize])
     }
 
-    /// The number of a cell, if it holds particles.
+    /// The index of a cell, if it holds particles.
     pub fn find(&self, coord: Coord) -> Option<usize> {
         let at = [0, 1, 2].map(|axis| i64::from(coord[axis]) - i64::from(self.low[axis]));
         if at.iter().any(|x| !(0..FARTHEST).contains(x)) {
@@ -133,7 +133,7 @@ impl Cells {
         self.keys.binary_search(&pack(at.map(|x| x as u64))).ok()
     }
 
-    /// The cells from `low` to `high` that hold particles, in ascending order: index and coordinates.
+    /// Calls `see` with the index and coordinates of each cell from `low` to `high` that holds particles, in ascending order.
     fn between(&self, low: Coord, high: Coord, mut see: impl FnMut(usize, Coord)) {
         let shifted = |at: Coord| [0, 1, 2].map(|axis| i64::from(at[axis]) - i64::from(self.low[axis]));
         let (first, last) = (shifted(low), shifted(high).map(|x| x.min(FARTHEST - 1)));
@@ -153,8 +153,8 @@ impl Cells {
         }
     }
 
-    /// Calls `see` with runs of particles in the cells from `low` to `high`: their first one's number in the order of cells, and
-    /// their offsets from a cell `from` (edges).
+    /// Calls `see` with the particles in the cells from `low` to `high`: their numbers in the order of cells, and their offsets from a cell
+    /// `from` (edges).
     pub fn near(&self, low: Coord, high: Coord, from: Coord, mut see: impl FnMut(usize, [f32; 3])) {
         self.between(low, high, |cell, at| {
             let shift = [0, 1, 2].map(|axis| (at[axis] - from[axis]) as f32);
@@ -164,8 +164,8 @@ impl Cells {
         });
     }
 
-    /// Calls `see` with the count of particles in each octant, cubes of half an edge, of the cells from `low` to `high`
-    /// that hold any: octants are counted through all cells.
+    /// Calls `see` with each octant, a cube of half an edge, of the cells from `low` to `high` that hold particles, and its count of
+    /// particles: octants are numbered through all cells.
     pub fn counts(&self, low: Coord, high: Coord, mut see: impl FnMut([i32; 3], u16)) {
         self.between(low, high, |cell, at| {
             for (octant, count) in self.octants[cell].iter().enumerate() {

@@ -1,7 +1,7 @@
-//! The way of each particle from one frame to the next.
+//! The path of each particle from one frame to the next.
 //!
-//! Particles are matched by id: files hold them in another order in each frame. With velocities a way is a cubic that begins and ends
-//! with these (Hermite), otherwise a line. Without ids it is the velocity times the time.
+//! Particles are matched by id: files order them differently in each frame. With velocities a path is a cubic that begins and ends with
+//! these (Hermite), otherwise a line. Without ids the displacement is the velocity times the time.
 
 use std::collections::HashMap;
 
@@ -12,29 +12,29 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::surface::Particles;
 
-/// The ways of particles that are there in both frames.
+/// The paths of particles that exist in both frames.
 #[derive(Debug, Default)]
 pub struct Paths {
     from: Vec<DVec3>,
     to: Vec<DVec3>,
-    /// Velocities times the time between the frames (m), at both ends; none: ways are lines.
+    /// Velocities times the time between the frames (m), at both ends; none: paths are lines.
     speeds: Vec<[DVec3; 2]>,
-    /// What tells particles at the same position apart.
+    /// Order of particles at the same position.
     ranks: Vec<i64>,
-    /// What velocities say where that is not what positions say: they are then left out.
+    /// How velocities disagree with positions, if they do: they are then ignored.
     pub mismatch: Option<Mismatch>,
-    /// Particles of the first frame that end, and of the second that are new.
+    /// Count of particles of the first frame that end, and of the second that are new.
     pub died: usize,
     /// See `died`.
     pub born: usize,
 }
 
-/// Ways are cubics if the velocities say, in the median, where particles go up to this share of the way.
+/// Paths are cubics if the velocities predict the end points with a median error of at most this share of the median displacement.
 const TRUSTED: f64 = 0.5;
 
 impl Paths {
-    /// From one frame to the next, `dt` (s) later. Where the second has no particles, those of the first go on with their velocities, if
-    /// they have any.
+    /// Paths from one frame to the next, `dt` (s) later. If the second has no particles, those of the first continue with their velocities,
+    /// if they have any.
     ///
     /// # Errors
     /// Neither ids in both frames nor velocities in the first.
@@ -95,7 +95,7 @@ impl Paths {
         Ok(Self { from: from.positions.clone(), to, ranks, ..Self::default() })
     }
 
-    /// What velocities say where they are not in the unit and at the time that the positions say.
+    /// The mismatch if velocities are not in the unit, or not of the time, of the positions.
     fn mismatched(&self) -> Option<Mismatch> {
         let speed = |n: usize| (self.speeds[n][0] + self.speeds[n][1]) * 0.5;
         let way = |n: usize| self.to[n] - self.from[n];
@@ -117,17 +117,17 @@ impl Paths {
         Some(Mismatch { by_ids, by_velocities, apart, cosine })
     }
 
-    /// Count of ways.
+    /// Count of paths.
     pub fn count(&self) -> usize {
         self.from.len()
     }
 
-    /// What tells particles at the same position apart.
+    /// Order of particles at the same position.
     pub fn rank(&self, path: u32) -> i64 {
         self.ranks[path as usize]
     }
 
-    /// Greatest distance (m) that a particle moves.
+    /// Maximum displacement (m) of a particle.
     pub fn farthest(&self) -> f64 {
         let each = (0..self.count()).into_par_iter().with_min_len(4096);
         each.map(|n| {
@@ -156,8 +156,8 @@ impl Paths {
     }
 }
 
-/// The particles between two frames of a cache that are `dt` (s) apart, at a share 0..1 of the time: those that are there in both, and
-/// those of the first that end.
+/// The particles between two frames of a cache that are `dt` (s) apart, at a fraction 0..1 of the time: those that exist in both, and those
+/// of the first that end.
 ///
 /// # Errors
 /// Neither ids in both frames nor velocities in the first.

@@ -1,4 +1,4 @@
-//! Where the liquid at a position was at the first frame: the particles around it know, by their ids.
+//! Where the liquid at a position was at the first frame, from the particles around it, by their ids.
 
 use rayon::prelude::*;
 
@@ -13,24 +13,24 @@ use crate::surface::Particles;
 use crate::surface::topology::change::Change;
 use crate::surface::tracker::Tracker;
 
-/// Radius within which particles count (spacings): that of advection's maps. It is doubled, so often at most, where there are none.
+/// Radius within which particles count (spacings): that of advection's maps. It is doubled, at most this often, where there are none.
 const RADIUS: i32 = 3;
 const DOUBLINGS: u32 = 1;
 /// Cells along a radius.
 const RINGS: i32 = 2;
-/// Particles are of one origin where their first positions lie within so many radii, 4 spacings, of that of one of them. Those around a
-/// position on the surface lie little more than a radius from the nearest one, so that liquid that has kept its shape is all of one origin.
-/// What has come together lay at least as far apart as the gap between was wide; where that was less than 4 spacings, positions between
-/// the two origins are off by less than the gap. Where the liquid was pressed together by more, only what is nearest counts.
+/// Particles have one origin if their first positions lie within this many radii, 4 spacings, of that of one of them. Those around a
+/// position on the surface lie little more than a radius from the nearest one, so that liquid that has kept its shape has a single origin.
+/// Bodies that have met were at least as far apart as the gap between them was wide; where that was less than 4 spacings, positions between
+/// the two origins are off by less than the gap. Where the liquid was compressed by more, only the nearest particles count.
 const TOGETHER: f64 = 4.0 / 3.0;
-/// Positions of a task.
+/// Positions per task.
 const PIECE: usize = 256;
-/// Particles of a task.
+/// Particles per task.
 const GRAIN: usize = 4096;
 /// Farthest cell.
 const LIMIT: f64 = (i32::MAX / 4) as f64;
 
-/// Where each particle was at the first frame.
+/// The position of each particle at the first frame.
 #[derive(Debug, Clone)]
 pub struct Rest {
     /// Ascending.
@@ -40,7 +40,7 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// Of the particles at the first frame; none where they have no ids.
+    /// From the particles at the first frame; none if they have no ids.
     pub fn of(first: &Particles) -> Option<Self> {
         if first.ids.is_empty() {
             return None;
@@ -52,11 +52,11 @@ impl Rest {
         Some(Self { ids, positions })
     }
 
-    /// Where the liquid at positions (m) was at the first frame (m): from the particles around, which are `now` and whose spacing is
-    /// `spacing` (m). Their ways back are fitted by an affine map, as those of advection are; of particles that came from different
-    /// positions only those of one origin count, which weigh most together. None where no particle that was there at the first frame is
-    /// within three spacings (six, where no other one is either), or particles have no ids. A position's answer does not depend on the
-    /// others.
+    /// Where the liquid at positions (m) was at the first frame (m): from the particles around them, which are `now` and whose spacing is
+    /// `spacing` (m). Their displacements back are fitted by an affine map, like those of advection; of particles that came from different
+    /// positions only those of one origin count, the one with the largest total weight. None if no particle that existed at the first frame
+    /// is within three spacings (six, if no other one is either), or particles have no ids. The results for different positions are
+    /// independent.
     ///
     /// # Errors
     /// A spacing that is not over 0; particles too far apart; cancel.
@@ -137,11 +137,11 @@ struct Seen {
     now: DVec3,
     first: DVec3,
     weight: f64,
-    /// The particle that stands for those of its origin.
+    /// The particle that represents its origin.
     head: Option<usize>,
 }
 
-/// Working memory of a task.
+/// Scratch buffers of a task.
 #[derive(Default)]
 struct Scratch {
     seen: Vec<Seen>,
@@ -149,10 +149,10 @@ struct Scratch {
     room: Near,
 }
 
-/// The particles near some places.
+/// The particles near some positions.
 struct Field {
     cells: Cells,
-    /// Where each is, and was at the first frame if it was there (m), in the order of cells.
+    /// The current position of each, and that at the first frame if it existed then (m), in the order of cells.
     particles: Vec<(DVec3, Option<DVec3>)>,
     /// m.
     spacing: f64,
@@ -187,8 +187,8 @@ impl Field {
         self.fitted(position, from, RADIUS << doubling, scratch)
     }
 
-    /// The particles within so many cells of a position, seen from the corner of its cell (cells), that were there at the first frame.
-    /// Returns whether any particle is near, also one that was not.
+    /// Collects the particles within this many cells of a position, relative to the corner of its cell (cells), that existed at the first
+    /// frame. Returns whether any particle is near, even one that did not.
     fn gather(&self, cell: Coord, from: DVec3, rings: i32, seen: &mut Vec<Seen>) -> bool {
         seen.clear();
         let (mut is_any, square) = (false, f64::from(rings * rings));
@@ -206,15 +206,15 @@ impl Field {
         is_any
     }
 
-    /// What the particles that were gathered within a radius (spacings) of a position (m) say of it, which is seen from the corner of its
-    /// cell (cells).
+    /// The first position that the particles gathered within a radius (spacings) give for a position (m), which lies at `from` relative to
+    /// the corner of its cell (cells).
     fn fitted(&self, position: DVec3, from: DVec3, radius: i32, scratch: &mut Scratch) -> Option<DVec3> {
         let Scratch { seen, near, room } = scratch;
         let most = TOGETHER * f64::from(radius) * self.spacing;
         let head = heaviest_origin(seen, most)?;
         let Seen { now, first, .. } = seen[head];
         let way = first - now;
-        // In spacings. Ways are seen from that of the head: they may be long, and differ by little.
+        // In spacings. Displacements are relative to that of the representative: they may be long, and differ by little.
         let edge = (self.cells.edge() / self.spacing) as f32;
         near.clear();
         for one in seen.iter().filter(|one| one.head == Some(head)) {
@@ -225,13 +225,13 @@ impl Field {
         let to = |turn: DVec3| position + way + turn * self.spacing;
         let Some(sums) = sums(near, room, at, radius as f32) else { return Some(to(DVec3::zeros())) };
         let fit = to(sums.map().at(DVec3::zeros()));
-        // What so few particles say that it leads far away is worth no more than their mean.
+        // If so few particles extrapolate far away, their mean is no worse.
         Some(if (fit - first).norm() <= most { fit } else { to(sums.mean()) })
     }
 }
 
-/// Tells particles apart by where they come from, those within `most` (m) of one, the heaviest that is left, together. Returns the one
-/// that stands for those that weigh most together; none without particles.
+/// Groups particles by origin: those within `most` (m) of the heaviest one that is left form a group. Returns the representative of the
+/// group with the largest total weight; none without particles.
 fn heaviest_origin(seen: &mut [Seen], most: f64) -> Option<usize> {
     let mut left: f64 = seen.iter().map(|one| one.weight).sum();
     let mut best: Option<(f64, usize)> = None;
@@ -259,13 +259,13 @@ mod tests {
     use crate::context::Pool;
     use crate::surface::test_particles::numbered;
 
-    /// A block of n^3 positions, one apart, from a corner on.
+    /// A block of n^3 positions, one apart, starting at a corner.
     fn block(corner: DVec3, n: i32) -> impl Iterator<Item = DVec3> {
         let on = move |axis: u32| (0..n * n * n).map(move |at| f64::from(at / n.pow(axis) % n));
         on(0).zip(on(1)).zip(on(2)).map(move |((x, y), z)| corner + DVec3::new(x, y, z))
     }
 
-    /// Turned by 1 rad about an axis, drawn out, and taken far away.
+    /// Rotated by 1 rad about an axis, stretched, and moved far away.
     fn moved(position: DVec3) -> DVec3 {
         let axis = DVec3::new(1.0, 2.0, 0.5).normalize();
         let p = position.component_mul(&DVec3::new(1.2, 0.95, 0.9));
@@ -281,7 +281,7 @@ mod tests {
         let spacing = 0.01;
         let first = numbered(block(DVec3::zeros(), 9).map(|position| position * spacing).collect());
         let rest = Rest::of(&first).unwrap();
-        // Backwards, and with particles that were born later, far away.
+        // In reverse order, and with particles that were born later, far away.
         let mut now = numbered(block(DVec3::zeros(), 9).map(|position| moved(position) * spacing).collect());
         now.positions.extend(block(DVec3::new(90.0, 0.0, 0.0), 3).map(|position| position * spacing));
         now.ids.extend(10_000..10_027);
@@ -299,7 +299,7 @@ mod tests {
             assert!(off < 5e-3, "{wanted}: {off} spacings off");
         }
         assert_eq!(found[wanted.len()..], [None, None]);
-        // One by one, and on one thread, they are the same bit for bit.
+        // One by one, and on one thread, the results are the same bit for bit.
         let alone = Context::new(Pool::new(0).unwrap());
         for (position, found) in at.iter().zip(&found) {
             assert_eq!(rest.positions(&alone, &now, spacing, &[*position]).unwrap(), [*found]);

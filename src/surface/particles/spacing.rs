@@ -1,28 +1,28 @@
-//! The spacing of particles, from where they are.
+//! Estimates the spacing of particles from their positions.
 
 use rayon::prelude::*;
 
 use crate::geometry::DVec3;
 
-/// Particles whose neighbours are looked at, and those that are enough to know about how large the spacing is.
+/// Count of particles whose neighbours are used, and the count that suffices for a rough estimate.
 const LOOKED_AT: [usize; 2] = [256, 32];
-/// In a cubic grid as many particles as this are one spacing away. In a liquid they are nearer and farther, by their mean distance
-/// as far (1.02 spacings in frames of two solvers' caches).
+/// In a cubic grid this many particles are one spacing away. In a liquid they are nearer and farther, at the same mean distance (1.02
+/// spacings in frames of two solvers' caches).
 const NEIGHBOURS: usize = 6;
 
-/// The spacing (m) of particles at positions (m): the mean distance to the six nearest ones, in the median. None for fewer than seven
-/// particles, or where so many lie at one position.
+/// The spacing (m) of particles at positions (m): the median of the mean distance to the six nearest ones. None for fewer than seven
+/// particles, or if too many lie at one position.
 pub fn estimate(positions: &[DVec3]) -> Option<f64> {
     median(positions, LOOKED_AT[0])
 }
 
-/// The same within a tenth or so, in an eighth of the time: to see whether a spacing that is known can be right.
+/// The same within a tenth or so, in an eighth of the time: to check whether a given spacing is plausible.
 pub fn rough(positions: &[DVec3]) -> Option<f64> {
     median(positions, LOOKED_AT[1])
 }
 
 fn median(positions: &[DVec3], looked_at: usize) -> Option<f64> {
-    // The same particles are looked at in whatever order they come.
+    // The same particles are used in whatever order they come.
     let mut order: Vec<usize> = (0..positions.len()).collect();
     let key = |at: &usize| positions[*at];
     order.par_sort_unstable_by(|a, b| {

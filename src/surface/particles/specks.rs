@@ -1,11 +1,11 @@
-//! Groups of a few particles apart from all others: spray that makes no surface worth having.
+//! Groups of a few particles apart from all others: spray too small for a surface.
 
 use super::grid::Cells;
 use crate::error::Result;
 use crate::geometry::DVec3;
 
-/// Which particles at positions (m), whose spacing is `spacing` (m), belong to groups of fewer than `least`. Two are of one group where
-/// the cells of one spacing that hold them touch.
+/// Which particles at positions (m), whose spacing is `spacing` (m), belong to groups of fewer than `least`. Two particles are in the same
+/// group if the cells of one spacing that hold them touch.
 ///
 /// # Errors
 /// Particles too far apart.
@@ -16,7 +16,7 @@ pub fn specks(positions: &[DVec3], spacing: f64, least: usize) -> Result<Vec<boo
     for (cell, coord) in cells.coords().enumerate() {
         for n in 0..27 {
             let near = [coord[0] + n / 9 - 1, coord[1] + n / 3 % 3 - 1, coord[2] + n % 3 - 1];
-            // Those behind are looked at from there.
+            // Each pair of cells is found once, from its lower cell.
             if near > coord
                 && let Some(other) = cells.find(near)
             {

@@ -1,4 +1,4 @@
-//! What particles carry, at the vertices of a surface: weighted means over the particles around.
+//! Particle attributes at the vertices of a surface: weighted means over the particles around.
 
 use rayon::prelude::*;
 
@@ -14,9 +14,9 @@ const DOUBLINGS: u32 = 4;
 /// Vertices of a task.
 const PIECE: usize = 256;
 
-/// Means of numbers of the particles at positions (m), whose spacing is `spacing` (m), at vertices (m): each particle counts by
-/// (1 - (d / R)^2)^3 at a distance d. Each column has one number for each particle; those that come out have one for each vertex, 0
-/// where no particle is near.
+/// Means of numbers of the particles at positions (m), whose spacing is `spacing` (m), at vertices (m): a particle at a distance d
+/// has the weight (1 - (d / R)^2)^3. Each column has one number for each particle; each result has one for each vertex, 0 where no particle
+/// is near.
 ///
 /// # Errors
 /// Particles too far apart; cancel.

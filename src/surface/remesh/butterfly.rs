@@ -1,5 +1,5 @@
-//! Where a vertex belongs that divides an edge: modified butterfly subdivision (Zorin, Schroeder and Sweldens 1996, "Interpolating
-//! subdivision for meshes with arbitrary topology"). The new vertex lies on a smooth surface through the vertices around the edge.
+//! Position of a vertex that splits an edge: modified butterfly subdivision (Zorin, Schroeder and Sweldens 1996, "Interpolating subdivision
+//! for meshes with arbitrary topology"). The new vertex lies on a smooth surface through the vertices around the edge.
 
 use std::f64::consts::TAU;
 
@@ -7,13 +7,13 @@ use super::fans::{Edge, Fans};
 use super::shape::is_upright;
 use crate::geometry::DVec3;
 
-/// Neighbours of a vertex from which on they are too many for a rule.
+/// Maximum number of neighbours of a vertex for the rule.
 const MOST: usize = 24;
-/// How far from its midpoint an edge may be divided, in its lengths: where the surface is folded the rule says nothing.
+/// Maximum distance from the edge's midpoint, in edge lengths: where the surface is folded the rule is meaningless.
 const FAR: f64 = 0.25;
 
 impl Fans<'_, '_> {
-    /// Where an edge is split: its middle, but its midpoint where a triangle would turn over.
+    /// Where an edge is split: at `middle`, or at its midpoint where a triangle would turn over.
     pub fn split_position(&self, edge: &Edge) -> DVec3 {
         let [a, b, c, d] = edge.corners.map(|corner| self.position(corner));
         let middle = self.middle([edge.corners[0], edge.corners[1]]);
@@ -26,8 +26,8 @@ impl Fans<'_, '_> {
         if halves.iter().all(|(old, new)| is_upright(old, new)) { middle } else { 0.5 * (a + b) }
     }
 
-    /// The position on a smooth surface that belongs to the middle of an edge; its midpoint where neighbours are missing or not where they
-    /// belong (flagged), or where that is far from it.
+    /// The position on a smooth surface that corresponds to the middle of an edge; the midpoint if neighbours are missing or out of place
+    /// (flagged), or if the position is far from the midpoint.
     pub fn middle(&self, ends: [u32; 2]) -> DVec3 {
         let [p, q] = ends.map(|end| self.position(end));
         let midpoint = 0.5 * (p + q);
@@ -46,7 +46,7 @@ impl Fans<'_, '_> {
             let wings = at(0, 2) + at(0, 4) + at(1, 2) + at(1, 4);
             return Some(0.5 * (self.position(a) + self.position(b)) + 0.125 * opposite - 0.0625 * wings);
         }
-        // The ends with other than 6 neighbours decide; both do so alike.
+        // The ends with other than 6 neighbours decide; if both have, their mean is taken.
         let (mut sum, mut count) = (DVec3::zeros(), 0.0);
         for (end, ring) in [a, b].into_iter().zip(&rings).filter(|(_, ring)| ring.len() != 6) {
             sum += 0.75 * self.position(end);
@@ -59,7 +59,7 @@ impl Fans<'_, '_> {
     }
 }
 
-/// The weight of a neighbour, counted from the edge's other end around a vertex, out of so many, not 6. All of them are 1/4 together.
+/// The weight of neighbour `n`, counted from the edge's other end around a vertex, out of `of`, not 6. The sum of all weights is 1/4.
 fn weight(n: usize, of: usize) -> f64 {
     match (of, n) {
         (3, 0) => 5.0 / 12.0,
@@ -112,7 +112,7 @@ mod tests {
             assert_eq!(fans.middle([middle, other]), expected);
             assert_eq!(fans.split_position(&fans.edge([middle, other]).unwrap()), expected);
         }
-        // Vertices at the border have not all neighbours.
+        // Vertices at the border do not have all neighbours.
         assert!(fans.butterfly([0, 1]).is_none());
         assert_eq!(fans.middle([0, 1]), 0.5 * (fans.position(0) + fans.position(1)));
     }

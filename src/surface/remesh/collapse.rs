@@ -1,26 +1,26 @@
-//! Which vertex goes where an edge is too short, and whether it may.
+//! Which end of a short edge is merged into the other, and whether it may be.
 
 use super::fans::{Collapse, Fans};
 use super::shape::{is_upright, normal, quality};
 use super::{between, mean};
 use crate::geometry::DVec3;
 
-/// How much normals spread on a ridge or in a corner: two planes of the same area do where they meet at 30 degrees.
+/// Minimum spread of normals on a ridge or in a corner: that of two planes of the same area that meet at 30 degrees.
 const SPREAD: f64 = 0.0625;
-/// Quality that a collapse leaves, unless there was less.
+/// Minimum quality of triangles after a collapse, unless it was lower before.
 const LEAST: f64 = 0.05;
-/// Quality of a triangle whose normal says nothing.
+/// Below this quality a triangle's normal is meaningless.
 const SLIVER: f64 = 1e-4;
-/// Length that a collapse leaves, at most (targets): less than that of an edge that is split, which would undo it.
+/// Maximum length of edges after a collapse (targets): shorter than an edge that is split, which would undo it.
 const LONGEST: f64 = 1.4;
-/// The same where a fold goes, which is worse than a long edge.
+/// The same where a fold is removed, which is worse than a long edge.
 const LONGEST_OF_FOLD: f64 = 2.0;
-/// Greatest cosine between the normals of triangles that are folded onto each other: they meet at more than 160 degrees.
+/// Maximum cosine between the normals of triangles that are folded onto each other: they meet at more than 160 degrees.
 const FOLDED: f64 = -0.9397;
 
 impl Fans<'_, '_> {
-    /// In how many directions the surface looks around a vertex: 1 where it is smooth, 2 on a ridge, 3 in a corner. The rank of the sum
-    /// of the products of its normals, weighted by area (the medial quadric of Jiao 2007, "Face offsetting"), from its invariants.
+    /// Number of independent normal directions around a vertex: 1 where the surface is smooth, 2 on a ridge, 3 in a corner. The rank of the
+    /// area-weighted sum of the outer products of its normals (the medial quadric of Jiao 2007, "Face offsetting"), from its invariants.
     pub fn rank(&self, vertex: u32) -> u8 {
         let mut rows = [DVec3::zeros(); 3];
         for &triangle in self.around(vertex) {
@@ -44,8 +44,8 @@ impl Fans<'_, '_> {
         }
     }
 
-    /// How the ends of an edge may become one, the best way first: what stays is what has more of a ridge or corner, then what was
-    /// there before this frame, then the lesser number. Where two new ones are on a smooth surface they meet in the middle.
+    /// The possible collapses of an edge, the best first: the end with more of a ridge or corner stays, then the one that was there before
+    /// this frame, then the lower index. Two new vertices on a smooth surface meet in the middle.
     pub fn collapses(&self, [a, b]: [u32; 2]) -> Vec<Collapse> {
         let (a, b) = (a.min(b), a.max(b));
         let into =
@@ -65,14 +65,15 @@ impl Fans<'_, '_> {
         ways
     }
 
-    /// Whether a collapse keeps a closed 2-manifold and leaves sound triangles; those of a fold, where it is to go, may turn over.
+    /// Whether a collapse preserves a closed 2-manifold and leaves valid triangles; the triangles of a fold that is to be removed may turn
+    /// over.
     pub fn may(&self, collapse: &Collapse, folded: &[u32]) -> bool {
         let mut moving = self.moving(collapse).into_iter();
         moving.all(|triangle| self.bears(triangle, collapse, folded))
             && self.may_join(collapse.from, collapse.to)
     }
 
-    /// Whether a triangle is sound after a collapse, or gone.
+    /// Whether a triangle is valid after a collapse, or removed by it.
     fn bears(&self, triangle: u32, collapse: &Collapse, folded: &[u32]) -> bool {
         let &Collapse { from, to, position, size } = collapse;
         let corners = self.corners(triangle);
@@ -95,8 +96,8 @@ impl Fans<'_, '_> {
         keeps_side && quality(&new) >= before.min(LEAST) && corners.into_iter().all(is_short)
     }
 
-    /// What unfolds a triangle, made or changed in this frame, and one that it is folded onto: the shortest of their edges that may
-    /// collapse, with an end that was made in this frame. None where it is not folded, or nothing may.
+    /// The collapse that unfolds a triangle, created or changed in this frame, from one that it is folded onto: the shortest of their edges
+    /// that may collapse and has an end created in this frame. None if it is not folded, or no edge may collapse.
     pub fn unfolding(&self, triangle: u32) -> Option<Collapse> {
         if !self.is_there(triangle) || self.is_whole(triangle) {
             return None;
@@ -189,14 +190,14 @@ mod tests {
             let fans = Fans::of(&mut mesh);
             fans.collapses([a, b]).iter().any(|way| fans.may(way, &[]))
         };
-        // As born the edges that it leaves would be too long.
+        // With the sizes at birth the resulting edges would be too long.
         assert!(!may(&mut body));
         body.sizes.iter_mut().flatten().for_each(|size| *size *= 2.0);
         assert!(may(&mut body));
         body.flags[c as usize] = true;
         assert!(!may(&mut body));
         body.flags[c as usize] = false;
-        // What is beyond the ring turns triangles over.
+        // A position beyond the ring turns triangles over.
         body.sizes.iter_mut().flatten().for_each(|size| *size *= 10.0);
         let mut mesh = body.improvable();
         let fans = Fans::of(&mut mesh);

@@ -1,6 +1,6 @@
-//! Whether the mesh strains or rests: by how much the liquid has displaced each vertex over the last steps, of which edges know by how much
-//! their lengths have changed. Without that, lengths near a limit of improvement would be remade for ever by particles that only tremble.
-//! Projection does not count: where the surface depends on few particles, as on thin sheets, it moves ten times as far as they tremble.
+//! Detects whether the mesh is strained or at rest: accumulates by how much the liquid has displaced each vertex over the last steps, which
+//! gives the change of edge lengths. Without it, edges near a limit of improvement would be remeshed forever by jittering particles.
+//! Projection is excluded: where the surface depends on few particles, as on thin sheets, it moves ten times as far as they jitter.
 
 use crate::geometry::DVec3;
 
@@ -10,19 +10,19 @@ pub(in crate::surface) const WINDOW: u32 = 8;
 /// Displacements since a reference step; none where the mesh is not rebuilt.
 #[derive(Debug, Clone, Default)]
 pub(in crate::surface) struct Drift {
-    /// Steps since the reference, under [`WINDOW`].
+    /// Steps since the reference, less than [`WINDOW`].
     pub steps: u32,
-    /// The displacement of each vertex (m). Vertices that were made since have it from when they were.
+    /// The displacement of each vertex (m). Vertices created since have it from their creation on.
     pub vertices: Vec<[f32; 3]>,
 }
 
 impl Drift {
-    /// That of a mesh of so many vertices at a reference step.
+    /// The drift of a mesh of this many vertices at a reference step.
     pub fn at_reference(vertices: usize) -> Self {
         Self { steps: 0, vertices: vec![[0.0; 3]; vertices] }
     }
 
-    /// That after a step in which the particles carried the vertices from some positions (m) to others; it is not yet a new reference.
+    /// Displacements after a step in which the particles carried the vertices from `from` to `to` (m); it is not yet a new reference.
     pub fn after(&self, from: &[DVec3], to: &[DVec3]) -> Vec<[f32; 3]> {
         let moved = |(drift, (from, to)): (&[f32; 3], (&DVec3, &DVec3))| {
             let by = to - from;
@@ -31,8 +31,8 @@ impl Drift {
         self.vertices.iter().zip(from.iter().zip(to)).map(moved).collect()
     }
 
-    /// Counts a step, after which vertices are displaced by so much (m): each [`WINDOW`] steps it is the new reference, and always where
-    /// there are no vertices.
+    /// Counts a step, with the displacements (m) after it: every [`WINDOW`] steps the mesh becomes the new reference, and always if there
+    /// are no vertices.
     pub fn next(&self, displacements: Vec<[f32; 3]>) -> Self {
         let steps = self.steps + 1;
         if steps < WINDOW && !displacements.is_empty() {
@@ -50,7 +50,7 @@ mod tests {
     use crate::surface::test_particles::{numbered, own_surface, shell};
     use crate::surface::{Params, Particles, Tracker};
 
-    /// Frames in which the liquid is drawn out, and those in which it rests.
+    /// Frames in which the liquid is stretched, and those in which it rests.
     const MOVING: i32 = 18;
     const RESTING: i32 = 24;
 
@@ -83,7 +83,7 @@ mod tests {
             from = to;
             made.push(report.change.map_or(0, |change| change.made_triangles()));
             if frame == MOVING + 3 {
-                // What it knows of its rest is in its state.
+                // The state includes what is known about rest.
                 let state = tracker.save();
                 tracker = Tracker::resume(params, &mesh, &state).unwrap();
                 assert!(tracker.save() == state && tracker.drift.steps != 0);

@@ -1,28 +1,28 @@
-//! A closed mesh that is being improved, with the triangles around its vertices. Splits, collapses and flips keep it a closed
-//! 2-manifold by index: two neighbours become one only where the link condition holds (Dey, Edelsbrunner, Guha and Nekhayev 1999,
-//! "Topology preserving edge contraction").
+//! A closed mesh that is being improved, with the triangles around its vertices. Splits, collapses and flips keep it a closed 2-manifold by
+//! index: two neighbours are merged only if the link condition holds (Dey, Edelsbrunner, Guha and Nekhayev 1999, "Topology preserving edge
+//! contraction").
 
 use super::{Improvable, Size, Source, mean};
 use crate::geometry::DVec3;
 
-/// Of a vertex around which no triangle has come or gone.
+/// For a vertex around which no triangle was added or removed.
 const NONE: u32 = u32::MAX;
 
-/// An edge and what is beside it.
+/// An edge with its triangles and corners.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Edge {
-    /// The triangle that runs along it from a to b, and the one that runs back.
+    /// The triangle that runs along it from a to b, and the one that runs from b to a.
     pub triangles: [u32; 2],
     /// Its ends a and b, then the corners opposite: the triangles are a b c and b a d.
     pub corners: [u32; 4],
 }
 
-/// A vertex that goes into a neighbour.
+/// A vertex that is merged into a neighbour.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Collapse {
     pub from: u32,
     pub to: u32,
-    /// Where the neighbour lies then, and its size.
+    /// The neighbour's new position and size.
     pub position: DVec3,
     /// See `position`.
     pub size: Size,
@@ -36,19 +36,19 @@ pub(super) fn flipped([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
 /// A mesh with the triangles around each vertex.
 pub(super) struct Fans<'m, 'a> {
     mesh: &'m mut Improvable<'a>,
-    /// For each vertex that came in where its triangles begin in `first`; then the count of all.
+    /// For each input vertex, where its triangles begin in `first`; then the count of all.
     starts: Vec<u32>,
-    /// Triangles around each vertex as they came in, ascending.
+    /// Triangles around each input vertex, ascending.
     first: Vec<u32>,
-    /// Of each vertex the index of its triangles in `own`; [`NONE`]: they are those that came in.
+    /// For each vertex, the index of its triangles in `own`; [`NONE`]: they are those of the input.
     slots: Vec<u32>,
-    /// Triangles around vertices where some came or went, in no order.
+    /// Triangles around vertices where some were added or removed, in no order.
     own: Vec<Vec<u32>>,
-    /// Of each triangle whether a collapse has taken it away.
+    /// For each triangle, whether a collapse has removed it.
     is_dead: Vec<bool>,
-    /// Of each vertex whether it went into another.
+    /// For each vertex, whether it was merged into another.
     is_gone: Vec<bool>,
-    /// Triangles that were changed since they were last asked for, each once.
+    /// Triangles changed since the last call of `take_touched`, each once.
     touched: Vec<u32>,
     is_touched: Vec<bool>,
 }
@@ -84,12 +84,12 @@ impl<'m, 'a> Fans<'m, 'a> {
         }
     }
 
-    /// Whether no collapse has taken a triangle away.
+    /// Whether a triangle has not been removed by a collapse.
     pub fn is_there(&self, triangle: u32) -> bool {
         !self.is_dead[triangle as usize]
     }
 
-    /// Whether a triangle is the artist's own, or one of a frame before, as it was.
+    /// Whether a triangle is unchanged in this frame: the artist's own, or from an earlier frame.
     pub fn is_whole(&self, triangle: u32) -> bool {
         matches!(self.mesh.sources[triangle as usize], Source::Whole(_))
     }
@@ -119,7 +119,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         (self.position(a) - self.position(b)).norm()
     }
 
-    /// Length of the edges that a vertex was born with.
+    /// Lengths of the edges of a vertex at its birth.
     pub fn size(&self, vertex: u32) -> Size {
         self.mesh.sizes[vertex as usize]
     }
@@ -129,7 +129,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         self.mesh.origins[vertex as usize].is_some()
     }
 
-    /// Whether the triangles around a vertex are left alone.
+    /// Whether the triangles around a vertex must not be changed.
     pub fn is_flagged(&self, vertex: u32) -> bool {
         self.mesh.flags[vertex as usize]
     }
@@ -144,7 +144,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         self.mesh.needs(ends, is_out)
     }
 
-    /// The triangles around a vertex; none where it went into another.
+    /// The triangles around a vertex; none if it was merged into another.
     pub fn around(&self, vertex: u32) -> &[u32] {
         let at = vertex as usize;
         match self.own.get(self.slots[at] as usize) {
@@ -153,7 +153,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         }
     }
 
-    /// The triangle that runs from a vertex to a neighbour, and its third corner. None where they are no neighbours.
+    /// The triangle with the directed edge from a vertex to a neighbour, and its third corner. None if they are not neighbours.
     fn beside(&self, from: u32, to: u32) -> Option<(u32, u32)> {
         self.around(from).iter().find_map(|&triangle| {
             let corners = self.corners(triangle);
@@ -162,14 +162,14 @@ impl<'m, 'a> Fans<'m, 'a> {
         })
     }
 
-    /// The edge between two vertices; none where they are no neighbours.
+    /// The edge between two vertices; none if they are not neighbours.
     pub fn edge(&self, [a, b]: [u32; 2]) -> Option<Edge> {
         let ((one, c), (two, d)) = (self.beside(a, b)?, self.beside(b, a)?);
         Some(Edge { triangles: [one, two], corners: [a, b, c, d] })
     }
 
-    /// The neighbours of a vertex, counter-clockwise seen from outside, beginning with one of them. None where they are fewer than 3,
-    /// or more than `most`.
+    /// The neighbours of a vertex, counter-clockwise seen from outside, starting with `first`. None if there are fewer than 3, or more than
+    /// `most`.
     pub fn ring_from(&self, vertex: u32, first: u32, most: usize) -> Option<Vec<u32>> {
         let count = self.around(vertex).len();
         if !(3..=most).contains(&count) {
@@ -184,7 +184,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         (last == first).then_some(ring)
     }
 
-    /// The vertices that have an edge in common with one, ascending.
+    /// The neighbours of a vertex, ascending.
     fn ring(&self, vertex: u32) -> Vec<u32> {
         let corners = self.around(vertex).iter().flat_map(|&triangle| self.corners(triangle));
         let mut ring: Vec<u32> = corners.filter(|&corner| corner != vertex).collect();
@@ -193,8 +193,8 @@ impl<'m, 'a> Fans<'m, 'a> {
         ring
     }
 
-    /// Whether two neighbours may become one vertex: none is beside both but the two corners opposite their edge, and these,
-    /// which lose a triangle each, keep three. That leaves tetrahedra alone, too.
+    /// Whether two neighbours may be merged: their only common neighbours are the two corners opposite their edge, and these, which lose a
+    /// triangle each, keep three. That also preserves tetrahedra.
     pub fn may_join(&self, a: u32, b: u32) -> bool {
         let [mut shared, other] = [a, b].map(|vertex| self.ring(vertex));
         shared.retain(|vertex| other.binary_search(vertex).is_ok());
@@ -206,7 +206,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         self.around(a).iter().any(|&triangle| self.corners(triangle).contains(&b))
     }
 
-    /// Triangles with a corner that a collapse moves or renames; those that it takes away are among them.
+    /// Triangles with a corner that a collapse moves or renames, including those that it removes.
     pub fn moving(&self, collapse: &Collapse) -> Vec<u32> {
         let &Collapse { from, to, position, .. } = collapse;
         let mut moving = self.around(from).to_vec();
@@ -217,7 +217,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         moving
     }
 
-    /// The triangles that were changed since this was last asked, ascending; collapses may have taken some away.
+    /// The triangles changed since the last call, ascending; collapses may have removed some.
     pub fn take_touched(&mut self) -> Vec<u32> {
         let mut touched = std::mem::take(&mut self.touched);
         touched.iter().for_each(|&triangle| self.is_touched[triangle as usize] = false);
@@ -225,7 +225,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         touched
     }
 
-    /// Divides an edge by a vertex at a position.
+    /// Splits an edge by a vertex at a position.
     pub fn split(&mut self, edge: &Edge, position: DVec3) {
         let Edge { triangles: [one, two], corners: [a, b, c, d] } = *edge;
         let made = self.mesh.positions.len() as u32;
@@ -257,7 +257,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         [one, two, three, four].into_iter().for_each(|triangle| self.touch(triangle));
     }
 
-    /// Makes a collapse of two vertices that may join.
+    /// Performs a collapse of two vertices that may be merged.
     pub fn collapse(&mut self, collapse: &Collapse) {
         let &Collapse { from, to, position, size } = collapse;
         self.moving(collapse).into_iter().for_each(|triangle| self.becomes_part(triangle));
@@ -281,7 +281,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         self.around(to).to_vec().into_iter().for_each(|triangle| self.touch(triangle));
     }
 
-    /// Puts the other diagonal of an edge's two triangles in its position. They stay parts where they are of one triangle.
+    /// Replaces an edge by the other diagonal of its two triangles. If these are parts of one triangle, they remain parts.
     pub fn flip(&mut self, edge: &Edge) {
         let Edge { triangles: [one, two], corners: [a, b, c, d] } = *edge;
         let sources = [one, two].map(|triangle| self.mesh.sources[triangle as usize]);
@@ -297,7 +297,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         self.add(d, one);
     }
 
-    /// The drift of a vertex between two.
+    /// The drift of a vertex between two others.
     fn mean_drift(&self, a: u32, b: u32) -> [f32; 3] {
         let [one, two] = [a, b].map(|vertex| self.mesh.drifts[vertex as usize]);
         [0, 1, 2].map(|axis| 0.5 * (one[axis] + two[axis]))
@@ -316,7 +316,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         }
     }
 
-    /// The triangles around a vertex, to be changed.
+    /// The triangles around a vertex, for modification.
     fn own_mut(&mut self, vertex: u32) -> &mut Vec<u32> {
         let at = vertex as usize;
         if self.slots[at] == NONE {
@@ -335,7 +335,7 @@ impl<'m, 'a> Fans<'m, 'a> {
         self.own_mut(vertex).retain(|&other| other != triangle);
     }
 
-    /// Drops the triangles and vertices that collapses took away. All others keep their order.
+    /// Drops the triangles and vertices that collapses removed. All others keep their order.
     pub fn finish(self) {
         let Self { mesh, is_dead, is_gone, .. } = self;
         if !is_gone.contains(&true) {
@@ -387,7 +387,7 @@ mod tests {
             let [a, b, _] = fans.corners(triangle);
             [a, b]
         };
-        // What is around a vertex is what names it.
+        // The stored triangles around a vertex are those that use it.
         let check = |fans: &Fans<'_, '_>| {
             for vertex in 0..fans.mesh.positions.len() as u32 {
                 let names =

@@ -1,19 +1,19 @@
-//! Whether an edge is better the other way across its two triangles.
+//! Whether an edge should be flipped.
 
 use super::TOO_LONG;
 use super::fans::{Edge, Fans, flipped};
 use super::shape::{is_upright, least_angle, normal};
 
-/// Smallest angle (degrees) from which on a triangle is left alone.
+/// Triangles whose smallest angle (degrees) is at least this are left alone.
 const LEAST: f64 = 20.0;
-/// By how much (degrees) a flip raises the smallest angle of its two triangles, at least.
+/// Minimum increase (degrees) of the smallest angle of the two triangles by a flip.
 const GAIN: f64 = 5.0;
-/// Least cosine between the normals of the two triangles: they meet at up to 30 degrees.
+/// Minimum cosine between the normals of the two triangles: they meet at up to 30 degrees.
 const FLAT: f64 = 0.866;
 
 impl Fans<'_, '_> {
-    /// The edge of a triangle that is best flipped. None where its angles are not small, or no flip is clearly better; the artist's own
-    /// triangles and those at flagged vertices do not flip.
+    /// The edge of a triangle whose flip is best. None if its angles are not small, or no flip is clearly better; the artist's own triangles
+    /// and those at flagged vertices are not flipped.
     pub fn better(&self, triangle: u32) -> Option<Edge> {
         let may = self.is_there(triangle) && !self.is_whole(triangle);
         if !may || least_angle(&self.positions(triangle)) >= LEAST {
@@ -32,7 +32,7 @@ impl Fans<'_, '_> {
         best.map(|(_, edge)| edge)
     }
 
-    /// By how much (degrees) a flip raises the smallest angle; none where it may not be.
+    /// Increase (degrees) of the smallest angle by a flip; none if it is not allowed.
     fn gain(&self, edge: &Edge) -> Option<f64> {
         let [_, _, c, d] = edge.corners;
         let is_fixed = edge.corners.iter().any(|&corner| self.is_flagged(corner))
@@ -63,7 +63,7 @@ mod tests {
     use super::*;
     use crate::geometry::DVec3;
 
-    /// Two triangles along an edge, of which the second is turned up around it (degrees).
+    /// Two triangles along an edge, the second of which is rotated about it (degrees).
     fn kite(height: f64, turn: f64) -> Body {
         let turn = turn.to_radians();
         let low = DVec3::new(0.0, -height * libm::cos(turn), height * libm::sin(turn));
@@ -87,7 +87,7 @@ mod tests {
         let flip = Edge { triangles: [0, 1], corners: [0, 1, 2, 3] };
         assert_eq!(better(&mut kite(0.5, 0.0)), Some(flip));
         assert_eq!(better(&mut kite(0.5, 25.0)), Some(flip));
-        // It is not flat, not better by as much, good already.
+        // Not flat, too little gain, already good.
         assert_eq!(better(&mut kite(0.5, 35.0)), None);
         assert_eq!(better(&mut kite(0.1, 0.0)), None);
         assert_eq!(better(&mut kite(0.8, 0.0)), None);
@@ -100,7 +100,7 @@ mod tests {
         let mut body = kite(0.5, 0.0);
         body.flags[3] = true;
         assert_eq!(better(&mut body), None);
-        // The new edge is there already, or would be too long.
+        // The new edge exists already, or would be too long.
         let mut body = kite(0.5, 0.0);
         body.triangles.push([2, 3, 0]);
         body.sources.push(Source::New);

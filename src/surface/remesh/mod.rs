@@ -1,16 +1,15 @@
-//! Mesh improvement (thesis 2.6): where the tracked mesh was stretched its edges are split, where it was squeezed they collapse, and
-//! thin triangles that were made flip. What is measured against is the length that the edges around a vertex had at its birth: long and
-//! short edges stay as they were sculpted. Nearly all of a mesh needs nothing, and stays as it is, bit for bit; so does all of one at rest
-//! (`strain.rs`).
+//! Mesh improvement (thesis 2.6): edges are split where the tracked mesh was stretched and collapsed where it was compressed, and edges of
+//! thin new triangles are flipped. The reference is the length that the edges around a vertex had at its birth: long and short edges stay as
+//! they were sculpted. Nearly all of a mesh needs no change, and stays as it is, bit for bit; so does all of a mesh at rest (`strain.rs`).
 //!
-//! After Wojtan et al. 2009, and Brochu and Bridson 2009 ("Robust topological operations for dynamic explicit surfaces") for what
-//! stays on ridges and in corners. `fans.rs` has the operations, `butterfly.rs`, `collapse.rs`, `flip.rs` and `relax.rs` say where and
-//! whether.
+//! After Wojtan et al. 2009, and Brochu and Bridson 2009 ("Robust topological operations for dynamic explicit surfaces") for the
+//! preservation of ridges and corners. `fans.rs` has the operations, `butterfly.rs`, `collapse.rs`, `flip.rs` and `relax.rs` decide where
+//! they are applied and whether they are allowed.
 //!
 //! | word | meaning |
 //! |---|---|
 //! | size | of a vertex: the lengths of the shortest and of the longest edge around it at its birth |
-//! | target | of an edge: what its ends allow; too long is measured by the lesser of their longest, too short by the greater of their shortest |
+//! | target | of an edge: its range of lengths; too long refers to the lower of its ends' longest, too short to the higher of their shortest |
 //! | due | of a triangle: something about it may be out of range |
 
 mod butterfly;
@@ -30,19 +29,19 @@ use crate::geometry::DVec3;
 use crate::mesh_repair::Source;
 use fans::Fans;
 
-/// Longest edge that is left alone (targets). The halves of one that is split have 0.75: far from what collapses.
+/// Longest edge that is left alone (targets). The halves of one that is split have 0.75: far from being collapsed.
 const TOO_LONG: f64 = 1.5;
 /// Shortest edge that is left alone (targets).
 const TOO_SHORT: f64 = 0.5;
-/// How often an edge and its parts may be halved in a frame: it may be any length where a vertex went astray.
+/// How often an edge and its parts may be halved in a frame: a stray vertex may make it arbitrarily long.
 const ROUNDS: usize = 5;
-/// Sweeps in a frame: what one changes is due in the next.
+/// Sweeps in a frame: the changes of one are checked in the next.
 const SWEEPS: usize = 3;
 /// How often vertices move in a sweep.
 const RELAXED: usize = 3;
-/// Triangles of a task.
+/// Triangles per task.
 const GRAIN: usize = 4096;
-/// Operations between two looks whether the work was cancelled.
+/// Operations between two checks for a cancel.
 const LOOK: usize = 256;
 
 /// A mesh that is improved, lengths in any unit: closed and 2-manifold by index. Arrays have one value for each vertex, or triangle.
@@ -51,40 +50,40 @@ pub struct Improvable<'a> {
     pub positions: &'a mut Vec<DVec3>,
     /// Triangles, counter-clockwise seen from outside.
     pub triangles: &'a mut Vec<[u32; 3]>,
-    /// Of each vertex the lengths of the shortest and of the longest edge around it at its birth: as born no edge is out of range. Edges
-    /// between vertices of size 0 are as they should be.
+    /// For each vertex, the lengths of the shortest and of the longest edge around it at its birth: at birth no edge is out of range. Edges
+    /// between vertices of size 0 are never out of range.
     pub sizes: &'a mut Vec<Size>,
-    /// Of each vertex the vertex that it was; none: it was made in this frame.
+    /// For each vertex, its vertex before the frame; none: it was created in this frame.
     pub origins: &'a mut Vec<Option<u32>>,
-    /// Displacement of each vertex since a reference some frames ago; not finite: it is not known.
+    /// Displacement of each vertex since a reference some frames ago; not finite: unknown.
     pub drifts: &'a mut Vec<[f32; 3]>,
-    /// Of each triangle where it comes from.
+    /// For each triangle, where it comes from.
     pub sources: &'a mut Vec<Source>,
-    /// Of each vertex whether its triangles are left alone: what is broken is rebuilt in the next frame.
+    /// For each vertex, whether its triangles are left alone: what is broken is rebuilt in the next frame.
     pub flags: &'a mut Vec<bool>,
-    /// By how much lengths change where the liquid only trembles.
+    /// Change of lengths where the liquid only jitters.
     pub tremble: f64,
 }
 
 /// Lengths of the shortest and of the longest edge around a vertex.
 pub type Size = [f32; 2];
 
-/// How many operations improved a mesh.
+/// Counts of the operations that improved a mesh.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Improvements {
-    /// Edges that were divided by a vertex.
+    /// Edges split by a vertex.
     pub splits: usize,
-    /// Vertices that went into a neighbour.
+    /// Vertices merged into a neighbour.
     pub collapses: usize,
-    /// Edges that were turned within their two triangles.
+    /// Edges flipped within their two triangles.
     pub flips: usize,
 }
 
-/// Improves a mesh; it stays a closed 2-manifold by index. Vertices that have an origin stay where they are or go; triangles that stay
-/// as they are stay in their order, with their vertices. Runs on the threads of the phase around it.
+/// Improves a mesh; it stays a closed 2-manifold by index. Vertices that have an origin stay where they are or are removed; unchanged
+/// triangles keep their order and vertices. Runs on the threads of the phase around it.
 ///
 /// # Errors
-/// Cancel: the mesh is then improved in part, and still closed.
+/// Cancel: the mesh is then partly improved, and still closed.
 pub fn improve(ctx: &Context, mesh: &mut Improvable<'_>) -> Result<Improvements> {
     let due = due(ctx, mesh)?;
     if due.is_empty() {
@@ -98,7 +97,7 @@ pub fn improve(ctx: &Context, mesh: &mut Improvable<'_>) -> Result<Improvements>
     result.map(|()| done)
 }
 
-/// The size of each vertex as it is; 0 where it has no edges.
+/// The current size of each vertex; 0 if it has no edges.
 pub fn sizes(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<Size> {
     let mut sizes = vec![[f32::INFINITY, 0.0f32]; positions.len()];
     for &[a, b, c] in triangles {
@@ -115,12 +114,12 @@ pub fn sizes(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<Size> {
 }
 
 impl Improvable<'_> {
-    /// The shortest and the longest that an edge should be.
+    /// The range of lengths of an edge: shortest and longest.
     fn target(&self, [a, b]: [u32; 2]) -> [f64; 2] {
         between(self.sizes[a as usize], self.sizes[b as usize])
     }
 
-    /// Square of an edge's length over its target; 1 where it is between the two, or has none.
+    /// Square of an edge's length over its target; 1 if it is within the range, or has none.
     fn stretch(&self, ends: [u32; 2]) -> f64 {
         let [p, q] = ends.map(|end| self.positions[end as usize]);
         let [shortest, longest] = self.target(ends);
@@ -140,7 +139,7 @@ impl Improvable<'_> {
         is_out(self.stretch(ends)) && self.is_strained(ends)
     }
 
-    /// Whether something about a triangle may be out of range: where none was made or changed in this frame, its edges alone.
+    /// Whether a triangle may be due: if none of it was created or changed in this frame, only its edges are checked.
     fn is_due(&self, [a, b, c]: [u32; 3], source: Source) -> bool {
         if [a, b, c].into_iter().any(|corner| self.flags[corner as usize]) {
             return false;
@@ -150,14 +149,14 @@ impl Improvable<'_> {
     }
 }
 
-/// The shortest and the longest that an edge between vertices of two sizes should be.
+/// The range of lengths of an edge between vertices of two sizes: shortest and longest.
 fn between(one: Size, two: Size) -> [f64; 2] {
     let [shortest, longest] = [f64::from(one[0].max(two[0])), f64::from(one[1].min(two[1]))];
-    // Vertices of different kinds, which were not born as neighbours, meet in the middle.
+    // If the sizes do not overlap, since the vertices were not born as neighbours, the mean is taken.
     if shortest <= longest { [shortest, longest] } else { [0.5 * (shortest + longest); 2] }
 }
 
-/// The size of a vertex between two.
+/// The size of a vertex between two others.
 fn mean(one: Size, two: Size) -> Size {
     [0, 1].map(|end| 0.5 * (one[end] + two[end]))
 }
@@ -170,7 +169,7 @@ fn is_short(stretch: f64) -> bool {
     stretch < TOO_SHORT * TOO_SHORT
 }
 
-/// The triangles that may need something, ascending.
+/// Triangles that may be due, ascending.
 fn due(ctx: &Context, mesh: &Improvable<'_>) -> Result<Vec<u32>> {
     let parts: Vec<Vec<u32>> = mesh
         .triangles
@@ -187,7 +186,7 @@ fn due(ctx: &Context, mesh: &Improvable<'_>) -> Result<Vec<u32>> {
     Ok(parts.concat())
 }
 
-/// Adds some triangles to others; ascending, each once.
+/// Adds triangles to others; ascending, each once.
 fn join(near: &mut Vec<u32>, more: &[u32]) {
     if !more.is_empty() {
         near.extend_from_slice(more);
@@ -196,7 +195,7 @@ fn join(near: &mut Vec<u32>, more: &[u32]) {
     }
 }
 
-/// What is done at some triangles.
+/// A pass over some triangles.
 type Pass<T> = fn(&mut T, &[u32]) -> Result<()>;
 
 /// A mesh that is being improved.
@@ -219,7 +218,7 @@ impl Work<'_, '_, '_> {
         Ok(())
     }
 
-    /// Looks at some triangles, and at what changes on the way, in each pass; returns what has changed.
+    /// Runs each pass on some triangles, and on those that change meanwhile; returns the changed ones.
     fn sweep(&mut self, mut near: Vec<u32>) -> Result<Vec<u32>> {
         let mut changed = Vec::new();
         let mut halved = self.split(&near)?;
@@ -276,7 +275,7 @@ impl Work<'_, '_, '_> {
         Ok(())
     }
 
-    /// Takes folds away.
+    /// Removes folds.
     fn unfold(&mut self, near: &[u32]) -> Result<()> {
         for (n, &triangle) in near.iter().enumerate() {
             self.look(n)?;
@@ -300,7 +299,7 @@ impl Work<'_, '_, '_> {
         Ok(())
     }
 
-    /// Moves vertices that were made in this frame.
+    /// Moves vertices created in this frame.
     fn relax(&mut self, near: &[u32]) -> Result<()> {
         let there = near.iter().filter(|triangle| self.fans.is_there(**triangle));
         let mut vertices: Vec<u32> = there.flat_map(|triangle| self.fans.corners(*triangle)).collect();
@@ -317,7 +316,8 @@ impl Work<'_, '_, '_> {
         Ok(())
     }
 
-    /// Edges of triangles that are out of range and not at rest, each once, in the order of their lengths times a sign, then of their vertices.
+    /// Edges of triangles that are out of range and not at rest, each once, in the order of their lengths times a sign, then of their
+    /// vertices.
     fn edges(&self, near: &[u32], is_out: fn(f64) -> bool, sign: f64) -> Vec<[u32; 2]> {
         let mut edges = Vec::new();
         for &triangle in near.iter().filter(|triangle| self.fans.is_there(**triangle)) {

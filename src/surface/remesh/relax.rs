@@ -1,14 +1,14 @@
-//! Vertices that were made in this frame move along the surface toward the middle of their neighbours: edges and angles become even.
+//! Vertices created in this frame move along the surface toward the middle of their neighbours: edges and angles become even.
 
 use super::fans::Fans;
 use super::shape::{is_upright, least_angle, normal};
 use crate::geometry::DVec3;
 
-/// Share of the way that a vertex moves.
+/// Fraction of the displacement to the neighbours' middle that a vertex moves at once.
 const SHARE: f64 = 0.5;
 
 impl Fans<'_, '_> {
-    /// Where a vertex that was made in this frame should lie along the surface; none where nothing is gained, or it is to stay.
+    /// The relaxed position along the surface of a vertex created in this frame; none if nothing is gained, or the vertex must stay.
     pub fn relaxed(&self, vertex: u32) -> Option<DVec3> {
         let fan = self.around(vertex);
         if self.has_origin(vertex) || fan.is_empty() {
@@ -21,7 +21,7 @@ impl Fans<'_, '_> {
             if self.is_whole(triangle) || corners.iter().any(|&corner| self.is_flagged(corner)) {
                 return None;
             }
-            // Each neighbour is in two triangles.
+            // Each neighbour is shared by two triangles.
             sum += corners.iter().map(|&corner| self.position(corner)).sum::<DVec3>() - position;
             across += normal(&self.positions(triangle));
         }

@@ -2,7 +2,7 @@
 
 use crate::geometry::DVec3;
 
-/// Least cosine between the normals of a triangle before and after a change: beyond that it turns over.
+/// Minimum cosine between the normals of a triangle before and after a change: below it the triangle turns over.
 const UPRIGHT: f64 = 0.2;
 
 /// A normal of a triangle, as long as twice its area.
@@ -17,7 +17,7 @@ pub(super) fn quality(corners: &[DVec3; 3]) -> f64 {
     if square > 0.0 { normal(corners).norm() / square } else { 0.0 }
 }
 
-/// Smallest angle of a triangle (degrees): that between its two longer edges. 0 where one of these has no length.
+/// Smallest angle of a triangle (degrees): that between its two longest edges. 0 if one of these has no length.
 pub(super) fn least_angle(corners: &[DVec3; 3]) -> f64 {
     let [a, b, c] = corners;
     let mut lengths = [(b - a).norm(), (c - b).norm(), (a - c).norm()];
@@ -26,7 +26,7 @@ pub(super) fn least_angle(corners: &[DVec3; 3]) -> f64 {
     if product > 0.0 { libm::asin((normal(corners).norm() / product).min(1.0)).to_degrees() } else { 0.0 }
 }
 
-/// Whether a triangle looks the same way after a change of its corners, more or less.
+/// Whether a triangle keeps roughly the same orientation after a change of its corners.
 pub(super) fn is_upright(old: &[DVec3; 3], new: &[DVec3; 3]) -> bool {
     let [before, after] = [old, new].map(normal);
     before.dot(&after) > UPRIGHT * before.norm() * after.norm()

@@ -1,27 +1,27 @@
-//! Which edges have changed of late. An edge that is out of range is left alone while it rests: it was tried when it came to be so, and
-//! what trembles around a limit would be remade in every frame.
+//! Which edges have changed recently. An edge that is out of range is left alone while it rests: improvement was tried when it left the
+//! range, and an edge that jitters around a limit would be remeshed in every frame.
 
 use super::{Improvable, TOO_LONG, TOO_SHORT};
 use crate::geometry::DVec3;
 
-/// Change of a length since the reference from which on an edge is not at rest (targets, and [`Improvable::tremble`]). Particles at
-/// rest that tremble by 0.02 spacings change lengths by up to 0.02 targets, and by 0.01 spacings.
+/// Change of a length since the reference from which on an edge is not at rest (targets, and [`Improvable::tremble`]). Particles at rest
+/// that jitter by 0.02 spacings change lengths by up to 0.02 targets, and by 0.01 spacings.
 const STRAIN: f64 = 0.04;
 /// Displacement since the reference up to which a vertex is at rest ([`Improvable::tremble`]): 0.3 spacings. On a sheet half a spacing
-/// thick, beyond whose particles fits reach far, particles that tremble by 0.02 spacings displace vertices by up to 0.26.
+/// thick, where fits extrapolate far beyond the particles, a jitter of 0.02 spacings displaces vertices by up to 0.26.
 const STILL: f64 = 30.0;
-/// Of a liquid that creeps, an edge that changes more slowly is looked at as well when it gets so many times out of range, and so many
-/// times farther each time.
+/// In a creeping liquid, an edge that changes more slowly is checked too each time it crosses one of a series of limits: the first is this
+/// many times out of range, each following one this many times farther.
 const BEYOND: [f64; 2] = [4.0 / 3.0, 1.5];
-/// How many times farther out these limits are for an edge whose ends are at rest. What is in motion is divided or collapses as it gets
-/// to a limit, so that edges come to rest a little within it, and tremble across it: not as far as to this one.
+/// Factor on these limits for an edge whose ends are at rest. Moving edges are split or collapsed when they reach a limit, so that edges
+/// come to rest slightly within it and jitter across it, but not as far as this one.
 const AT_REST: f64 = 1.25;
-/// Limits that are told apart.
+/// Maximum number of limits.
 const LIMITS: u32 = 64;
 
 impl Improvable<'_> {
-    /// Whether an edge is of a vertex that was made in this frame, or its length has changed since the reference by more than what
-    /// particles at rest do. Where that is not known (not finite) it has.
+    /// Whether an edge has an end that was created in this frame, or its length has changed since the reference by more than jitter
+    /// explains. If the change is unknown (not finite), it is strained.
     pub(super) fn is_strained(&self, ends: [u32; 2]) -> bool {
         let [a, b] = ends.map(|end| end as usize);
         if self.origins[a].is_none() || self.origins[b].is_none() {
@@ -33,7 +33,7 @@ impl Improvable<'_> {
         let [shortest, longest] = self.target(ends);
         let target = if now > longest { longest } else { shortest };
         let change = (now - before).abs();
-        // Particles that are where they were strain nothing, however much a fit through few of them says so.
+        // Particles that have not moved cause no strain, even if a fit through few of them says so.
         let is_still = |at: usize| drift(at).norm() <= STILL * self.tremble;
         let is_still = is_still(a) && is_still(b);
         let rests = is_still || change <= (STRAIN * target).max(self.tremble);
@@ -42,7 +42,7 @@ impl Improvable<'_> {
     }
 }
 
-/// How many of the limits, so many times farther out, a length (targets) is beyond.
+/// How many of the limits, scaled by `farther`, a length (targets) is beyond.
 fn limits(length: f64, farther: f64) -> u32 {
     let out = (length / TOO_LONG).max(TOO_SHORT / length);
     let (mut count, mut limit) = (0, BEYOND[0] * farther);
@@ -68,7 +68,7 @@ mod tests {
 
     #[test]
     fn an_edge_rests_until_it_changes_or_creeps_far_out() {
-        // Two vertices 1.6 targets apart, of which the second came from a position this much nearer.
+        // Two vertices 1.6 targets apart, of which the second was this much nearer before.
         let is_strained = |length: f64, nearer: f32, tremble: f64| {
             let positions = vec![DVec3::zeros(), DVec3::x() * length, DVec3::y()];
             let mut body = Body::of(positions, vec![[0, 1, 2]]);
@@ -81,7 +81,7 @@ mod tests {
         assert!(is_strained(1.6, 0.05, 0.0) && is_strained(1.6, -0.05, 0.0) && !is_strained(1.6, 0.05, 0.1));
         assert!(is_strained(2.01, 0.02, 0.1) && !is_strained(2.05, 0.02, 0.1));
         assert!(is_strained(1.6, f32::NAN, 0.0));
-        // It is back from beyond a limit: that is no reason.
+        // It came back from beyond a limit: that is no reason.
         assert!(!is_strained(1.99, -0.02, 0.1));
     }
 
@@ -97,7 +97,7 @@ mod tests {
         };
         assert!(!is_strained(1.6, 0.29) && !is_strained(1.6, -0.29));
         assert!(is_strained(1.6, 0.31) && is_strained(1.6, -0.31));
-        // What only trembles about a limit at which moving edges were divided does not cross the one that it has at rest.
+        // An edge that only jitters about a limit of moving edges does not cross the one at rest.
         assert!(is_strained(2.55, 0.29) && !is_strained(2.05, 0.29) && !is_strained(2.85, 0.29));
         assert!(is_strained(1.6, f32::NAN));
     }

@@ -1,4 +1,4 @@
-//! Meshes that were stretched and squeezed, and what improvement makes of them.
+//! Improvement of stretched and squeezed meshes.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -10,10 +10,10 @@ use crate::geometry::check::topology::Topology;
 use crate::geometry::test_meshes;
 use crate::surface::remesh::*;
 
-/// The drift of a vertex of which nothing is known: so large that no edge rests, and equal to itself as NaN is not.
+/// The drift of a vertex of which nothing is known: so large that no edge rests, and, unlike NaN, equal to itself.
 const UNKNOWN: [f32; 3] = [f32::INFINITY; 3];
 
-/// A mesh with all that is improved along with it.
+/// A mesh with all arrays that are improved along with it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Body {
     pub positions: Vec<DVec3>,
@@ -27,7 +27,7 @@ pub(super) struct Body {
 }
 
 impl Body {
-    /// As it is born; how its vertices moved before is not known.
+    /// A mesh at birth, with unknown earlier displacements.
     pub fn of(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
         Self {
             sizes: sizes(&positions, &triangles),
@@ -54,7 +54,7 @@ impl Body {
         }
     }
 
-    /// Checks that arrays are in step and that the mesh is closed.
+    /// Checks that arrays have matching lengths and that the mesh is closed.
     pub fn check(&self) {
         let vertices = self.positions.len();
         let counts = [self.sizes.len(), self.drifts.len(), self.origins.len(), self.flags.len()];
@@ -72,7 +72,7 @@ impl Body {
         self
     }
 
-    /// Improves it and checks what always holds.
+    /// Improves it and checks the invariants.
     fn improved(mut self, threads: usize) -> (Self, Improvements) {
         let before = self.clone();
         let ctx = Context::new(Pool::new(threads).unwrap());
@@ -126,7 +126,7 @@ impl Body {
         sides.iter().filter(|([a, b], up)| a < b && up.dot(&sides[&[*b, *a]]) < -0.94).count()
     }
 
-    /// As it comes into the next frame.
+    /// Its state at the start of the next frame.
     fn in_next_frame(mut self) -> Self {
         self.origins = (0..self.positions.len() as u32).map(Some).collect();
         self.sources = (0..self.triangles.len() as u32).map(Source::Whole).collect();
@@ -140,7 +140,7 @@ pub(super) fn sphere(levels: u32) -> Body {
     Body::of(positions, triangles)
 }
 
-/// A torus whose edges are not all of a length.
+/// A torus with edges of different lengths.
 fn torus() -> Body {
     const AROUND: u32 = 80;
     const ACROSS: u32 = 24;
@@ -185,7 +185,7 @@ fn stretched_and_squeezed_meshes_get_their_edges_back() {
             angles.sort_unstable_by(f64::total_cmp);
             let least = angles[angles.len() / 100];
             assert!(least >= 10.0, "{case}: {least} degrees");
-            // What was split does not collapse in the next frame, nor the other way round.
+            // Split edges do not collapse in the next frame, nor the reverse.
             let (_, again) = body.in_next_frame().improved(1);
             assert!(again.splits == 0 && again.collapses < 20, "{case}: then {again:?}");
         }
@@ -212,7 +212,7 @@ fn what_rests_stays_bit_for_bit_however_it_is_stretched() {
         let (after, done) = at_reference(by).improved(2);
         assert_eq!(done, Improvements::default());
         assert!(after == at_reference(by));
-        // As it is drawn out since the reference, it is improved as if nothing were known.
+        // If it was stretched since the reference, it is improved as if its drift were unknown.
         let mut body = at_reference(by);
         for (drift, (now, before)) in
             body.drifts.iter_mut().zip(body.positions.iter().zip(&torus().positions))

@@ -1,5 +1,5 @@
-//! The mesh where the liquid has merged or split: matched to the particles' surface (thesis 2.4) and rebuilt (2.5), in the cells
-//! in which it no longer fits; elsewhere it stays as it is.
+//! Changes the mesh where the liquid has merged or split: it is matched to the particles' surface (thesis 2.4) and rebuilt (2.5) in the
+//! cells in which it no longer fits; elsewhere it stays as it is.
 
 use super::hidden::Everywhere;
 use super::mesh_distance::Gamma;
@@ -26,62 +26,63 @@ pub struct Unfit<'a> {
     pub triangles: &'a [[u32; 3]],
     /// Vertices whose triangles are rebuilt.
     pub flags: &'a [bool],
-    /// Positions of the particles' surface that the mesh should have, and does not (cells).
+    /// Positions of the particles' surface that the mesh should cover, and does not (cells).
     pub bare: &'a [DVec3],
-    /// What it takes to find where it does not fit besides; none: that is not looked for.
+    /// Data for finding all other cells in which it does not fit; none: these are not searched for.
     pub everywhere: Option<Everywhere<'a>>,
 }
 
-/// What a mesh became.
+/// A changed mesh.
 #[derive(Debug, Clone)]
 pub struct Change {
-    /// Positions of vertices (m): those that stayed, in their order, then those that were made.
+    /// Positions of vertices (m): those that stayed, in their order, then new ones.
     pub vertices: Vec<DVec3>,
     /// Triangles, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// For each vertex the vertex that it was; none: it was made.
+    /// For each vertex, its vertex before the change; none: it is new.
     pub origins: Vec<Option<u32>>,
-    /// For each triangle where it comes from.
+    /// For each triangle, where it comes from.
     pub sources: Vec<Source>,
-    /// Positions (m) to which the step took the vertices that there were; after several steps, the first that changed the mesh.
+    /// Positions (m) to which the step took the vertices before the change; after several steps, of the first step that changed the mesh.
     pub before: Vec<DVec3>,
-    /// For each vertex that was made its signed distance from the particles' surface (m); of several steps, in the last.
+    /// For each new vertex, its signed distance from the particles' surface (m); after several steps, in the last.
     pub delta: Vec<f32>,
-    /// For each vertex the lengths (m) of the shortest and of the longest edge around it at its birth.
+    /// For each vertex, the lengths (m) of the shortest and of the longest edge around it at its birth.
     pub sizes: Vec<[f32; 2]>,
-    /// For each vertex its displacement (m) since the reference of [`crate::surface::Tracker`], from which edges at rest are known.
+    /// For each vertex, its displacement (m) since the reference of [`crate::surface::Tracker`], by which edges at rest are recognised.
     pub drifts: Vec<[f32; 3]>,
-    /// What improved the mesh; of several steps, in the last.
+    /// Counts of improvements; after several steps, of the last.
     pub improvements: Improvements,
-    /// Parts without particles that were taken away.
+    /// Count of parts without particles that were removed.
     pub dry: usize,
-    /// Parts with some particles, but fewer than [`crate::surface::Params::min_drop`], that were taken away.
+    /// Count of parts with some particles, but fewer than [`crate::surface::Params::min_drop`], that were removed.
     pub specks: usize,
     /// Cells in which the mesh did not fit.
     pub flagged_cells: usize,
     /// Cells that were rebuilt.
     pub rebuilt_cells: usize,
-    /// How much more was rebuilt than those cells and what they need: 0 nothing, 1 a ring around them, 2 whole parts, 3 everything.
+    /// Rebuild level: how much was rebuilt beyond those cells and what they need: 0 nothing, 1 a ring around them, 2 whole parts, 3
+    /// everything.
     pub rung: usize,
     /// Iterations of the matching.
     pub iterations: usize,
 }
 
-/// By how much lengths change where particles only tremble (spacings), at most.
+/// Maximum change of lengths where particles only jitter (spacings).
 const TREMBLE: f64 = 0.01;
-/// Where the mesh has passed through itself by less than this (cells) it is left alone: mending takes more of it than that is worth.
+/// Where the mesh has passed through itself by less than this (cells) it is left alone: mending would lose more of it than that is worth.
 const DEEP: f64 = 0.25;
-/// Lengths of the shortest and of the longest edge around a vertex that was made (cells).
+/// Lengths of the shortest and of the longest edge around a new vertex (cells).
 const BORN: [f64; 2] = [1.0, 1.0];
 
 impl Change {
-    /// Of a mesh that goes as a whole.
+    /// The change of a mesh that is removed entirely.
     pub(in crate::surface) fn to_nothing(unfit: &Unfit<'_>) -> Self {
         let (vertices, triangles, origins, sources) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Self { vertices, triangles, origins, sources, ..Self::nothing(unfit) }
     }
 
-    /// Of a mesh that stays as it is.
+    /// The change of a mesh that stays as it is.
     fn nothing(unfit: &Unfit<'_>) -> Self {
         Self {
             vertices: unfit.vertices.to_vec(),
@@ -102,8 +103,8 @@ impl Change {
         }
     }
 
-    /// Carries shares (0..=1) over from the vertices before the change to those after it. A vertex that was made gets the mean of its
-    /// neighbours that stayed, 0 if there are none.
+    /// Carries shares (0..=1) over from the vertices before the change to those after it. A new vertex gets the mean of its neighbours that
+    /// stayed, 0 if there are none.
     pub(in crate::surface) fn carried_shares(&self, values: &[f32]) -> Vec<f32> {
         let old = |vertex: u32| self.origins[vertex as usize].map(|at| values[at as usize]);
         let sums: Vec<(f32, u32)> = around(self.origins.len(), &self.triangles, old);
@@ -113,17 +114,17 @@ impl Change {
         (0..).zip(sums).map(mean).collect()
     }
 
-    /// Count of triangles that were made: parts of others among them.
+    /// Count of new triangles, including parts of others.
     pub fn made_triangles(&self) -> usize {
         self.sources.iter().filter(|source| !matches!(source, Source::Whole(_))).count()
     }
 
-    /// Count of triangles that neither are triangles of the mesh before nor parts of one.
+    /// Count of triangles that are neither triangles of the previous mesh nor parts of one.
     pub(in crate::surface) fn rebuilt_triangles(&self) -> usize {
         self.sources.iter().filter(|source| **source == Source::New).count()
     }
 
-    /// What two changes did, one after the other.
+    /// The combination of two successive changes.
     pub fn after(mut self, first: &Self) -> Self {
         self.origins.iter_mut().for_each(|at| *at = at.and_then(|at| first.origins[at as usize]));
         self.sources.iter_mut().for_each(|source| *source = source.after(&first.sources));
@@ -138,7 +139,7 @@ impl Change {
     }
 }
 
-/// Rebuilds a closed mesh where it no longer fits. None where it does everywhere.
+/// Rebuilds a closed mesh where it no longer fits. None if it fits everywhere.
 ///
 /// # Errors
 /// Vertices too far apart for the grid; more memory than the context allows; cancel.
@@ -158,7 +159,7 @@ pub fn change(
     let in_cells: Vec<DVec3> = unfit.vertices.iter().map(|position| lattice.to_cells(*position)).collect();
     let fixed = in_cells.iter().map(|position| lattice.fix(*position)).collect::<Result<Vec<_>>>()?;
     let (shape, flagged) = ctx.phase("flag", || {
-        // Some 100 bytes for each edge of the grid, of which there are up to 1.7 for a cell's face.
+        // Some 100 bytes for each edge of the grid, of which there are up to 1.7 for each cell face's area of the mesh.
         let edges = |[a, b, c]: [DVec3; 3]| (b - a).cross(&(c - a)).norm() / 2.0;
         let faces: f64 =
             unfit.triangles.iter().map(|names| edges(names.map(|name| in_cells[name as usize]))).sum();
@@ -213,10 +214,9 @@ pub fn change(
     }))
 }
 
-/// Takes parts with too few particles away, improves a mesh (thesis 2.6), also where it was changed, and measures the vertices
-/// that were made. Sizes, and drifts up to now, are those of the mesh before the change; vertices that were made keep a distance of at most `most` (m): what lies
-/// farther from the particles' surface is no detail, and moves there, or is rebuilt again, in the next frame. None where nothing has
-/// changed.
+/// Removes parts with too few particles, improves a mesh (thesis 2.6), including where it was changed, and measures the new vertices.
+/// `sizes`, and `drifts` up to now, are those of the mesh before the change; new vertices keep a distance of at most `most` (m): anything
+/// farther from the particles' surface is no detail, and is moved there, or rebuilt again, in the next frame. None if nothing has changed.
 ///
 /// # Errors
 /// Cancel.
@@ -264,7 +264,7 @@ pub fn improved(
     Ok(Some(change))
 }
 
-/// The cells in which the mesh does not fit: those of triangles around flagged vertices, those of the positions that it should have, and
+/// The cells in which the mesh does not fit: those of triangles around flagged vertices, those of the positions that it should cover, and
 /// those in which it has passed through itself.
 fn flagged(unfit: &Unfit<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
     let mut set = CellSet::default();

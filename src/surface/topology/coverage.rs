@@ -1,8 +1,8 @@
-//! Positions of the particles' surface that the mesh does not cover, though it covers others of the same part: a bridge that has just
-//! grown between two bodies, the rim of a hole. They reveal a change before a vertex jumps there. The thesis (2.3.3) has no such
-//! early test: a thread that forms between vertices moves none of them.
+//! Positions of the particles' surface that the mesh does not cover, on parts that it covers elsewhere: a bridge that has just grown between
+//! two bodies, the rim of a hole. They reveal a change before a vertex jumps there. The thesis (2.3.3) has no such early test: a thread that
+//! forms between vertices moves none of them.
 //!
-//! What covers the surface is the mesh of the feet: each vertex without its detail. Where nothing changes it lies on the surface.
+//! The surface is covered by the mesh of the feet: each vertex without its detail. Where nothing changes, that mesh lies on the surface.
 
 use std::collections::HashMap;
 
@@ -18,16 +18,16 @@ use crate::surface::level_set::implicit::{Implicit, SIDE};
 use crate::surface::level_set::isosurface::Isosurface;
 use crate::surface::particles::grid::cell_of;
 
-/// A position of the surface is covered if a triangle of feet is so near (spacings; a cell at least).
+/// A position of the surface is covered if a triangle of feet is within this distance (spacings; a cell at least).
 const SLACK: f64 = 0.5;
-/// Vertices whose feet are so near to an uncovered position are beside it (spacings; two cells at least).
+/// A vertex is beside an uncovered position if its foot is within this distance of it (spacings; two cells at least).
 const BESIDE: f64 = 1.0;
-/// Factor by which `BESIDE` is larger at the first frame. Gaps of that frame are no change, but look a little larger or smaller as the
+/// Factor by which `BESIDE` is larger at the first frame. Gaps of that frame are no change, but their size seems to vary slightly as the
 /// surface moves through the grid.
 const FIRST: f64 = 2.0;
-/// A triangle of feet over more bins than this on an axis does not lie on the surface.
+/// A triangle of feet that spans more bins than this on an axis does not lie on the surface.
 const LONG: f64 = 1024.0;
-/// Vertices, positions or triangles between looks for a cancel.
+/// Vertices, positions or triangles between two checks for a cancel.
 const GRAIN: usize = 2048;
 
 /// The mesh without its detail, on the particles' surface.
@@ -37,12 +37,12 @@ pub struct Cover<'a> {
     pub triangles: &'a [[u32; 3]],
     /// Initial distance between particles (cells).
     pub spacing: f64,
-    /// Whether it is as it was given.
+    /// Whether this is the first frame.
     pub is_first: bool,
 }
 
 impl Cover<'_> {
-    /// Whether each vertex is beside a position of the surface that is not covered, and these positions (cells).
+    /// Whether each vertex is beside an uncovered position of the surface, and these positions (cells).
     ///
     /// # Errors
     /// Cancel.
@@ -76,12 +76,12 @@ impl Cover<'_> {
         Ok((flags.concat(), bare))
     }
 
-    /// How near to an uncovered position a vertex' foot is beside it (cells).
+    /// Maximum distance of a vertex' foot from an uncovered position beside it (cells).
     pub fn reach(&self) -> f64 {
         (BESIDE * self.spacing).max(2.0) * if self.is_first { FIRST } else { 1.0 }
     }
 
-    /// Those of some places (cells) that no triangle of feet is near.
+    /// Those positions (cells) that are near no triangle of feet.
     fn bare(&self, ctx: &Context, positions: &[DVec3]) -> Result<Vec<DVec3>> {
         if positions.is_empty() {
             return Ok(Vec::new());
@@ -95,7 +95,7 @@ impl Cover<'_> {
             for (triangle, index) in triangles.iter().zip((chunk * GRAIN) as u32..) {
                 let Some(corners) = self.corners(triangle) else { continue };
                 each_bin(corners, slack, |bin| bins.push(bin));
-                // Parts of a long triangle share most of theirs.
+                // Parts of a long triangle share most of their bins.
                 bins.sort_unstable();
                 bins.dedup();
                 out.extend(bins.drain(..).filter(|bin| wanted.has(*bin)).map(|bin| (bin, index)));
@@ -144,7 +144,7 @@ fn doubtful(phi: &Implicit, surface: &Isosurface, parts: &Parts, trodden: &Marks
     (0..surface.vertices() as u32).into_par_iter().with_min_len(4096).filter_map(position).collect()
 }
 
-/// What lies in cubes of an edge (cells).
+/// Items in cubes of an edge (cells).
 struct Bins {
     edge: f64,
     /// Ascending, each once.
@@ -158,10 +158,10 @@ impl Bins {
         Self { edge, items }
     }
 
-    /// What lies in the bin of a position (cells) and in those around it.
+    /// Items in the bin of a position (cells) and in those around it.
     fn near(&self, position: &DVec3) -> impl Iterator<Item = u32> {
         let [x, y, z] = bin_of(position, self.edge);
-        // The three along z are neighbours in the order.
+        // Three neighbours along z are contiguous in the order.
         (x - 1..=x + 1).flat_map(move |x| (y - 1..=y + 1).map(move |y| (x, y))).flat_map(move |(x, y)| {
             let from = self.items.partition_point(|(bin, _)| *bin < [x, y, z - 1]);
             self.items[from..].iter().take_while(move |(bin, _)| *bin <= [x, y, z + 1]).map(|(_, item)| *item)
@@ -169,13 +169,13 @@ impl Bins {
     }
 }
 
-/// Calls `see` with bins of an edge (cells) that together hold a triangle; it is divided until its box is that of a few.
+/// Calls `see` with bins of an edge (cells) that together contain a triangle; it is subdivided until each piece spans only a few bins.
 fn each_bin(triangle: [DVec3; 3], edge: f64, mut see: impl FnMut(Coord)) {
     let [a, b, c] = &triangle;
     if (a.sup(b).sup(c) - a.inf(b).inf(c)).max() > LONG * edge {
         return;
     }
-    // Most triangles are no larger than a few bins: the list is not allocated for these.
+    // Most triangles span only a few bins: the list is not allocated for these.
     let (mut due, mut next) = (Vec::new(), Some(triangle));
     while let Some([a, b, c]) = next {
         let [low, high] = [bin_of(&a.inf(&b).inf(&c), edge), bin_of(&a.sup(&b).sup(&c), edge)];
@@ -197,7 +197,7 @@ fn each_bin(triangle: [DVec3; 3], edge: f64, mut see: impl FnMut(Coord)) {
     }
 }
 
-/// Marked bins or cells: a bit for each of those in a patch.
+/// Marked bins or cells, as one bit each in patches.
 #[derive(Default)]
 struct Marks {
     patches: HashMap<Coord, u64>,

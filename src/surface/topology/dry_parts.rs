@@ -1,4 +1,4 @@
-//! Parts of the mesh without liquid, crumbs that were left where it went, and those with too little of it. They are taken away.
+//! Removes parts of the mesh without liquid, crumbs left where it disappeared, and parts with too little of it.
 
 use super::change::Change;
 use super::particle_count::{Bounds, Crowd, are_inside, seen_from};
@@ -9,10 +9,10 @@ use crate::geometry::mesh::{renumbered, used};
 use crate::mesh_repair::Source;
 
 impl Change {
-    /// Takes away the parts of the mesh with a volume over 0 that hold too few particles, and what hollows are in them. Returns how many
-    /// held none, and how many some; hollows are not counted. A mesh of one part stays.
+    /// Removes the parts of the mesh with a volume over 0 that hold too few particles, and the hollows in them. Returns the count of those
+    /// that held none, and of those that held some; hollows are not counted. A mesh of one part stays.
     pub(in crate::surface) fn drop_dry(&mut self, crowd: &Crowd<'_>) -> [usize; 2] {
-        // Mostly there is one.
+        // Mostly there is only one.
         if topology::parts(self.vertices.len(), &self.triangles) < 2 {
             return [0; 2];
         }
@@ -38,7 +38,7 @@ impl Change {
         if gone == [0; 2] {
             return gone;
         }
-        // Parts do not pass through each other, so one corner tells. A part within one of too few particles has too few, too.
+        // Parts do not intersect, so one corner is enough. A part within one with too few particles has too few, too.
         let corners = hollows.iter().filter_map(|hollow| self.corners(hollow).next());
         let firsts: Vec<DVec3> = corners.map(|[first, ..]| first).collect();
         let out_bounds: Vec<Bounds> = out.iter().map(|part| bounds[*part]).collect();
@@ -95,7 +95,7 @@ mod tests {
         on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| low + DVec3::new(x, y, z))))
     }
 
-    /// A ball, from which a drop of 4 particles flies one way and one of 20 the other, and where the middles of these are.
+    /// A ball, from which a drop of 4 particles flies one way and a drop of 20 the other, and the centres of these drops.
     fn splash(frame: i32) -> (Particles, [DVec3; 2]) {
         let way = 3.6 + 0.25 * f64::from(frame);
         let [small, large] = [DVec3::new(way, 0.4, 0.4), DVec3::new(-way - 4.0, 0.4, 0.4)];
@@ -107,7 +107,7 @@ mod tests {
         (numbered(positions), middles)
     }
 
-    /// Follows it to the end: how many specks were taken away, and in each of the last frames the counts of vertices at both drops.
+    /// Follows it to the end: the count of specks removed, and the counts of vertices at both drops in each of the last frames.
     fn followed(min_drop: usize) -> (usize, Vec<[usize; 2]>) {
         let ctx = Context::new(Pool::new(2).unwrap());
         let mut from = splash(0).0;

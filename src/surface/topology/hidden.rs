@@ -1,16 +1,16 @@
-//! Topology errors that are invisible at vertices (thesis 2.8, "at every frame"): where the mesh is not where the particles' surface is, by more than its
+//! Topology errors that are invisible at vertices (thesis 2.8, "at every frame"): the mesh is farther from the particles' surface than its
 //! detail, though each of its vertices was projected.
 //!
-//! A vertex that was projected lies as far from phi = 0 as it keeps. So what is hidden lies between vertices, or has none, or never
-//! had a distance to keep:
+//! A projected vertex is at its kept distance from phi = 0. So a hidden error lies between vertices, has no vertices, or is at vertices that
+//! never had a distance to keep:
 //!
 //! | what | found by |
 //! |---|---|
-//! | liquid without a mesh, a mesh without liquid | nodes inside of the one and outside of the other, farther from phi = 0 than vertices around keep |
+//! | liquid without a mesh, a mesh without liquid | nodes inside only one of the two, farther from phi = 0 than vertices around keep |
 //! | needles, and films across a gap | positions on triangles, farther from phi = 0 than the corners keep |
-//! | hollows of the mesh in which there is liquid | closed parts with a volume below 0 that lie inside of phi |
+//! | hollows of the mesh that contain liquid | closed parts with a volume below 0 that lie inside phi |
 //!
-//! Bubbles and drops that the mesh does not cover are known anyway (`topology/uncovered_parts.rs`).
+//! Bubbles and drops that the mesh does not cover are known already (`topology/uncovered_parts.rs`).
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -31,30 +31,30 @@ use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::sampler::Sampler;
 use crate::surface::particles::grid::cell_of;
 
-/// How much farther from phi = 0 than detail reaches the mesh must be (spacings; a cell at least).
+/// How much farther from phi = 0 than its detail the mesh must be to be flagged (spacings; a cell at least).
 const SLACK: f64 = 0.5;
-/// Triangles between looks for a cancel.
+/// Triangles between two checks for a cancel.
 const GRAIN: usize = 2048;
-/// A triangle in more blocks than this is looked for from each block.
+/// A triangle in more blocks than this is tested in each block instead of being listed there.
 const LARGE: i64 = 512;
-/// Vertices are rounded by less than this (cells).
+/// Upper bound on the rounding of vertices (cells).
 const ROUNDED: f64 = 0.01;
-/// Most positions on a triangle along an axis.
+/// Maximum number of positions on a triangle along an axis.
 const POSITIONS: f64 = 4096.0;
 
-/// What it takes to find where a mesh does not fit, all over it.
+/// Data for finding where a mesh does not fit, anywhere on it.
 pub struct Everywhere<'a> {
     /// The distance that each vertex keeps (m); NaN: it has none.
     pub kept: &'a [f32],
     /// Initial distance between particles (cells).
     pub spacing: f64,
-    /// Bounds (cells) of drops that the mesh should not have.
+    /// Bounds (cells) of drops that get no mesh.
     pub specks: &'a [Bounds],
 }
 
 impl Everywhere<'_> {
-    /// Adds the cells in which a mesh does not fit and no vertex says so. Vertices have these positions (cells from the lattice's origin);
-    /// `phi` and its distances are on the same grid.
+    /// Adds the cells in which a mesh does not fit though no vertex is flagged. Vertices have these positions (cells from the lattice's
+    /// origin); `phi` and its distances are on the same grid.
     ///
     /// # Errors
     /// Cancel.
@@ -67,7 +67,7 @@ impl Everywhere<'_> {
         set: &mut CellSet,
     ) -> Result<()> {
         let cell = distances.cell() as f32;
-        // No number is less than 0.
+        // NaN becomes 0.
         let keeps = self.kept.iter().map(|delta| (delta.abs() / cell).max(0.0)).collect();
         let slack = (SLACK * self.spacing).max(1.0) as f32;
         let origin = lattice.origin;
@@ -90,7 +90,7 @@ struct Compared<'a> {
     in_cells: &'a [DVec3],
     /// See [`Everywhere::kept`].
     kept: &'a [f32],
-    /// The size of that (cells); 0 where there is none.
+    /// The magnitude of that (cells); 0 if there is none.
     keeps: Vec<f32>,
     /// Cells.
     slack: f32,
@@ -100,7 +100,7 @@ struct Compared<'a> {
     distances: &'a Distances,
 }
 
-/// A triangle in many blocks: the least and the greatest of them, and the most that its corners keep (cells).
+/// A triangle in many blocks: the lowest and the highest of them, and the maximum that its corners keep (cells).
 struct Large {
     low: Coord,
     high: Coord,
@@ -108,22 +108,22 @@ struct Large {
 }
 
 impl Large {
-    /// Whether a block is so many blocks from it at most.
+    /// Whether a block is within `by` blocks of it.
     fn is_near(&self, block: Coord, by: i32) -> bool {
         (0..3).all(|axis| (self.low[axis] - by..=self.high[axis] + by).contains(&block[axis]))
     }
 }
 
-/// What triangles are in blocks.
+/// Triangles by block.
 #[derive(Default)]
 struct Passed {
-    /// The most that corners of triangles in a block keep (cells).
+    /// Maximum that corners of triangles in a block keep (cells).
     keeps: BTreeMap<Coord, f32>,
     large: Vec<Large>,
 }
 
 impl Compared<'_> {
-    /// Nodes inside of the mesh and outside of phi, or the other way round, farther from phi = 0 than detail there.
+    /// Nodes inside the mesh and outside phi, or the reverse, farther from phi = 0 than the detail there.
     fn differing(&self, ctx: &Context) -> Result<Vec<Coord>> {
         let passed = self.passed(ctx)?;
         let origin = self.origin.map(|at| at >> 3);
@@ -154,7 +154,7 @@ impl Compared<'_> {
         let known = self.distances.find(there).map(|slot| self.distances.values(slot));
         let is_passed =
             passed.keeps.contains_key(&block) || passed.large.iter().any(|large| large.is_near(block, 0));
-        // Where the mesh does not pass, all nodes are on one side of it.
+        // Where no triangle passes, all nodes are on the same side of the mesh.
         let first = self.is_inside(node(block, 0));
         let differs = |at: usize| {
             let node = node(block, at);
@@ -165,7 +165,7 @@ impl Compared<'_> {
         (0..VOXELS).filter_map(differs).collect()
     }
 
-    /// The blocks in which triangles are.
+    /// The blocks that contain triangles.
     fn passed(&self, ctx: &Context) -> Result<Passed> {
         let in_blocks = |triangles: &[[u32; 3]]| {
             ctx.check()?;
@@ -204,7 +204,7 @@ impl Compared<'_> {
             let mut out = Vec::new();
             for names in triangles {
                 let [a, b, c] = longest_first(self.corners(names));
-                // Short ones cannot be farther than corners that are where they should be.
+                // A short triangle cannot stray farther than its corners, if these are where they should be.
                 let is_known = names.iter().all(|name| !self.kept[*name as usize].is_nan());
                 if is_known && (b - a).norm() <= 2.0 * f64::from(self.slack) {
                     continue;
@@ -227,7 +227,7 @@ impl Compared<'_> {
         Ok(lists.concat())
     }
 
-    /// Adds the cells of hollows of the mesh that lie inside of phi, with all that is in them.
+    /// Adds the cells of hollows of the mesh that lie inside phi, with everything in them.
     fn hollows(&self, ctx: &Context, set: &mut CellSet) -> Result<()> {
         let triangles = &self.shape.triangles;
         if parts(self.in_cells.len(), triangles) < 2 {
@@ -250,7 +250,7 @@ impl Compared<'_> {
         Ok(())
     }
 
-    /// Adds the cells of a hollow's surface and those with nodes in it.
+    /// Adds the cells of a hollow's surface and the cells with nodes in it.
     fn fill(&self, surface: Vec<Coord>, set: &mut CellSet) {
         let of = |pick: fn(i32, i32) -> i32| {
             surface.iter().copied().reduce(|a, b| [0, 1, 2].map(|axis| pick(a[axis], b[axis])))
@@ -278,7 +278,7 @@ impl Compared<'_> {
         }
     }
 
-    /// Whether a node is inside of the mesh.
+    /// Whether a node is inside the mesh.
     fn is_inside(&self, node: Coord) -> bool {
         self.shape.pierces.winding(node) > 0
     }
@@ -306,13 +306,13 @@ impl Compared<'_> {
         names.map(|name| self.in_cells[name as usize])
     }
 
-    /// The most that corners keep (cells).
+    /// Maximum that corners keep (cells).
     fn most_kept(&self, names: &[u32; 3]) -> f32 {
         names.iter().map(|name| self.keeps[*name as usize]).fold(0.0, f32::max)
     }
 }
 
-/// Raises what is kept in a block.
+/// Raises the maximum of a block.
 fn raise(all: &mut BTreeMap<Coord, f32>, block: Coord, keeps: f32) {
     let most = all.entry(block).or_default();
     *most = most.max(keeps);
@@ -322,7 +322,7 @@ fn plus(a: Coord, b: Coord) -> Coord {
     [0, 1, 2].map(|axis| a[axis] + b[axis])
 }
 
-/// A corner of a cell, seen from its first node.
+/// A corner of a cell, relative to its first node.
 fn corner(n: i32) -> Coord {
     [n >> 2, n >> 1 & 1, n & 1]
 }
@@ -332,7 +332,7 @@ fn cells_at(node: Coord) -> impl Iterator<Item = Coord> {
     (0..8).map(move |n| plus(node, corner(n).map(|at| -at)))
 }
 
-/// The corners of a triangle so that its longest edge is that from the first to the second.
+/// The corners of a triangle, rotated so that its longest edge is the first.
 fn longest_first([a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
     match [(a - b).norm_squared(), (b - c).norm_squared(), (c - a).norm_squared()] {
         [ab, bc, ca] if ab >= bc && ab >= ca => [a, b, c],
@@ -341,7 +341,7 @@ fn longest_first([a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
     }
 }
 
-/// Calls `see` with positions on a triangle whose first edge is its longest, a cell apart or less.
+/// Calls `see` with positions on a triangle whose first edge is its longest, at most a cell apart.
 fn each_position([a, b, c]: [DVec3; 3], mut see: impl FnMut(DVec3)) {
     let length = (b - a).norm();
     let height = if length > 0.0 { (b - a).cross(&(c - a)).norm() / length } else { 0.0 };
@@ -370,7 +370,7 @@ mod tests {
         Context::new(Pool::new(2).unwrap())
     }
 
-    /// What becomes of a mesh on particles that stay where they are.
+    /// A mesh tracked along particles that stay where they are.
     fn followed(ctx: &Context, mesh: &TriMesh, positions: &[DVec3], every: bool) -> Tracker {
         let particles = numbered(positions.to_vec());
         let params = Params { rebuild: true, every, ..Params::for_spacing(1.0) };
@@ -427,7 +427,7 @@ mod tests {
         let ctx = context();
         let positions = two_balls(3.5, DVec3::new(-7.0, 0.0, 0.0)).positions;
         let mut mesh = own_surface(&ctx, &positions);
-        // The tip of a triangle that looks at the other ball is pulled up to it.
+        // The tip of a triangle that faces the other ball is pulled up to it.
         let x = |name: u32| mesh.positions[name as usize].x;
         let middle = |triangle: &usize| mesh.triangles[*triangle].map(x).iter().sum::<f32>();
         let left = (0..mesh.triangles.len()).filter(|triangle| middle(triangle) < 0.0);

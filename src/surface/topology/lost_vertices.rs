@@ -1,12 +1,12 @@
 //! Vertices that have lost the surface: particles that fly apart carry them far away, and the triangles between would be spikes through
-//! all that is there. Where the mesh is rebuilt anyway they go with the vertices around them instead.
+//! everything else. Where the mesh is rebuilt anyway, they follow the vertices around them instead.
 
 use crate::geometry::DVec3;
 
-/// How far from a vertex that found the surface others follow it (edges).
+/// Maximum distance from a vertex that found the surface at which others follow it (edges).
 const RINGS: usize = 16;
 
-/// Moves vertices (m) that are lost as those around them have moved from `before` on, ring by ring; those with none around stay.
+/// Moves lost vertices (m) by the displacement since `before` of those around them, ring by ring; those with none around stay.
 pub fn gather(before: &[DVec3], triangles: &[[u32; 3]], is_lost: &[bool], vertices: &mut [DVec3]) {
     let near: Vec<&[u32; 3]> =
         triangles.iter().filter(|corners| corners.iter().any(|corner| is_lost[*corner as usize])).collect();
@@ -59,7 +59,7 @@ mod tests {
         for (position, first) in vertices.iter().zip(&before) {
             assert!((position - first - DVec3::y()).norm() < 1e-12, "{position:?}");
         }
-        // Without any that is known nothing moves.
+        // If no vertex is known, none moves.
         let mut alone = vertices.clone();
         gather(&before, &triangles, &[true; 6], &mut alone);
         assert!(alone == vertices);

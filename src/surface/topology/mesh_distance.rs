@@ -1,5 +1,5 @@
-//! Gamma, the signed distance from the mesh, near the cells in which the mesh no longer fits the particles, matched to phi there
-//! (thesis 2.4): what of the grid will be inside of the rebuilt mesh.
+//! Gamma, the signed distance from the mesh, near the cells in which the mesh no longer fits the particles, matched to phi there (thesis
+//! 2.4): it determines which nodes will be inside the rebuilt mesh.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -19,15 +19,15 @@ use crate::numeric::lanes::LANES;
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::{Implicit, SIDE};
 
-/// How far from the mesh Gamma is known (cells): the thesis' fixed cells reach sqrt(3).
+/// Distance from the mesh up to which Gamma is known (cells): the thesis' fixed cells reach sqrt(3).
 const KNOWN: f32 = 2.0;
-/// How far from flagged nodes Gamma may change (cells): at most a block.
+/// Distance from flagged nodes within which Gamma may change (cells): at most a block.
 const REACH: i32 = 8;
-/// Bytes of a block: its distances twice, and what its nodes are in the matching.
+/// Bytes of a block: its distances twice, and its nodes in the matching.
 const BYTES: usize = VOXELS * (2 * 4 + 2 * 28);
 /// What needs the memory, for messages.
 const WHAT: &str = "the mesh's change (larger cells need less)";
-/// Least distance of a node from the mesh (cells), so that it has a side.
+/// Minimum distance of a node from the mesh (cells), so that it is inside or outside.
 const LEAST: f32 = 1e-6;
 /// All nodes of a block.
 const ALL: [u64; DIM] = [u64::MAX; DIM];
@@ -38,17 +38,17 @@ pub struct Gamma<'a> {
     slots: HashMap<Coord, u32>,
     /// Blocks, counted from the lattice's origin, ascending.
     blocks: Vec<Coord>,
-    /// cells.
+    /// Cells.
     values: Vec<Values>,
-    /// Nodes whose Gamma is no longer the mesh's own: a bit each.
+    /// Nodes whose Gamma differs from the mesh's own: a bit each.
     changed: Vec<[u64; DIM]>,
     /// Iterations of the matching.
     pub iterations: usize,
 }
 
 impl<'a> Gamma<'a> {
-    /// Matches it around flagged cells. Vertices have these positions (cells from the lattice's origin); `phi` and its distances are
-    /// on the same grid.
+    /// Matches Gamma around flagged cells. Vertices have these positions (cells from the lattice's origin); `phi` and its distances are on
+    /// the same grid.
     ///
     /// # Errors
     /// More memory than the context allows; cancel.
@@ -128,7 +128,7 @@ impl<'a> Gamma<'a> {
         Some(self.values[slot][offset(x, y, z)])
     }
 
-    /// Nodes that went in or out.
+    /// Nodes that changed sides.
     pub fn turned(&self) -> impl Iterator<Item = Coord> + '_ {
         self.blocks.iter().flat_map(|block| (0..VOXELS).map(move |at| node(*block, at))).filter(|node| {
             self.changed(*node).is_some_and(|gamma| (gamma < 0.0) != (self.shape.pierces.winding(*node) > 0))
@@ -164,7 +164,7 @@ fn is_flagged(flagged: &CellSet, node: Coord) -> bool {
     (0..8).any(|n| flagged.holds([node[0] - (n >> 2), node[1] - (n >> 1 & 1), node[2] - (n & 1)]))
 }
 
-/// phi at a node of a block (of phi's grid) in which no distances are known: their reach, with its sign.
+/// phi at a node of a block (of phi's grid) in which no distances are known: the reach, with the sign of phi.
 pub(in crate::surface) fn far(phi: &Implicit, reach: f32, block: Coord, at: usize) -> f32 {
     let node = node(block, at);
     let patch = node.map(|at| at.div_euclid(SIDE));
@@ -178,7 +178,7 @@ pub(in crate::surface) fn far(phi: &Implicit, reach: f32, block: Coord, at: usiz
     if is_inside { -reach } else { reach }
 }
 
-/// Blocks, or other coordinates, of a box, its ends included.
+/// Blocks, or other coordinates, in a box, including its ends.
 pub(in crate::surface) fn between(low: Coord, high: Coord) -> impl Iterator<Item = Coord> {
     let on = move |axis: usize| low[axis]..=high[axis];
     on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])))
@@ -201,7 +201,7 @@ fn near(
         let high = side(v[0].sup(&v[1]).sup(&v[2]), KNOWN + 1.0);
         let size = (0..3).map(|axis| i64::from(high[axis] - low[axis]) + 1).product::<i64>();
         if size > blocks.len() as i64 {
-            // A spike: its box holds more blocks than there are.
+            // A spike: its box contains more blocks than there are.
             let is_in = |block: &Coord| (0..3).all(|axis| (low[axis]..=high[axis]).contains(&block[axis]));
             let within = blocks.iter().zip(&mut lists).filter(|(block, _)| is_in(block));
             within.for_each(|(_, list)| list.push(triangle));

@@ -1,4 +1,4 @@
-//! Where the mesh of a tracker no longer fits its liquid after a step, and what it becomes.
+//! Where a tracker's mesh no longer fits its liquid after a step, and its change there.
 
 use rayon::prelude::*;
 
@@ -16,7 +16,7 @@ use crate::surface::particles::grid::cell_of;
 use crate::surface::tracker::{Covered, Next, Tracker};
 
 impl Tracker {
-    /// What the mesh becomes where it no longer fits.
+    /// The changed mesh where it no longer fits.
     pub(in crate::surface) fn changed(
         &self,
         ctx: &Context,
@@ -26,7 +26,7 @@ impl Tracker {
         (phi, distances): (&Implicit, &Distances),
         particles: &[DVec3],
     ) -> Result<Option<Change>> {
-        // What never had a distance does not fit from the start: that is no change.
+        // Vertices that never had a distance have not fitted from the start: that is no change.
         let mut flags: Vec<bool> =
             next.flags.iter().zip(&next.delta).map(|(flag, delta)| *flag && !delta.is_nan()).collect();
         self.wait_alone(&mut flags, &covered.bare);
@@ -50,9 +50,8 @@ impl Tracker {
         improved(ctx, &unfit, own, changed, distances, &crowd, farthest * spacing)
     }
 
-    /// Takes the flags off vertices that jump alone, were placed in the last step, and have only covered surface beside them: mostly the
-    /// foot slips over a crease and comes back, and to cut a crease for it takes much of the mesh. What has come to stay is flagged
-    /// again in the next step.
+    /// Unflags vertices that jump alone, were placed in the last step, and have only covered surface beside them: mostly the foot slips over
+    /// a crease and comes back, and cutting a crease for it would lose much of the mesh. Lasting changes are flagged again in the next step.
     fn wait_alone(&self, flags: &mut [bool], bare: &[bool]) {
         if !flags.contains(&true) {
             return;
@@ -71,7 +70,7 @@ impl Tracker {
         }
     }
 
-    /// Becomes what the mesh became.
+    /// Replaces the mesh by the changed one.
     pub(in crate::surface) fn take(&mut self, change: &Change) {
         let mut made = change.delta.iter();
         let delta =

@@ -1,4 +1,4 @@
-//! What has merged and split: where the mesh no longer fits its liquid, and what it becomes there.
+//! Merges and splits: where the mesh no longer fits its liquid, and how it changes there.
 
 pub(in crate::surface) mod change;
 pub(in crate::surface) mod coverage;

@@ -1,7 +1,7 @@
-//! How many particles closed parts of a surface hold: drops, crumbs.
+//! Count of particles in closed parts of a surface: drops, crumbs.
 //!
-//! The particles' surface passes close to those of small drops, and outside of some: of 20 at random positions 10 to 14 lie inside, nearly
-//! all others less than half a spacing from it. So those beside a part count too, if any lies inside.
+//! The particles' surface passes close to the particles of small drops, and some of them lie outside it: of 20 at random positions 10 to 14
+//! lie inside, nearly all others less than half a spacing from it. So those beside a part count too, if any lies inside.
 
 use super::mesh_distance::between;
 use crate::geometry::Coord;
@@ -10,14 +10,14 @@ use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh};
 use crate::surface::particles::grid::cell_of;
 
-/// A direction along which no edges of made meshes run.
+/// A direction along which no edges of new meshes run.
 const ASLANT: DVec3 = DVec3::new(0.5773, 0.6533, 0.4896);
-/// How near to a part a particle is beside it (spacings).
+/// Maximum distance of a particle that is beside a part (spacings).
 const BESIDE: f64 = 0.5;
-/// The longest part of those in bins of one size over the shortest.
+/// Ratio of the longest to the shortest part in bins of one size.
 const SPREAD: f64 = 4.0;
 
-/// Least and greatest position of a part.
+/// Minimum and maximum position of a part.
 pub type Bounds = [DVec3; 2];
 
 /// Particles, of which a part of the mesh must hold a minimum count.
@@ -27,14 +27,14 @@ pub struct Crowd<'a> {
     pub positions: &'a [DVec3],
     /// Initial distance between them (m).
     pub spacing: f64,
-    /// How many a part must hold, at least 1.
+    /// Minimum count in a part, at least 1.
     pub least: usize,
 }
 
 impl Crowd<'_> {
-    /// How many particles each of some closed parts holds, of which these are the bounds (m), counted up to [`Crowd::least`]: 0 if none
-    /// lies inside, else those inside and beside it. `mesh` gives a part's triangles, outward, their positions seen from its least one; it
-    /// is asked where particles come near.
+    /// Count of particles in each of some closed parts, given by their bounds (m), counted up to [`Crowd::least`]: 0 if none lies inside,
+    /// else those inside and beside it. `mesh` gives a part's triangles, turned outward, with positions relative to its minimum corner; it
+    /// is called for parts that particles come near.
     pub fn held(&self, parts: &[Bounds], mesh: impl Fn(usize) -> TriMesh) -> Vec<usize> {
         let mut trees: Vec<Option<Bvh>> = Vec::new();
         trees.resize_with(parts.len(), || None);
@@ -62,7 +62,7 @@ impl Crowd<'_> {
     }
 }
 
-/// Counts the positions within each of some bounds that are of the part, up to as many as it lacks.
+/// Counts the positions within the bounds of each part that belong to it, up to as many as it lacks.
 fn count(
     parts: &[Bounds],
     positions: &[DVec3],
@@ -95,20 +95,20 @@ fn count(
     counts
 }
 
-/// Parts of about one size, in the bins that their bounds touch: up to 8 each.
+/// Parts of similar size, in the bins that their bounds touch: up to 8 each.
 struct Bins {
-    /// Of a bin (m): as long as the longest part.
+    /// Edge of a bin (m): as long as the longest part.
     edge: f64,
     /// Bins with the parts in them, ascending.
     listed: Vec<(Coord, usize)>,
-    /// How many parts are listed.
+    /// Count of listed parts.
     parts: usize,
-    /// How many of them still lack some.
+    /// Count of those that still lack particles.
     open: usize,
 }
 
 impl Bins {
-    /// Those of some parts: a few, for sizes from the least to the greatest.
+    /// Bins for these parts: a few sets, from small to large sizes.
     fn of(bounds: &[Bounds], mut parts: Vec<usize>) -> Vec<Self> {
         let length = |part: usize| (bounds[part][1] - bounds[part][0]).max();
         parts.sort_by(|a, b| length(*a).total_cmp(&length(*b)));
@@ -116,7 +116,7 @@ impl Bins {
         let mut rest = &parts[..];
         while let [first, ..] = rest {
             let most = SPREAD * length(*first);
-            // Never none, whatever the numbers.
+            // At least one, even if lengths are not finite.
             let count = rest.partition_point(|part| length(*part) <= most).max(1);
             let (own, longer) = rest.split_at(count);
             let edge = length(own[count - 1]);
@@ -135,16 +135,16 @@ impl Bins {
         all
     }
 
-    /// The parts in the bin of a position: all whose bounds hold it, and others.
+    /// The parts in the bin of a position: all whose bounds contain it, and others.
     fn near(&self, position: &DVec3) -> impl Iterator<Item = usize> {
-        // The quotient of a position between two others is never outside of theirs.
+        // Division is monotone: a position between two others stays between them.
         let bin = cell_of(&(position / self.edge));
         let first = self.listed.partition_point(|(other, _)| *other < bin);
         self.listed[first..].iter().take_while(move |(other, _)| *other == bin).map(|(_, part)| *part)
     }
 }
 
-/// Which of some places (m) lie inside of any of some closed parts, of which these are the bounds (m); `mesh` as for [`Crowd::held`].
+/// Which positions (m) lie inside any of some closed parts, given by their bounds (m); `mesh` as for [`Crowd::held`].
 pub fn are_inside(positions: &[DVec3], parts: &[Bounds], mesh: impl Fn(usize) -> TriMesh) -> Vec<bool> {
     let mut are = vec![false; positions.len()];
     for (part, bounds) in parts.iter().enumerate() {
@@ -164,7 +164,7 @@ pub fn is_within([low, high]: &Bounds, position: &DVec3) -> bool {
     (0..3).all(|axis| (low[axis]..=high[axis]).contains(&position[axis]))
 }
 
-/// Triangles as a mesh, their positions seen from another; each has corners of its own.
+/// Triangles as a mesh, with positions relative to another; each has its own corners.
 pub fn seen_from(position: DVec3, triangles: &[[DVec3; 3]]) -> TriMesh {
     let positions = triangles.as_flattened().iter().map(|corner| (corner - position).cast()).collect();
     let triangles = (0..triangles.len() as u32).map(|at| [3 * at, 3 * at + 1, 3 * at + 2]).collect();
@@ -175,7 +175,7 @@ pub fn seen_from(position: DVec3, triangles: &[[DVec3; 3]]) -> TriMesh {
 mod tests {
     use super::*;
 
-    /// How many particles are held by a hundred cubes of an edge of 1 along a line, and by a box that holds them all.
+    /// Counts of particles in a hundred cubes with an edge of 1 along a line, and in a box that contains them all.
     fn held(positions: &[DVec3], spacing: f64, least: usize) -> Vec<usize> {
         let mut parts: Vec<Bounds> = (0..100)
             .map(|n| DVec3::new(3.0 * f64::from(n), 0.0, 0.0))
@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn particles_are_counted_in_parts_of_all_lengths() {
-        // One in every second cube, another in each tenth; one between cubes, one outside of all.
+        // One in every second cube, another in every tenth; one between cubes, one outside all.
         let mut positions: Vec<DVec3> = (0..100).filter(|n| n % 2 == 0).map(middle).collect();
         positions.extend((0..100).filter(|n| n % 10 == 0).map(|n| middle(n) + DVec3::repeat(0.1)));
         positions.extend([DVec3::new(1.6, 0.5, 0.5), DVec3::new(0.5, 9.0, 0.5)]);
@@ -220,7 +220,7 @@ mod tests {
             .map(|n| (any(40.0) - DVec3::repeat(20.0), any(sizes[n % 4])))
             .map(|(low, size)| [low, low + size])
             .collect();
-        // Some on the very bounds.
+        // Some exactly on the bounds.
         let mut positions: Vec<DVec3> = (0..3000).map(|_| any(44.0) - DVec3::repeat(22.0)).collect();
         positions.extend(parts.as_flattened());
         let lacking: Vec<usize> = (0..parts.len()).map(|n| n % 3 * 5).collect();
@@ -234,7 +234,7 @@ mod tests {
     #[test]
     fn positions_in_any_part_are_told() {
         let parts = [DVec3::zeros(), DVec3::new(5.0, 0.0, 0.0)].map(|low| [low, low + DVec3::repeat(1.0)]);
-        // The mesh of the second fills a part of its bounds alone.
+        // The mesh of the second fills only a part of its bounds.
         let mesh = |part: usize| TriMesh::cuboid([0.0; 3], [1.0, [1.0, 0.5][part], 1.0]);
         let positions = [0.3, 5.3, 3.0].map(|x| DVec3::new(x, 0.7, 0.6));
         assert_eq!(are_inside(&positions, &parts, mesh), [true, false, false]);
@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn those_beside_count_where_one_is_inside() {
-        // Above the first cube and above the second; inside of the first alone.
+        // Above the first cube and above the second; inside the first only.
         let above = |n: u32, by: f64| middle(n) + DVec3::new(0.0, 0.55 + by, 0.0);
         let positions = [above(0, 0.4), middle(0), above(0, 0.6), above(1, 0.4), above(0, 0.1)];
         let counts = held(&positions, 1.0, 8);

@@ -1,4 +1,4 @@
-//! Parts of the particles' surface that the mesh does not cover: drops that fly apart from it, bubbles inside. They have no vertices.
+//! Parts of the particles' surface that the mesh does not cover: drops that have flown off, bubbles inside. They have no vertices.
 
 use rayon::prelude::*;
 
@@ -12,29 +12,29 @@ use crate::surface::particles::grid::cell_of;
 /// A part of the particles' surface on which no vertex of the mesh lies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Apart {
-    /// Its middle: the mean of its corners (m).
+    /// Centre: the mean of its corners (m).
     pub position: DVec3,
-    /// What it encloses (m3); negative: a bubble.
+    /// Enclosed volume (m3); negative: a bubble.
     pub volume: f64,
-    /// Its triangles.
+    /// Count of its triangles.
     pub triangles: usize,
 }
 
-/// Which of the parts that it does not cover a mesh should have.
+/// Which of the uncovered parts a mesh should cover.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted<'a> {
-    /// Drops: those that hold enough of these particles; where one is enough, all.
+    /// Drops: those that hold enough of these particles; if one is enough, all.
     pub crowd: Crowd<'a>,
-    /// Bubbles: those of so large a volume (cells^3), but none in drops that are too small; infinite: none at all.
+    /// Bubbles: those of at least this volume (cells^3), but none in drops that are too small; infinite: none at all.
     pub bubble: f64,
 }
 
-/// What a mesh should have, and does not.
+/// Missing parts of a mesh.
 #[derive(Debug, Default)]
 pub struct Lacking {
     /// Positions (cells) on the particles' surface.
     pub positions: Vec<DVec3>,
-    /// Bounds (cells) of drops that it should not have: they are too small.
+    /// Bounds (cells) of drops that it should not cover, as they are too small.
     pub specks: Vec<Bounds>,
 }
 
@@ -47,7 +47,7 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Parts, those covered on which one of the feet lies, which are in these cells of phi's grid.
+    /// Finds the parts; those with one of the feet on them are covered. `feet` are cells of phi's grid.
     pub fn new(phi: &Implicit, surface: &Isosurface, mut feet: Vec<Coord>) -> Self {
         feet.par_sort_unstable();
         feet.dedup();
@@ -63,12 +63,12 @@ impl Parts {
         Self { of_vertex, is_covered }
     }
 
-    /// Whether a vertex of the surface is of a part that the mesh covers.
+    /// Whether a vertex of the surface belongs to a part that the mesh covers.
     pub fn is_covered(&self, vertex: u32) -> bool {
         self.is_covered[self.of_vertex[vertex as usize] as usize]
     }
 
-    /// What of the parts that the mesh does not cover it should have.
+    /// The uncovered parts that the mesh should cover.
     pub fn lacking(&self, phi: &Implicit, surface: &Isosurface, wanted: &Wanted<'_>) -> Lacking {
         if self.is_covered.iter().all(|covered| *covered) {
             return Lacking::default();
@@ -104,8 +104,8 @@ impl Parts {
         Lacking { positions, specks }
     }
 
-    /// Those of some drops, ascending, that hold too few particles, those of some bubbles, with a position (m) on each, that lie in such a
-    /// drop, and the bounds (cells) of the drops. The meshes that they would get are counted in the same way.
+    /// The drops, of ascending `drops`, that hold too few particles, and the `bubbles`, with a position (m) on each, that lie in such a
+    /// drop; and the bounds (cells) of these drops. The meshes that they would get are counted in the same way.
     fn specks(
         &self,
         phi: &Implicit,
@@ -147,7 +147,7 @@ impl Parts {
         if self.is_covered.iter().all(|covered| *covered) {
             return Vec::new();
         }
-        // Sums of corners and their count, six times the volume from the first corner, triangles.
+        // Sums of corners and their count, six times the volume relative to the first corner, triangles.
         let mut sums = vec![(DVec3::zeros(), 0usize, 0.0f64, 0usize); self.is_covered.len()];
         let mut firsts: Vec<Option<DVec3>> = vec![None; sums.len()];
         for triangle in surface.runs().flat_map(|(_, triangles)| triangles) {
@@ -175,11 +175,11 @@ impl Parts {
     }
 }
 
-/// Whether a foot, of those in ascending cells, lies in a cell or in one beside it.
+/// Whether one of the feet, in ascending cells, lies in a cell or in one of the 26 around it.
 pub fn is_near(feet: &[Coord], cell: Coord) -> bool {
     (-1..=1).any(|x| {
         (-1..=1).any(|y| {
-            // The three along z are neighbours in the order.
+            // Three neighbours along z are contiguous in the order.
             let low = [cell[0] + x, cell[1] + y, cell[2] - 1];
             let at = feet.partition_point(|foot| *foot < low);
             feet.get(at).is_some_and(|foot| foot[..2] == low[..2] && foot[2] <= cell[2] + 1)
@@ -187,7 +187,7 @@ pub fn is_near(feet: &[Coord], cell: Coord) -> bool {
     })
 }
 
-/// The part of each vertex, counted in the order of their first vertices.
+/// The part of each vertex, numbered in the order of the parts' first vertices.
 fn connected(surface: &Isosurface) -> Vec<u32> {
     let mut parent: Vec<u32> = (0..surface.vertices() as u32).collect();
     fn root(parent: &mut [u32], mut at: u32) -> u32 {
@@ -200,7 +200,7 @@ fn connected(surface: &Isosurface) -> Vec<u32> {
     for [a, b, c] in surface.runs().flat_map(|(_, triangles)| triangles) {
         for other in [b, c] {
             let [from, to] = [a, other].map(|vertex| root(&mut parent, *vertex));
-            // The lesser is the root: it comes first.
+            // The lower one is the root: it comes first.
             parent[from.max(to) as usize] = from.min(to);
         }
     }

@@ -1,11 +1,11 @@
 //! The mesh is carried along by the particles around it (thesis 2.2).
 //!
-//! The thesis moves a vertex by the weighted mean of the particles' ways. That is right to zeroth order only: a vertex outside the
-//! particles moves as those inside do, and lags where the liquid turns. By default the ways are fitted by affine maps (weighted
-//! least squares) at the nodes of a grid, one spacing apart, and a vertex follows the eight maps around it: affine motion is
+//! The thesis moves a vertex by the weighted mean of the particles' displacements. That is accurate to zeroth order only: a vertex outside
+//! the particles moves as those inside do, and lags where the liquid rotates. By default, affine maps are fitted to the displacements
+//! (weighted least squares) at the nodes of a grid, one spacing apart, and a vertex follows the eight maps around it: affine motion is
 //! exact, and there are far fewer nodes than vertices of a detailed mesh.
 //!
-//! Where particles move farther than their spacing, a frame is divided, and the parts of their ways are taken one after the other.
+//! If particles move farther than their spacing, a frame is divided, and the parts of their paths are followed one after the other.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -21,7 +21,7 @@ use crate::surface::particles::grid::Cells;
 use crate::surface::particles::paths::Paths;
 use crate::surface::tracker::validate_step;
 
-/// How the ways of particles are combined.
+/// How the displacements of particles are combined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Weighting {
     /// By affine maps.
@@ -33,20 +33,20 @@ pub enum Weighting {
 
 /// Radius within which particles count for a mean (spacings; thesis 2.2).
 const MEAN_RADIUS: f32 = 2.0;
-/// Radius within which they count for a map (spacings): trembling particles make vertices tremble less the more there are.
+/// Radius within which they count for a map (spacings): the more particles, the less their jitter moves vertices.
 const MAP_RADIUS: f32 = 3.0;
-/// Greatest part of a way in one go (spacings).
+/// Maximum displacement in one part of a frame (spacings).
 const STEP: f64 = 1.0;
-/// Most parts of a frame.
+/// Maximum number of parts of a frame.
 const MOST: usize = 64;
 /// How often the radius is doubled where no particle is near.
 const DOUBLINGS: u32 = 8;
 /// Farthest cell.
 const LIMIT: f64 = (i32::MAX / 4) as f64;
 
-/// Where particles carry positions (m) from one frame to the next, `dt` (s, over 0) later: what
-/// [`Tracker::step`](crate::surface::Tracker::step) does to its vertices before it projects them, for any positions, with the parameters' spacing
-/// and weighting.
+/// Where particles carry positions (m) from one frame to the next, `dt` (s, over 0) later: as
+/// [`Tracker::step`](crate::surface::Tracker::step) carries its vertices before projection, but for any positions, with the spacing and
+/// weighting of `params`.
 ///
 /// # Errors
 /// Parameters out of range, a time that is not positive; particles that are not valid or too far apart, or have neither ids nor
@@ -69,14 +69,14 @@ pub fn carried(
     })
 }
 
-/// Working memory of one thread.
+/// Scratch buffers of one thread.
 #[derive(Default)]
 struct Scratch {
     of_cell: Near,
     of_position: Near,
 }
 
-/// Carries positions (m) along the ways of particles whose spacing is `spacing` (m). Returns the count of parts.
+/// Carries positions (m) along the paths of particles whose spacing is `spacing` (m). Returns the count of parts.
 ///
 /// # Errors
 /// Particles too far apart; cancel.
@@ -111,16 +111,16 @@ pub fn advect(
     Ok(parts)
 }
 
-/// Particles and their ways in a part of a frame.
+/// Particles and their displacements in a part of a frame.
 struct Field<'a> {
     cells: &'a Cells,
-    /// In the order of cells (spacings).
+    /// Displacements in the order of cells (spacings).
     ways: Vec<[f32; 3]>,
     /// m.
     spacing: f64,
 }
 
-/// Sorts vertices (m) by cells of an edge (m). `order` are their cells and numbers, as they were sorted before.
+/// Sorts vertices (m) by cells of an edge (m). `order` holds their cells and indices in the previous order.
 fn sort(vertices: &[DVec3], edge: f64, order: &mut [(Coord, u32)]) {
     order.par_iter_mut().with_min_len(4096).for_each(|(cell, vertex)| {
         let position = vertices[*vertex as usize];
@@ -137,7 +137,7 @@ impl Field<'_> {
         let mut nodes: Vec<Coord> = groups.iter().flat_map(|group| corners(group[0].0)).collect();
         nodes.par_sort_unstable_by_key(|node| (node.map(|x| x >> 1), *node));
         nodes.dedup();
-        // Nodes of a particles' cell share what is near.
+        // Nodes in the same particle cell share the particles around them.
         let shared: Vec<&[Coord]> = nodes.chunk_by(|a, b| a.map(|x| x >> 1) == b.map(|x| x >> 1)).collect();
         let maps: Vec<Vec<Option<Map>>> = shared
             .par_iter()
@@ -168,7 +168,7 @@ impl Field<'_> {
         Ok(())
     }
 
-    /// The maps at nodes in a particles' cell; none where no particle is near.
+    /// The maps at nodes in one of the particles' cells; none where no particle is near.
     fn maps_at(&self, nodes: &[Coord], scratch: &mut Scratch) -> Vec<Option<Map>> {
         let Scratch { of_cell, of_position } = scratch;
         let cell = nodes[0].map(|x| x >> 1);
@@ -180,7 +180,7 @@ impl Field<'_> {
         nodes.iter().map(map).collect()
     }
 
-    /// Carries vertices (m) by the mean way of the particles around them.
+    /// Carries vertices (m) by the mean displacement of the particles around them.
     fn carry_by_means(
         &self,
         ctx: &Context,
@@ -205,13 +205,13 @@ impl Field<'_> {
         Ok(())
     }
 
-    /// A position (m) from the corner of a particles' cell (spacings).
+    /// A position (m) relative to the corner of one of the particles' cells (spacings).
     fn seen_from(&self, cell: Coord, position: DVec3) -> [f32; 3] {
         let at = (position - DVec3::from(cell.map(f64::from)) * self.cells.edge()) / self.spacing;
         [at.x as f32, at.y as f32, at.z as f32]
     }
 
-    /// The particles in the cells around one, in spacings from its corner.
+    /// The particles in the cells around a cell, in spacings from its corner.
     fn gather(&self, cell: Coord, rings: i32, out: &mut Near) {
         out.clear();
         let [low, high] = [-rings, rings].map(|by| cell.map(|at| at.saturating_add(by)));
@@ -220,8 +220,7 @@ impl Field<'_> {
         });
     }
 
-    /// The mean way (spacings) of the particles around a position (m) that has none near: the thesis' radius is doubled until there are
-    /// some.
+    /// The mean displacement (spacings) for a position (m) without particles nearby: the thesis' radius is doubled until there are some.
     fn mean_far(&self, position: DVec3) -> DVec3 {
         let cell =
             [0, 1, 2].map(|axis| (position[axis] / self.cells.edge()).floor().clamp(-LIMIT, LIMIT) as i32);
@@ -234,7 +233,7 @@ impl Field<'_> {
     }
 }
 
-/// The ways (m) of the vertices of each group.
+/// The displacements (m) of the vertices of each group.
 fn each(
     ctx: &Context,
     groups: &[&[(Coord, u32)]],
@@ -253,13 +252,13 @@ fn add(groups: &[&[(Coord, u32)]], ways: &[Vec<DVec3>], vertices: &mut [DVec3]) 
     }
 }
 
-/// The eight nodes of a cell: bits x, y and z of their number.
+/// The eight nodes of a cell: bits x, y and z of their index.
 fn corners(cell: Coord) -> [Coord; 8] {
     std::array::from_fn(|n| [0, 1, 2].map(|axis| cell[axis] + (n >> (2 - axis) & 1) as i32))
 }
 
-/// What the maps at the corners of a cell say at a position in it (0..1 on each axis): the nearer, and the more particles they are
-/// made of, the more they count. None without maps.
+/// Blends the maps at the corners of a cell at a position in it (0..1 on each axis): weights grow with proximity and with the particle
+/// weight behind a map. None without maps.
 fn blended(maps: &[Option<Map>; 8], at: DVec3) -> Option<DVec3> {
     let (mut sum, mut all) = (Vector3::zeros(), 0.0);
     for (n, map) in maps.iter().enumerate() {

@@ -1,5 +1,5 @@
 //! Where the band of distances must reach farther than elsewhere: around the few vertices whose detail is deeper than that of nearly all
-//! others. A band as wide as theirs all over the surface would take many times as long.
+//! others. A band that wide over the whole surface would take many times as long.
 
 use std::collections::BTreeMap;
 
@@ -9,31 +9,31 @@ use crate::numeric::blocks::DIM;
 use crate::surface::particles::grid::cell_of;
 use crate::surface::tracker::{DRIFT, REACH, Tracker, WIDER};
 
-/// Blocks of the band, ascending, and how far it reaches in each (cells).
+/// Blocks of the band, ascending, and its reach in each (cells).
 pub type Deep = Vec<(Coord, f32)>;
 
-/// How far from a vertex splines read nodes (cells), and one for rounding.
+/// Distance of nodes from a vertex that splines read (cells), plus one for rounding.
 const READ: f64 = 3.0;
-/// Reaches are rounded up to so much (cells): that of the same vertex is then the same however it was measured.
+/// Reaches are rounded up to multiples of this (cells), so that the reach of a vertex does not depend on how it was measured.
 const STEP: f64 = 0.25;
 
 impl Tracker {
-    /// How far the band must reach (r) for a vertex that keeps a distance (r).
+    /// The reach of the band (r) that a vertex with a given distance (r) needs.
     pub(in crate::surface) fn reach_for(&self, delta: f64) -> f64 {
-        // Splines read two nodes farther; a vertex drifts less than this before it is moved back.
+        // Splines read two nodes farther; a vertex drifts less than `DRIFT` before it is moved back.
         (WIDER * delta + DRIFT + 2.0 * self.params.cell).clamp(REACH[0], REACH[1])
     }
 
-    /// The blocks around vertices at these positions (m) in which the band must reach farther than it does everywhere. Around those that
-    /// have no distance it reaches as far as `unknown` (r).
+    /// The blocks around vertices at these positions (m) in which the band must reach farther than elsewhere. Around vertices without a
+    /// distance it reaches as far as `unknown` (r).
     pub(in crate::surface) fn deep(&self, vertices: &[DVec3], unknown: f64) -> Deep {
         let (spacing, cell) = (self.params.spacing, self.params.cell * self.params.spacing);
         let cells = |length: f64| (length / self.params.cell / STEP).ceil() * STEP;
-        // Neighbours share their blocks: these are listed once for all of them.
+        // Neighbours share their blocks: each set of blocks is listed once.
         let mut boxes: BTreeMap<[Coord; 2], f64> = BTreeMap::new();
         for (position, delta) in vertices.iter().zip(&self.delta) {
             let far = f64::from(delta.abs()) / spacing;
-            // On the way to its foot a vertex comes no farther from where it is than that.
+            // Maximum displacement of a vertex on the path to its foot.
             let [reach, way] =
                 if delta.is_nan() { [unknown; 2] } else { [self.reach_for(far), far + 2.0 * DRIFT] };
             if reach > self.reach {
@@ -52,19 +52,19 @@ impl Tracker {
     }
 }
 
-/// Ascending, each block once, with the farthest of its reaches.
+/// Sorts blocks; each appears once, with its largest reach.
 pub fn sorted(mut blocks: Deep) -> Deep {
     blocks.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
     blocks.dedup_by_key(|(block, _)| *block);
     blocks
 }
 
-/// How far the band reaches in a block; none where it does no farther than elsewhere.
+/// Reach of the band in a block; none if it is the same as elsewhere.
 pub fn reach_in(deep: &[(Coord, f32)], block: Coord) -> Option<f32> {
     deep.binary_search_by_key(&block, |(block, _)| *block).ok().map(|at| deep[at].1)
 }
 
-/// Whether the band reaches in all blocks of one list as far as in those of the other.
+/// Whether the band reaches at least as far in all blocks of `deep` as in those of `other`.
 pub fn covers(deep: &[(Coord, f32)], other: &[(Coord, f32)]) -> bool {
     other.iter().all(|(block, reach)| reach_in(deep, *block).is_some_and(|own| own >= *reach))
 }

@@ -1,6 +1,6 @@
-//! Changes that are seen before they happen (thesis 2.8 wishes for it): vertices that a change will take away lead to what will take
-//! their position, and go a part of that way in each of the frames before it, so that a bridge does not pop up. Only what is shown is
-//! moved so; the mesh that goes on is not.
+//! Easing of topology changes (thesis 2.8 wishes for it): vertices that a change will remove move towards what will replace them, a fraction
+//! of the displacement in each of the frames before it, so that a bridge does not pop up. This affects only the displayed mesh, not the
+//! tracked one.
 
 use rayon::prelude::*;
 
@@ -13,30 +13,30 @@ use crate::geometry::{DVec3, TriMesh, Vec3};
 use crate::mesh_repair::{Source, weights};
 use crate::surface::topology::change::Change;
 
-/// Positions of a task.
+/// Positions per task.
 const GRAIN: usize = 256;
-/// How often the positions that are made pull the old surface towards them.
+/// Number of iterations in which new positions pull the old surface towards them.
 const PULLS: usize = 16;
-/// Longest way to what takes a vertex' position (spacings): what is farther away is another surface that appears.
+/// Maximum displacement to what replaces a vertex (spacings): anything farther away is another surface that appears.
 const LONGEST: f64 = 4.0;
-/// A part of the old surface is not eased if nothing that is made there is farther from it than this (spacings): there is no jump to hide.
+/// A part of the old surface is not eased if nothing new on it is farther away than this (spacings): there is no jump to hide.
 const NEAR: f64 = 0.25;
-/// How often the ways of vertices that nothing pulls at become the mean of those around them.
+/// Number of iterations in which vertices without a pull take the mean displacement of their neighbours.
 const SPREAD: usize = 8;
-/// A pull that counts for less than this of a vertex is left out.
+/// A pull on a vertex with less than this weight is ignored.
 const LEAST: f64 = 1e-3;
 
-/// What a step does to the vertices before it.
+/// Effect of a step on the vertices before it.
 #[derive(Debug, Clone, Default)]
 pub struct Leads {
-    /// Vertices that go, ascending, with their ways (m) to what takes their position.
+    /// Vertices that are removed, ascending, with their displacements (m) to what replaces them.
     ways: Vec<(u32, DVec3)>,
-    /// The vertex before the step that each vertex was, where any was made or went.
+    /// For each vertex, its vertex before the step, if any vertex is new or was removed.
     origins: Origins,
 }
 
 impl Leads {
-    /// Those of a change of a mesh that had these triangles; particles are a spacing (m) apart.
+    /// The targets of a change of a mesh that had these triangles; particles are a spacing (m) apart.
     ///
     /// # Errors
     /// Cancel.
@@ -45,22 +45,22 @@ impl Leads {
         Ok(Self { ways, origins: Some(change.origins.clone()) })
     }
 
-    /// Of a mesh that is exchanged for another, which has nothing of it.
+    /// For a mesh that is exchanged for an unrelated one.
     pub fn cut(vertices: usize) -> Self {
         Self { ways: Vec::new(), origins: Some(vec![None; vertices]) }
     }
 
-    /// The vertex before the step that a vertex after it was; none: it was made.
+    /// The vertex before the step that a vertex after it was; none: it is new.
     pub fn before(&self, vertex: u32) -> Option<u32> {
         origin(&self.origins, vertex)
     }
 
-    /// Whether a vertex before the step goes, and has something that takes its place.
+    /// Whether a vertex before the step is removed and something replaces it.
     pub fn takes(&self, vertex: u32) -> bool {
         self.ways.binary_search_by_key(&vertex, |(vertex, _)| *vertex).is_ok()
     }
 
-    /// Of two steps, one after the other.
+    /// The combination of two successive steps.
     pub fn then(mut self, next: &Self) -> Self {
         let ways = next.ways.iter().filter_map(|(vertex, way)| Some((origin(&self.origins, *vertex)?, *way)));
         self.ways.extend(ways);
@@ -70,32 +70,32 @@ impl Leads {
     }
 }
 
-/// The vertex that each vertex was; none: each is as it was.
+/// The vertex that each vertex was; none: all are unchanged.
 type Origins = Option<Vec<Option<u32>>>;
 
 fn origin(origins: &Origins, vertex: u32) -> Option<u32> {
     origins.as_ref().map_or(Some(vertex), |origins| origins[vertex as usize])
 }
 
-/// Through two steps.
+/// Origins through two steps.
 fn through(first: Origins, second: &Origins) -> Origins {
     let Some(second) = second else { return first };
     Some(second.iter().map(|at| at.and_then(|at| origin(&first, at))).collect())
 }
 
-/// A vertex that is moved for what is to come.
+/// A vertex that is displaced ahead of a change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Eased {
-    /// Which one.
+    /// Its index.
     pub vertex: u32,
-    /// By how much now (m).
+    /// Displacement now (m).
     pub now: DVec3,
-    /// And when the first of the coming steps is done.
+    /// Displacement after the first of the coming steps (m).
     pub next: DVec3,
 }
 
-/// Which vertices are moved, and by how much, for the steps to come, the first one first, in ascending order. They are moved for
-/// `ahead` steps, ever nearer to what the last one of these makes of them, and are there when it is done.
+/// The vertices, ascending, that are displaced ahead of the steps in `coming` (the first step first), and by how much. Displacement starts
+/// `ahead` steps before the step that removes a vertex, grows with each step, and is complete when that step is done.
 pub fn eased<'a>(coming: impl IntoIterator<Item = &'a Leads>, ahead: usize) -> Vec<Eased> {
     let (mut origins, mut moved) = (None, Vec::new());
     for (step, leads) in (1..=ahead + 1).zip(coming) {
@@ -111,20 +111,20 @@ pub fn eased<'a>(coming: impl IntoIterator<Item = &'a Leads>, ahead: usize) -> V
     moved
 }
 
-/// Share of its way that a vertex has gone so many steps before it is done; it sets out and arrives gently.
+/// Fraction of the displacement `steps` before the change is done; it starts and ends smoothly.
 fn weight(steps: usize, ahead: usize) -> f64 {
     let gone = 1.0 - (steps as f64 / (ahead + 1) as f64).min(1.0);
     gone * gone * (3.0 - 2.0 * gone)
 }
 
-/// The ways (m) of the vertices that a change takes away, by the vertices before it; lengths count in spacings (m).
+/// The displacements (m) of the vertices that a change removes, by their index before it; limits are in spacings (m).
 fn ways(ctx: &Context, change: &Change, triangles: &[[u32; 3]], spacing: f64) -> Result<Vec<(u32, DVec3)>> {
     let Some(old) = Patch::old(change, triangles) else { return Ok(Vec::new()) };
     let new = Patch::new(change);
     if new.triangles.is_empty() {
         return Ok(Vec::new());
     }
-    // Positions count from one of them: far from the origin 32 bits are too few.
+    // Positions are relative to one of them: far from the origin 32 bits are not precise enough.
     let origin = change.before[old.names[0] as usize];
     let begin: Vec<DVec3> = old.names.iter().map(|name| change.before[*name as usize] - origin).collect();
     let ends: Vec<DVec3> = new.names.iter().map(|name| change.vertices[*name as usize] - origin).collect();
@@ -164,18 +164,18 @@ fn ways(ctx: &Context, change: &Change, triangles: &[[u32; 3]], spacing: f64) ->
     Ok(moved.map(|at| (old.names[at], ways[at])).collect())
 }
 
-/// Triangles that a change takes away, or that it makes.
+/// Triangles that a change removes, or that it creates.
 struct Patch {
-    /// Of the mesh, ascending.
+    /// Indices of the mesh's vertices, ascending.
     names: Vec<u32>,
-    /// Whether each goes, or was made; the others stay.
+    /// Whether each vertex is removed, or new; the others stay.
     is_loose: Vec<bool>,
-    /// Of these vertices.
+    /// Triangles of these vertices.
     triangles: Vec<[u32; 3]>,
 }
 
 impl Patch {
-    /// Those that are no longer there as they were; none where no vertex goes.
+    /// The triangles that are removed or changed; none if no vertex is removed.
     fn old(change: &Change, triangles: &[[u32; 3]]) -> Option<Self> {
         let mut goes = vec![true; change.before.len()];
         change.origins.iter().flatten().for_each(|at| goes[*at as usize] = false);
@@ -193,7 +193,7 @@ impl Patch {
         (!patch.triangles.is_empty()).then_some(patch)
     }
 
-    /// Those that are new, or parts of others.
+    /// The triangles that are new, or parts of others.
     fn new(change: &Change) -> Self {
         let made = change.sources.iter().zip(&change.triangles);
         let made = made.filter(|(source, _)| !matches!(source, Source::Whole(_))).map(|(_, names)| *names);
@@ -206,8 +206,9 @@ impl Patch {
         Self { is_loose: names.iter().map(|name| is_loose(*name)).collect(), names, triangles }
     }
 
-    /// The positions that are made at parts of the patch where the surface jumps: each counts for the nearest part (its vertices lie at `begin`),
-    /// and a part jumps if one of them is farther away than the first length. Those beyond the second belong to another surface, and are left out.
+    /// The new positions at parts of the patch where the surface jumps: each belongs to the nearest part (whose vertices lie at `begin`),
+    /// and a part jumps if one of its positions is farther away than `near`. Positions beyond `longest` belong to another surface, and are
+    /// left out.
     fn jumps(&self, begin: &[DVec3], made: Vec<DVec3>, [near, longest]: [f64; 2]) -> Vec<DVec3> {
         let mut part_of = vec![0; self.triangles.len()];
         let parts = bodies(&self.triangles);
@@ -228,7 +229,7 @@ impl Patch {
         found.into_iter().filter(|(_, part)| is_jump[*part]).map(|(position, _)| position).collect()
     }
 
-    /// Gives each loose vertex without a way the mean of those around it, a few times; those that stay have none.
+    /// Gives each removed or new vertex without a displacement the mean of those around it, several times; vertices that stay have none.
     fn spread(&self, ways: &mut [DVec3], has_way: &[bool]) {
         for _ in 0..SPREAD {
             let sums = around(ways.len(), &self.triangles, |vertex| Some(ways[vertex as usize]));
@@ -282,7 +283,7 @@ mod tests {
             let leads = Leads::of(&ctx, &change, &triangles, 1.0).unwrap();
             eased([&leads], 0).iter().for_each(|eased| places[eased.vertex as usize] += eased.next);
             assert!(farthest(&places, &triangles, &change) < 0.35 * far, "{step}");
-            // What stays is not moved.
+            // Vertices that stay are not displaced.
             let stay: Vec<u32> = change.origins.iter().copied().flatten().collect();
             assert!(stay.len() > 100, "{step}: {} stay", stay.len());
             for at in stay {
@@ -295,7 +296,7 @@ mod tests {
 
     #[test]
     fn a_vertex_is_moved_more_the_nearer_its_change_is_by_the_name_that_it_has() {
-        // The second step takes vertex 1 away, which was vertex 2 before the first.
+        // The second step removes vertex 1, which was vertex 2 before the first.
         let way = DVec3::new(1.0, 2.0, 3.0);
         let first = Leads { ways: Vec::new(), origins: Some(vec![Some(0), Some(2), None]) };
         let second = Leads { ways: vec![(1, way), (2, way)], origins: Some(vec![Some(0)]) };

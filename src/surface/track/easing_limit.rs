@@ -1,5 +1,5 @@
-//! Easing that stops short: where the surfaces of a mesh are led towards what will join them they may pass through each other first. There
-//! vertices go less far, down to not at all, so that what is shown meets itself nowhere but where the mesh itself does.
+//! Limits easing: parts of a mesh that are displaced towards their future bridge may pass through each other first. There displacements are
+//! reduced, down to 0, so that the displayed mesh intersects itself only where the mesh itself does.
 
 use std::collections::HashSet;
 
@@ -11,21 +11,22 @@ use crate::geometry::mesh::{renumbered, used};
 use crate::geometry::{DVec3, TriMesh};
 use crate::surface::particles::grid::cell_of;
 
-/// How often the displacements of triangles that meet are halved, and in how many rounds they are taken back whole after that; then all are.
+/// Rounds in which the displacements of intersecting triangles are halved, and the total number of rounds; in the rounds after the halvings
+/// they are set to 0, and after the last round all are.
 const HALVINGS: usize = 5;
 const ROUNDS: usize = 20;
-/// By how much the shares of neighbours differ at most after a round: no vertex is left standing out alone.
+/// Maximum difference of the shares of neighbours after a round: no vertex is left sticking out alone.
 const STEP: f64 = 0.25;
-/// Bins that a box of one triangle may have; a larger one is near everything.
+/// Maximum number of bins for the box of a triangle; a larger box is near everything.
 const BINS: i64 = 4096;
-/// Of a vertex that is not displaced.
+/// For a vertex that is not displaced.
 const NONE: u32 = u32::MAX;
 
 /// A vertex, and its displacement (m).
 pub type Displaced = (u32, DVec3);
 
-/// What of some displacements, of different vertices, is left where the mesh is to meet itself nowhere but where it does without them, in
-/// the 32 bits that files have.
+/// Reduces displacements, of different vertices, so that the mesh intersects itself only where it does without them, with positions rounded
+/// to the 32 bits that files have.
 ///
 /// # Errors
 /// Cancel.
@@ -65,10 +66,10 @@ pub fn uncrossed(
 struct Around<'a> {
     vertices: &'a [DVec3],
     displaced: &'a [Displaced],
-    /// Of the mesh, ascending, and the displacement of each, if it has one.
+    /// Indices of the mesh's vertices, ascending, and the displacement of each, if it has one.
     names: Vec<u32>,
     slots: Vec<u32>,
-    /// Of these vertices.
+    /// Triangles of these vertices.
     triangles: Vec<[u32; 3]>,
 }
 
@@ -96,7 +97,7 @@ impl<'a> Around<'a> {
         Self { vertices, displaced, triangles: renumbered(&near, &names), names, slots }
     }
 
-    /// Pairs of triangles that meet where vertices are displaced by shares of what is asked.
+    /// Pairs of triangles that intersect if vertices are displaced by these shares of the requested displacements.
     fn meeting(&self, shares: &[f64]) -> Vec<[u32; 2]> {
         let position = |(name, slot): (&u32, &u32)| {
             let own = self.vertices[*name as usize];
@@ -107,7 +108,7 @@ impl<'a> Around<'a> {
         meeting_pairs(&TriMesh { positions, triangles: self.triangles.clone() })
     }
 
-    /// The displacements at triangles that meet with these shares, and do not without any; ascending.
+    /// The displacements at triangles that intersect with these shares, but not without displacements; ascending.
     fn met(&self, own: &[[u32; 2]], shares: &[f64]) -> Vec<u32> {
         let new = self.meeting(shares).into_iter().filter(|pair| own.binary_search(pair).is_err());
         let corners = new.flatten().flat_map(|triangle| self.triangles[triangle as usize]);
@@ -118,7 +119,7 @@ impl<'a> Around<'a> {
         met
     }
 
-    /// Lowers shares that are much over those of neighbours.
+    /// Lowers shares that are far above those of neighbours.
     fn even_out(&self, shares: &mut [f64]) {
         let before = shares.to_vec();
         for corners in &self.triangles {
@@ -133,14 +134,14 @@ impl<'a> Around<'a> {
     }
 }
 
-/// The bins that some boxes touch.
+/// The bins that boxes touch.
 struct Bins {
-    /// m.
+    /// Edge (m).
     edge: f64,
     /// Bounds of all boxes (m).
     bounds: [DVec3; 2],
     touched: HashSet<Coord>,
-    /// A box was too large to be listed.
+    /// Whether a box was too large to be listed.
     is_all: bool,
 }
 
@@ -160,7 +161,7 @@ impl Bins {
         bins
     }
 
-    /// Whether a box is in a bin that one of the boxes touches.
+    /// Whether a box touches one of the listed bins.
     fn has(&self, own: &[DVec3; 2]) -> bool {
         let [low, high] = self.bounds;
         if (0..3).any(|axis| own[1][axis] < low[axis] || own[0][axis] > high[axis]) {
@@ -170,7 +171,7 @@ impl Bins {
         self.is_all || each(low, high).any(|bin| self.touched.contains(&bin))
     }
 
-    /// The bins of a box; none where they are too many.
+    /// The range of bins of a box; none if there are too many.
     fn between(&self, [low, high]: &[DVec3; 2]) -> Option<[Coord; 2]> {
         let from = self.bounds[0];
         let ends = [low, high].map(|position| cell_of(&((position - from) / self.edge)));
@@ -180,7 +181,7 @@ impl Bins {
     }
 }
 
-/// Bins from one to another.
+/// Bins in a range.
 fn each(low: Coord, high: Coord) -> impl Iterator<Item = Coord> {
     let on = move |axis: usize| low[axis]..=high[axis];
     on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])))
@@ -200,7 +201,7 @@ mod tests {
         (mesh.positions.iter().map(|position| position.cast()).collect(), mesh.triangles)
     }
 
-    /// The faces at the gap move by so much towards each other.
+    /// Moves the faces at the gap towards each other by `by`.
     fn towards(vertices: &[DVec3], by: f64) -> Vec<Displaced> {
         let at_gap = (0..).zip(vertices).filter(|(_, position)| position.x == 1.0 || position.x == 2.0);
         at_gap

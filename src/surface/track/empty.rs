@@ -1,4 +1,4 @@
-//! A mesh without liquid: before the first particles come, and when all are gone.
+//! A mesh without liquid: before the first particles appear, and when all are gone.
 
 use super::prefetch::Ahead;
 use crate::context::Context;
@@ -12,7 +12,7 @@ use crate::surface::topology::change::{Change, Unfit};
 use crate::surface::tracker::Tracker;
 
 impl Tracker {
-    /// A mesh without vertices: that of frames before the first particles. A step to particles makes it, where it is rebuilt, from their
+    /// A mesh without vertices: that of frames before the first particles. If it is rebuilt, a step to particles creates it from their
     /// surface.
     ///
     /// # Errors
@@ -28,7 +28,7 @@ impl Tracker {
             flags: Vec::new(),
             bare: Vec::new(),
             reach: crate::surface::tracker::REACH[0],
-            // Its state has its own triangles: none.
+            // Its state includes its own triangles: none.
             is_rebuilt: true,
             sizes: Vec::new(),
             drift: Drift::default(),
@@ -103,7 +103,7 @@ mod tests {
         assert!(tracker.vertices().is_empty() && tracker.triangles().is_empty());
         let report = tracker.step(&ctx, &none, &none, DT).unwrap();
         assert!(report.change.is_none() && report.died == 0);
-        // What was saved goes on with the same bytes.
+        // The saved state continues with the same bytes.
         let mut back = Tracker::resume(params(true), &mesh, &tracker.save()).unwrap();
         let report = tracker.step(&ctx, &none, &second, DT).unwrap();
         assert_eq!(report.born, second.positions.len());
@@ -113,7 +113,7 @@ mod tests {
         assert!(faults.by_index.is_watertight() && faults.parts == 1, "{faults:?}");
         let wanted = own_surface(&ctx, &second.positions).volume();
         assert!((tracker.mesh().volume() / wanted - 1.0).abs() < 0.02, "{}", tracker.mesh().volume());
-        // One that begins without any is the same.
+        // A mesh that starts without vertices gives the same result.
         let mut born = Tracker::without_mesh(params(true)).unwrap();
         born.step(&ctx, &none, &second, DT).unwrap();
         assert!(born.triangles() == tracker.triangles() && born.vertices() == tracker.vertices());

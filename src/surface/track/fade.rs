@@ -1,11 +1,11 @@
 //! Detail fades (wished for in thesis 2.8): a runny liquid does not keep what was sculpted into it.
 //!
-//! Delta halves in a given time, and becomes less the more the mesh is strained around a vertex. What is painted to last does not.
+//! Delta halves in a given time, and shrinks with the strain of the mesh around a vertex. Detail retention slows both; at 1 nothing fades.
 
 use crate::geometry::DVec3;
 use crate::surface::tracker::Tracker;
 
-/// The distance that each vertex is to keep after a step of `dt` (s) that carries the vertices to places (m).
+/// The distance that each vertex keeps after a step of `dt` (s) in which its vertices are carried to `carried` (m).
 pub fn fade(tracker: &Tracker, carried: &[DVec3], dt: f64) -> Vec<f32> {
     let params = &tracker.params;
     let mut delta = tracker.delta.clone();
@@ -22,7 +22,7 @@ pub fn fade(tracker: &Tracker, carried: &[DVec3], dt: f64) -> Vec<f32> {
     delta
 }
 
-/// How much the edges around each vertex become longer or shorter: the mean of the logarithm of the ratio, without its sign.
+/// Strain of the edges around each vertex: the mean absolute logarithm of the ratio of their lengths.
 fn strains(tracker: &Tracker, carried: &[DVec3]) -> Vec<f64> {
     let mut sums = vec![(0.0, 0u32); carried.len()];
     for &[a, b, c] in &tracker.triangles {

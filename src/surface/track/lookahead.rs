@@ -1,5 +1,5 @@
-//! Steps of a tracker that are made before they are wanted: what they change is seen before it happens (`track/easing.rs`), and when their
-//! turn comes they are there.
+//! Steps of a tracker that are computed in advance: their changes are known before they happen (`track/easing.rs`), and the results are
+//! reused when their turn comes.
 
 use std::collections::VecDeque;
 
@@ -12,16 +12,16 @@ use crate::surface::Particles;
 use crate::surface::report::StepReport;
 use crate::surface::tracker::Tracker;
 
-/// The steps to come of a tracker.
+/// The coming steps of a tracker.
 #[derive(Debug, Default)]
 pub struct Outlook {
-    /// The particles at which the first one begins.
+    /// The particles at which the first step begins.
     from: Particles,
-    /// In their order.
+    /// In order.
     steps: VecDeque<Coming>,
 }
 
-/// A step to come.
+/// A coming step.
 #[derive(Debug)]
 struct Coming {
     to: Particles,
@@ -32,8 +32,8 @@ struct Coming {
 }
 
 impl Outlook {
-    /// Makes the steps from the particles `from`, at which the tracker is, through those to come, each `dt` (s) after the one before.
-    /// Steps that were made for the same particles are kept. A tracker that went another way needs another outlook.
+    /// Computes the coming steps, starting at the particles `from`, at which the tracker is, each `dt` (s) after the previous one. Steps
+    /// already computed for the same particles are kept. A tracker that took a different path needs another outlook.
     ///
     /// # Errors
     /// As [`Tracker::step`]; the steps before the one that failed stay.
@@ -70,7 +70,7 @@ impl Outlook {
         Ok(())
     }
 
-    /// What a step becomes that was made already.
+    /// The result of a step, if it has been computed.
     pub fn take(&mut self, from: &Particles, to: &Particles, dt: f64) -> Option<(Tracker, StepReport)> {
         let is_it = |step: &Coming| step.dt == dt && step.to == *to;
         if self.from != *from || !self.steps.front().is_some_and(is_it) {
@@ -82,8 +82,8 @@ impl Outlook {
         Some((after, report))
     }
 
-    /// Positions (m) of the tracker's vertices as they are shown: those that a step to come takes away go towards what it makes, for
-    /// `ahead` steps before it, as far as the mesh does not pass through itself.
+    /// Positions (m) of the tracker's vertices as displayed: those that a coming step removes move towards their replacement, for `ahead`
+    /// steps before it, as far as the mesh does not intersect itself.
     ///
     /// # Errors
     /// Cancel.
@@ -139,7 +139,7 @@ mod tests {
             assert_eq!(report.change.is_some(), wanted.change.is_some(), "{frame}");
         }
         assert!(moved > 20, "{moved}");
-        // Other particles are another way.
+        // Other particles are a different path.
         outlook.look(&ctx, &tracker, balls(16), vec![balls(17)], DT).unwrap();
         assert!(outlook.take(&balls(16), &balls(18), DT).is_none());
         assert!(outlook.take(&balls(16), &balls(17), DT).is_none());

@@ -1,4 +1,4 @@
-//! A step of the mesh while the topology of its liquid stays: it is carried along, projected, fades, and is shown eased.
+//! A step of the mesh while its liquid keeps its topology: it is carried along and projected, fades, and is eased for display.
 
 pub(in crate::surface) mod advect;
 pub(in crate::surface) mod deep_detail;

@@ -1,4 +1,4 @@
-//! The surface of the particles to come, made while the mesh is rebuilt: that work keeps few threads busy.
+//! The surface of the coming particles, computed while the mesh is rebuilt, which keeps few threads busy.
 
 use std::sync::Arc;
 
@@ -10,20 +10,20 @@ use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::isosurface::Isosurface;
 use crate::surface::tracker::Tracker;
 
-/// Where phi is 0, and its triangles.
+/// The implicit function and the triangles of its zero set.
 type Surface = Arc<(Implicit, Isosurface)>;
 
-/// What is known of particles to come.
+/// Data of the coming particles.
 #[derive(Debug, Clone, Default)]
 pub(in crate::surface) struct Ahead {
-    /// Those whose surface is to be made during the next step.
+    /// Particles whose surface is to be computed during the next step.
     wanted: Option<Arc<Particles>>,
-    /// Those whose surface is there, and that.
+    /// Particles whose surface is ready, and that surface.
     ready: Option<(Arc<Particles>, Surface)>,
 }
 
 impl Ahead {
-    /// The surface of particles at these positions, if it is there.
+    /// The surface of particles at these positions, if it is ready.
     pub fn ready(&self, positions: &[DVec3]) -> Option<Surface> {
         self.ready
             .as_ref()
@@ -33,18 +33,18 @@ impl Ahead {
 }
 
 impl Tracker {
-    /// Hands over the particles to which the step after the coming one goes: where the mesh is rebuilt, their surface is made at the same
-    /// time, on threads that have nothing to do. The result is identical.
+    /// Prefetches the particles of the step after next: while the mesh is rebuilt, their surface is computed on idle threads. The result is
+    /// identical.
     pub fn set_ahead(&mut self, particles: Arc<Particles>) {
         self.ahead.wanted = Some(particles);
     }
 
-    /// Drops the surface that was made ahead: the step that it is for is done elsewhere.
+    /// Drops the prefetched surface: its step is done elsewhere.
     pub fn forget_ahead(&mut self) {
         self.ahead = Ahead::default();
     }
 
-    /// Does some work, and makes the surface of the particles to come at the same time.
+    /// Runs `work`, and computes the surface of the coming particles at the same time.
     pub(in crate::surface) fn with_next<R>(
         &self,
         ctx: &Context,
@@ -59,7 +59,7 @@ impl Tracker {
                 return Ok((done, Ahead::default()));
             };
             let made = making.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-            // What fails here fails again when it is that frame's turn, and is told there.
+            // An error here will occur again in that frame's own step, and is reported there.
             let ready = made.ok().map(|surface| (particles.clone(), Arc::new(surface)));
             Ok((done, Ahead { wanted: None, ready }))
         })

@@ -1,21 +1,20 @@
-//! Projection that keeps detail (thesis 2.3.2): a vertex is moved to the surface, then along the same line to the distance that
-//! it keeps from it.
+//! Projection that keeps detail (thesis 2.3.2): a vertex is moved to the surface, then along the same line to its kept distance.
 //!
-//! The thesis' formulas are read so: phi and its gradient are those at the current x*, and delta is signed as phi, which the last
-//! formula needs on the inside.
+//! The thesis' formulas are interpreted as follows: phi and its gradient are those at the current x*, and delta has the sign of phi, which
+//! the last formula needs on the inside.
 
 use crate::geometry::DVec3;
 use crate::surface::level_set::sampler::Sampler;
 
-/// Shares of the way to phi = 0 that a step goes: a large one, for as many steps as that mostly takes, then the thesis' own (2.3.2),
-/// which arrives where splines bend.
+/// Fractions of the distance to phi = 0 covered by a step, each with its number of steps: a large one for as many steps as are usually
+/// needed, then the thesis' own (2.3.2), which converges where splines bend.
 const STEPS: [(f64, usize); 2] = [(0.8, 6), (0.35, 64)];
-/// Distance from phi = 0 at which a vertex has arrived (cells; thesis 2.3.2).
+/// Distance from phi = 0 at which a vertex has converged (cells; thesis 2.3.2).
 const ARRIVED: f32 = 0.005;
-/// A vertex nearer to its foot than this (cells) is moved along the gradient there: the line between them says nothing.
+/// A vertex nearer to its foot than this (cells) is moved along the gradient there: the line between them has no reliable direction.
 const TINY: f64 = 0.1;
 
-/// Where a vertex meets the surface.
+/// Where a vertex projects onto the surface.
 #[derive(Debug, Clone, Copy)]
 pub struct Foot {
     /// The position on phi = 0 (cells).
@@ -26,7 +25,7 @@ pub struct Foot {
     pub distance: f64,
 }
 
-/// The foot of a vertex at a position (cells); none where the steps do not arrive.
+/// The foot of a vertex at a position (cells); none if the steps do not converge.
 pub fn foot(sampler: &mut Sampler<'_>, position: DVec3) -> Option<Foot> {
     let mut at = position;
     let (first, mut slope) = sampler.at(at)?;
@@ -38,10 +37,10 @@ pub fn foot(sampler: &mut Sampler<'_>, position: DVec3) -> Option<Foot> {
         if phi.abs() < ARRIVED {
             let way = position - at;
             let length = way.norm();
-            // Signed as phi: the way leads outward from outside, and inward from inside.
+            // Signed as phi: the vector to the vertex points outward from outside, and inward from inside.
             let sign = if first < 0.0 { -1.0 } else { 1.0 };
             return Some(if length < TINY {
-                // The foot that the vertex itself has in that direction.
+                // The vertex' own foot in that direction.
                 let distance = way.dot(&unit);
                 Foot { position: position - unit * distance, outward: unit, distance }
             } else {

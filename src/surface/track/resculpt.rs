@@ -1,4 +1,4 @@
-//! A mesh that was edited by hand takes the place of the one that has followed the particles up to then.
+//! Replaces the tracked mesh by one that was edited by hand.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -8,12 +8,12 @@ use crate::surface::report::StepReport;
 use crate::surface::tracker::Tracker;
 
 impl Tracker {
-    /// Puts an edited mesh (m), of any vertices and triangles, in the place of its own, at the time of `particles`: those to which its last
-    /// step went, or with which it began. What each vertex keeps is measured anew and followed from there; the parameters stay, no detail
-    /// is said to last ([`Tracker::set_lasting`]), no vertex is flagged. The report is that of [`Tracker::begin`]. After an error the
-    /// tracker is as it was.
+    /// Replaces its mesh by an edited one (m), of any vertices and triangles, at the time of `particles`: those to which its last step went,
+    /// or with which it began. The distance of each vertex is measured anew and kept from there on; the parameters stay, detail retention is
+    /// cleared ([`Tracker::set_lasting`]), no vertex is flagged. The report is that of [`Tracker::begin`]. After an error the tracker is
+    /// unchanged.
     ///
-    /// States have the edited mesh's triangles from then on: [`Tracker::resume`] still takes the mesh with which all began.
+    /// From then on states contain the edited mesh's triangles: [`Tracker::resume`] still takes the initial mesh.
     ///
     /// # Errors
     /// As [`Tracker::begin`] and [`Tracker::set_lasting`].
@@ -26,9 +26,9 @@ impl Tracker {
     ) -> Result<StepReport> {
         let ((mut next, report), phases) = ctx.step(4, || Self::begin(ctx, self.params, mesh, particles))?;
         next.set_lasting(lasting)?;
-        // Also where the triangles are the first ones: sizes, and what lasts, are no longer those of the first mesh.
+        // Even if the triangles are the initial ones: sizes and detail retention are no longer those of the initial mesh.
         next.is_rebuilt = true;
-        // The surface of the particles to come is the same for every mesh.
+        // The surface of the coming particles is the same for every mesh.
         next.ahead = std::mem::take(&mut self.ahead);
         *self = next;
         Ok(StepReport { phases, ..report })
@@ -61,7 +61,7 @@ mod tests {
         numbered(shell(middle(frame), 0.0, 5.2))
     }
 
-    /// A mesh of its surface that has followed it to a frame, and the mesh at the first one.
+    /// A mesh of its surface that has followed it to a frame, and the initial mesh.
     fn followed(ctx: &Context, rebuild: bool, frame: i32) -> (Tracker, TriMesh) {
         let first = ball(0);
         let mesh = own_surface(ctx, &first.positions);
@@ -77,7 +77,7 @@ mod tests {
         }
     }
 
-    /// How far the mesh reaches over the middle of the ball (m).
+    /// Height of the mesh above the ball's middle (m).
     fn top(tracker: &Tracker, frame: i32) -> f64 {
         tracker.vertices().iter().map(|position| (position - middle(frame)).y).fold(0.0, f64::max)
     }
@@ -120,7 +120,7 @@ mod tests {
             tracker.set_lasting(vec![0.5; tracker.vertices().len()]).unwrap();
             let mut edited = with_bump(&tracker, 2);
             if !rebuild {
-                // One that is not rebuilt may be open.
+                // A mesh that is not rebuilt may be open.
                 edited.triangles.truncate(edited.triangles.len() - 2);
             }
             tracker.resculpt(&ctx, &edited, Vec::new(), &ball(2)).unwrap();
@@ -128,7 +128,7 @@ mod tests {
             assert!(tracker.lasting.is_empty());
             tracker.set_lasting(vec![0.25; edited.positions.len()]).unwrap();
             let state = tracker.save();
-            // It is the first mesh that a state belongs to.
+            // A state belongs to the initial mesh.
             let mut back = Tracker::resume(tracker.params, &first, &state).unwrap();
             assert!(back.save() == state && back.lasting == tracker.lasting);
             go_on(&ctx, &mut tracker, [2, 4]);

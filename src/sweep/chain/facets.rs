@@ -1,9 +1,9 @@
-//! The parts of a chain's faces that bound its volume. The chain's boundary also has sheets inside the
-//! volume, where layers overlap: distances must not be measured from those.
+//! The parts of a chain's faces that bound its volume. Where layers overlap, the chain's boundary also has sheets inside the volume:
+//! distances must not be measured from those.
 //!
-//! A point of a face is open when the chain is absent a hair in front of it, and present behind it. Faces are small
-//! compared with the volume, so one sample decides for a face unless its neighbourhood disagrees; then its corners
-//! are sampled too, and the face is clipped where it enters the volume.
+//! A point of a face is open if the chain is absent slightly in front of it and present slightly behind it. Faces are small compared with
+//! the volume, so one sample decides for a face unless its neighbourhood disagrees; then its corners are sampled too, and the face is
+//! clipped where it enters the volume.
 
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -24,9 +24,9 @@ use crate::sweep::signed_distance::exposure::{BURIED, Exposure, OPEN, THIN};
 pub struct Facet {
     /// Corners, counter-clockwise seen from outside.
     pub v: Corners,
-    /// The face of the chain that it is a part of.
+    /// The chain's face that it is a part of.
     pub face: u32,
-    /// Whether it is open throughout; otherwise it is open where it was sampled, and buried sheets pass nearby.
+    /// Whether it is known to be open throughout; otherwise it is open where it was sampled, and buried sheets pass nearby.
     pub sure: bool,
 }
 
@@ -36,8 +36,8 @@ type Part = (Corners, bool);
 /// Corners of a triangle.
 pub type Corners = [Fixed; 3];
 
-/// Depth (fixed-point units) up to which a sheet counts as surface: the sides of a sweep are folds of many
-/// sheets, closer together than the sweep's own tolerance.
+/// Depth (fixed-point units) up to which a sheet counts as surface: the sides of a sweep are folds of many sheets that are closer together
+/// than the sweep's own tolerance.
 const HAIR: f64 = 0.005 * UNITS as f64;
 /// [`THIN`], in hairs.
 const THIN_HAIRS: f64 = THIN * UNITS as f64 / HAIR;
@@ -47,24 +47,23 @@ const SMALL: f32 = 1.5;
 const LONG: f32 = 3.0;
 /// Distance between the samples of a long face (fixed-point units).
 const SPACING: f64 = 1.2 * UNITS as f64;
-/// Their distance where a face is sampled again because it is buried among open ones.
+/// Their spacing where a face is sampled again because it is buried among open ones.
 const CLOSER: f64 = 0.6 * UNITS as f64;
-/// Corners are sampled this fraction of the way to the centre, away from the edges shared with neighbours.
+/// Sample points at corners are moved this fraction of the way to the centre, away from the edges shared with neighbours.
 const INSET: f64 = 0.05;
 /// Bisections that find where an edge enters the volume: to 1/16 of its length.
 const HALVINGS: usize = 3;
-/// Flag of a bin that is a stack, whose surface is made of patches.
+/// Flag of a bin that is a stack, where the surface consists of patches.
 const STACK: u8 = 4;
 /// Flag of any other bin.
 const LOOSE: u8 = 8;
 /// Flag of a long face that no line crosses.
 const SLIVER: u8 = 16;
-/// Flag of a small open face in a stack: patches may not reach it.
+/// Flag of a small open face in a stack, which patches may not cover.
 const SPECK: u8 = 32;
 /// The small faces of a stack are sampled in bins with at most this many faces.
 const MANY: usize = 2000;
-/// Gaps in front of an open face are wider than this (hairs). Sheets of successive poses leave narrower slits, within the
-/// motion's tolerance.
+/// Gaps in front of an open face are wider than this (hairs). Sheets of successive poses leave narrower slits, within the motion's tolerance.
 const SLIT: f64 = 3.0;
 const OPEN_AND_LOOSE: u8 = OPEN | LOOSE;
 /// Faces per task: fixed, so that nothing depends on the number of threads.
@@ -108,7 +107,7 @@ pub fn facets(ctx: &Context, bins: &Bins, exposure: &Exposure) -> Result<Vec<Fac
     Ok(facets)
 }
 
-/// The faces sorted by bin, so that a bin's prisms stay cached.
+/// The faces sorted by bin, so that a bin's prisms stay in the cache.
 fn order(bins: &Bins) -> Vec<u32> {
     let position = |id: usize| (bins.of_voxel(voxel_of(middle(&bins.faces[id].v))), id as u32);
     let mut positions: Vec<(Option<usize>, u32)> =
@@ -117,7 +116,7 @@ fn order(bins: &Bins) -> Vec<u32> {
     positions.into_iter().map(|(_, id)| id).collect()
 }
 
-/// The flags of each bin: whether it is a stack, and its faces' verdicts; and for each face the flags of all its bins.
+/// The flags of each bin: whether it is a stack, and the verdicts of its faces; and for each face the combined flags of its bins.
 fn neighbourhoods(bins: &Bins, exposure: &Exposure, verdicts: &[u8]) -> (Vec<u8>, Vec<u8>) {
     let seen: Vec<AtomicU8> = verdicts.iter().map(|_| AtomicU8::new(0)).collect();
     let around: Vec<AtomicU8> = (0..bins.count()).map(|_| AtomicU8::new(0)).collect();
@@ -154,8 +153,8 @@ pub fn open_parts(
     out.into_iter().map(|(v, _)| v).collect()
 }
 
-/// [`OPEN`] or [`BURIED`], for a point of a face. It is open when the chain is present a hair behind it, and absent a hair
-/// and [`SLIT`] in front of it, or in a stack [`THIN`] in front of it.
+/// [`OPEN`] or [`BURIED`], for a point of a face. It is open if the chain is present a hair behind it, and absent both a hair and [`SLIT`]
+/// in front of it, or, in a stack, [`THIN`] in front of it.
 fn classify(bins: &Bins, exposure: &Exposure, at: Point, ahead: Point, prisms: &mut Prisms) -> u8 {
     let moved = |side: f64| [0, 1, 2].map(|axis| at[axis] + side * ahead[axis]);
     let [front, back] = bins.windings(moved(1.0), moved(-1.0), prisms);
@@ -176,8 +175,8 @@ fn ahead(bins: &Bins, id: usize) -> Option<Point> {
 }
 
 impl Clipper<'_> {
-    /// The flags of a face: [`OPEN`] and [`BURIED`] from the lines that cross it and from samples. In a stack only slivers
-    /// and specks are sampled.
+    /// The flags of a face: [`OPEN`] and [`BURIED`], from the lines that cross it and from samples. In a stack only slivers and specks are
+    /// sampled.
     fn verdict(&mut self, id: usize) -> u8 {
         let (v, seen) = (self.bins.faces[id].v, self.exposure.faces[id]);
         let Some(ahead) = ahead(self.bins, id) else { return seen | BURIED };
@@ -202,7 +201,7 @@ impl Clipper<'_> {
         front < 1 && back >= 1 && self.bins.windings(moved(SLIT), at, &mut self.prisms)[0] < 1
     }
 
-    /// Whether a long face passes between the lines: no patch covers it.
+    /// Whether a long face passes between the lines, so that no patch covers it.
     fn is_sliver(&self, id: usize) -> bool {
         let (low, high) = extent(&self.bins.faces[id].v);
         self.exposure.faces[id] == 0 && (0..3).any(|axis| high[axis] - low[axis] > LONG)
@@ -257,7 +256,7 @@ impl Clipper<'_> {
         }
     }
 
-    /// As [`Clipper::dice`], for a part with the flags `own` that has open and buried faces, or stacks, around it.
+    /// As [`Clipper::dice`], for a part with the flags `own` that has both open and buried faces, or stacks, around it.
     fn split(
         &mut self,
         id: usize,
@@ -327,7 +326,7 @@ impl Clipper<'_> {
         self.clip_by(v, open, ahead, out);
     }
 
-    /// Adds the open part of a triangle with open and buried corners, cut off along a straight line.
+    /// Adds the open part of a triangle that has open and buried corners, cut off along a straight line.
     fn clip_by(&mut self, v: Corners, open: [bool; 3], ahead: Point, out: &mut Vec<Part>) {
         let alone = (0..3).find(|&i| open[i] != open[(i + 1) % 3] && open[i] != open[(i + 2) % 3]);
         let turn = alone.unwrap_or(0);
@@ -340,7 +339,7 @@ impl Clipper<'_> {
         }
     }
 
-    /// Where an edge changes between open and buried; `open` is whether `a` is open, and `b` is the opposite.
+    /// The point where an edge changes between open and buried; `open` is whether `a` is open, and `b` is the opposite.
     fn rim(&mut self, a: Fixed, b: Fixed, open: bool, ahead: Point) -> Fixed {
         let (a, b) = (a.map(f64::from), b.map(f64::from));
         let (mut first, mut last) = (0.0, 1.0);
@@ -356,20 +355,19 @@ impl Clipper<'_> {
         classify(self.bins, self.exposure, at, ahead, &mut self.prisms)
     }
 
-    /// Whether distances may be wanted near a point, and do not come from a stack's patches.
+    /// Whether distances may be wanted near a point where patches of a stack do not provide them.
     fn is_sampled(&self, at: Point) -> bool {
         self.bins.of_voxel(voxel_of(at)).is_some_and(|bin| !self.exposure.stacks[bin])
     }
 }
 
-/// Whether one sample decides for a part of a face.
+/// Whether one sample is enough for a part of a face.
 pub fn is_small(v: &Corners) -> bool {
     let (low, high) = extent(v);
     (0..3).all(|axis| high[axis] - low[axis] <= SMALL)
 }
 
-/// Calls `see` with the centroid of a small triangle, else with points about `spacing` apart in rows along the longest
-/// edge.
+/// Calls `see` with the centroid of a small triangle, otherwise with points about `spacing` apart in rows along the longest edge.
 fn each_sample(v: &Corners, spacing: f64, mut see: impl FnMut(Point)) {
     if is_small(v) {
         return see(middle(v));

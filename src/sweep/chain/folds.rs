@@ -1,10 +1,10 @@
 //! Self-inverting surfaces in a sweep.
 //!
-//! Where the winding number of a pose is negative, outward motion only brings it back to 0: the point is not swept, though
-//! the surface passed it outward. A point is swept when its winding number reaches 1 at some time. So near such positions each
-//! outward passage is tested at sample points: the winding number of the pose before, plus the passages earlier in the same
-//! step, must not be negative, or the passage does not count. Where the first pose has a negative winding number the chain
-//! starts below 0 too: the passage that brings it to 0 for the first time counts.
+//! Where the winding number of a pose is negative, outward motion only brings it back to 0: the point is not swept, although the surface
+//! passed it outward. A point is swept when its winding number reaches 1 at some time. Near such positions each outward passage is
+//! therefore tested at sample points: the winding number of the pose before, plus the passages earlier in the same step, must not be
+//! negative, or the passage does not count. Where the first pose has a negative winding number, the chain also starts below 0: the passage
+//! that first brings it to 0 counts.
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -29,7 +29,7 @@ const GRAIN: usize = 4096;
 /// Passages or points per task.
 const FEW: usize = 64;
 
-/// Clears the bits (see [`crate::sweep::chain`]) of tetrahedra through which the surface only returns from inside out.
+/// Clears the bits (see [`crate::sweep::chain`]) of tetrahedra in which the surface only returns from being inside out.
 ///
 /// # Errors
 /// Cancel.
@@ -57,7 +57,7 @@ pub fn drop_returns(
     Ok(())
 }
 
-/// Where to look for passages that return from inside out.
+/// Where to look for passages that return from being inside out.
 enum Folded {
     /// All poses are rigid motions of the first one; the triangles near its negative winding numbers.
     Rigid(Vec<u32>),
@@ -106,7 +106,7 @@ impl Folded {
     }
 }
 
-/// A window grown by the largest displacement from the first pose: what enters the window is in it at the first pose.
+/// A window grown by the largest displacement from the first pose: whatever enters the window is inside it at the first pose.
 fn grown(window: &Window, levels: &[Vec<Fixed>]) -> Window {
     let way = |level: &Vec<Fixed>| {
         let ways =
@@ -135,7 +135,7 @@ fn touching(topology: &Topology, level: &[Fixed], blocks: &HashSet<[i32; 3]>) ->
     (0..topology.simplices.len() as u32).filter(|&id| touches(&topology.simplices[id as usize])).collect()
 }
 
-/// The blocks with negative winding numbers of a pose, and those around them.
+/// The blocks of a pose with negative winding numbers, and those around them.
 fn folded_blocks(
     ctx: &Context,
     topology: &Topology,
@@ -193,11 +193,11 @@ fn negative_blocks(faces: &[Face], window: &Window) -> Vec<[i32; 3]> {
     out
 }
 
-/// The passages of a step that return from inside out.
+/// The passages of a step that return from being inside out.
 #[derive(Default)]
 struct Returns {
     positions: Vec<Place>,
-    /// Sample points of them with a negative winding number at the first pose, which may come to 0 for the first time.
+    /// Their sample points with a negative winding number at the first pose, where the number may reach 0 for the first time.
     early: Vec<Early>,
 }
 
@@ -242,7 +242,7 @@ fn returns(ctx: &Context, poses: &Poses<'_>, step: usize, triangles: &[u32]) -> 
     Ok(Returns { positions, early: found.into_iter().flat_map(|(_, early)| early).collect() })
 }
 
-/// The passages whose points no earlier step brings to 0.
+/// The passages whose points are not brought to 0 by an earlier step.
 fn first_ones(ctx: &Context, poses: &Poses<'_>, mut early: Vec<Early>) -> Result<Vec<Place>> {
     let mut first = Vec::new();
     for step in 0..poses.levels.len() - 1 {

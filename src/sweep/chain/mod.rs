@@ -1,12 +1,10 @@
 //! The signed space-time chain of a moving mesh and its boundary.
 //!
-//! Between two poses each triangle sweeps a prism, split into three tetrahedra by ascending vertex
-//! index so that neighbours match: T1 = (a0 a1 a2 b2), T2 = (a0 a1 b1 b2), T3 = (a0 b0 b1 b2), a the
-//! earlier and b the later pose. The chain is the solid at the first pose plus every tetrahedron
-//! through which the surface moves outward (but see [`folds`]); points with winding number > 0 are the swept
-//! volume.
-//! Only the boundary of the chain is built: faces between two tetrahedra that are both in the chain,
-//! or both out of it, cancel and are never made.
+//! Between two poses each triangle sweeps a prism, split into three tetrahedra by ascending vertex index so that neighbours match: T1 = (a0
+//! a1 a2 b2), T2 = (a0 a1 b1 b2), T3 = (a0 b0 b1 b2), where a is the earlier and b the later pose. The chain is the solid at the first pose
+//! plus every tetrahedron through which the surface moves outward (with the exceptions in [`folds`]); points with winding number > 0 are
+//! the swept volume. Only the boundary of the chain is built: faces between two tetrahedra that are both in the chain, or both not in it,
+//! cancel and are never made.
 
 pub(in crate::sweep) mod facets;
 mod folds;
@@ -23,22 +21,22 @@ use crate::distance::vectors::{cross, difference, dot};
 use crate::error::Result;
 use folds::drop_returns;
 
-/// How often the parts of a moving mesh count in the chain.
+/// The weights with which a moving mesh contributes to the chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Weights {
-    /// Weight of the solid at the first pose (1; 0 leaves it out; negative cuts it away).
+    /// Weight of the solid at the first pose (normally 1; 0 omits it, a negative weight subtracts it).
     pub solid: i32,
-    /// Weight of what is swept outward (1).
+    /// Weight of the part that is swept outward (normally 1).
     pub swept: i32,
 }
 
-/// Fixed-point box in which a sweep is wanted. Faces are made wherever they may be met by a line along z through it, the axis of
-/// the scan lines: which voxels are inside is known from all that a line meets, below the box and above it.
+/// Fixed-point box in which a sweep is wanted. Faces are made wherever a line along z (the axis of the scan lines) through it may meet
+/// them: which voxels are inside depends on everything that a line meets, above and below the box too.
 #[derive(Debug, Clone, Copy)]
 pub struct Window {
-    /// Least corner.
+    /// Minimum corner.
     pub min: Fixed,
-    /// Greatest corner.
+    /// Maximum corner.
     pub max: Fixed,
 }
 
@@ -49,7 +47,7 @@ impl Window {
     }
 }
 
-/// Outward motion below this (fixed-point units) counts as none: otherwise rounding would decide it.
+/// Outward motion below this (fixed-point units) counts as none: otherwise its sign would be decided by rounding.
 pub const STILL: f64 = 4.0 / 4096.0 * UNITS as f64;
 /// Triangles or edges per task: fixed, so that the order of faces never depends on the number of threads.
 const GRAIN: usize = 2048;
@@ -151,7 +149,7 @@ fn mark_outward(
     }
 }
 
-/// Faces of one triangle: itself at each pose, and the two between the tetrahedra of each prism.
+/// Faces of one triangle: the triangle itself at each pose, and the two between the tetrahedra of each prism.
 fn caps(
     topology: &Topology,
     levels: &[Vec<Fixed>],
@@ -184,8 +182,7 @@ fn caps(
     }
 }
 
-/// The two faces that an edge (i, j) sweeps in each step, (ai aj bj) and (ai bi bj), where the
-/// tetrahedra beside them do not cancel.
+/// The two faces that an edge (i, j) sweeps in each step, (ai aj bj) and (ai bi bj), where the tetrahedra beside them do not cancel.
 fn sides(
     topology: &Topology,
     levels: &[Vec<Fixed>],

@@ -1,9 +1,8 @@
 //! The surface of a stack of sheets.
 //!
-//! A body that turns about an axis of near symmetry sweeps hundreds of sheets that nearly coincide; its surface is a
-//! mosaic of slivers, too small to sample each. But it is smooth except at its edges, and lines through voxels meet it
-//! at least once per cell: around such a spot the plane of the exposed face is the surface, as far as the volume lies
-//! close behind it and not in front.
+//! A body that turns about an axis of near symmetry sweeps hundreds of nearly coincident sheets; its surface is a mosaic of slivers, too
+//! small to sample each. But it is smooth except at its edges, and lines through voxels meet it at least once per cell: around such a spot
+//! the plane of the exposed face approximates the surface, as far as the volume lies close behind the plane and not in front of it.
 
 use rayon::prelude::*;
 
@@ -16,21 +15,21 @@ use crate::error::Result;
 use crate::sweep::signed_distance::bins::{Bins, Point};
 use crate::sweep::signed_distance::exposure::{Exposure, Spot};
 
-/// How far (cells) the surface may lie from a patch's plane.
+/// Maximum distance (cells) of the surface from a patch's plane.
 const OFF: f64 = 0.04;
 /// The same on the neighbouring lines: between them the surface is nearer to the plane.
 const OFF_BESIDE: f64 = 2.0 * OFF;
-/// Half the edge (cells, seen along its line) of a square patch, where the neighbouring lines agree with its plane.
+/// Half the edge (cells, seen along its line) of a square patch, used where the neighbouring lines agree with its plane.
 const HALF: f64 = 0.51;
-/// Radius (cells) of other patches, at most.
+/// Maximum radius (cells) of other patches.
 const REACH: f64 = 1.0;
 /// Bisections that find where the surface leaves a patch's plane: to 1/64 of its radius.
 const HALVINGS: usize = 4;
-/// Where a patch's mean radius, relative to [`REACH`], is less than this, its whole face becomes a facet too.
+/// If a patch's mean radius, relative to [`REACH`], is less than this, its whole face becomes a facet too.
 const LEAST: f64 = 0.25;
 /// Spots per task: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 32;
-/// Directions, in its plane, in which a patch's radius is found.
+/// Number of directions in the patch's plane in which its radius is measured.
 const WAYS: usize = 12;
 
 /// Makes patches, on one thread.
@@ -96,7 +95,7 @@ impl Patches<'_> {
         })
     }
 
-    /// How far (0 to 1) along a path from the spot its plane is the surface.
+    /// The fraction (0 to 1) of a path from the spot along which the plane is the surface.
     fn reach(&mut self, normal: &Point, position: impl Fn(f64) -> Point) -> f64 {
         let (mut first, mut last) = (0.0, 0.5);
         if self.is_surface(position(0.5), normal) {
@@ -123,7 +122,7 @@ impl Patches<'_> {
     }
 }
 
-/// The point of a spot's plane on the line at this offset (cells) from its own.
+/// The point of a spot's plane on the line at this offset (cells) from the spot's own line.
 fn on_plane(spot: &Spot, normal: &Point, [p, q]: [f64; 2]) -> Point {
     let way = spot.axis.beside([p, q]);
     let mut at = spot.at();

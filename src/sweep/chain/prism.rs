@@ -8,13 +8,13 @@ use crate::sweep::signed_distance::bins::Point;
 
 /// Prisms tested at once.
 const LANES: usize = 8;
-/// Values nearer to 0 than this (cells) are not decided in 32-bit arithmetic.
+/// Values closer to 0 than this (cells) are not decided in 32-bit arithmetic.
 const CLEAR: f32 = 1e-3;
-/// Greatest distance (cells) of the points beside a query point whose winding numbers are found with its own.
+/// Maximum distance (cells) from a query point of the points beside it whose winding numbers are found together with its own.
 pub const BESIDE: f32 = 0.02;
 
-/// Height over the triangle's plane, then for each edge the distance inward of it (cells), as linear functions of a
-/// position: `f[0] * p.x + f[1] * p.y + f[2] * p.z + f[3]`. One cache line.
+/// Height above the triangle's plane, then for each edge the distance to its inner side (cells), as linear functions of a position: `f[0] *
+/// p.x + f[1] * p.y + f[2] * p.z + f[3]`. One cache line.
 #[repr(align(64))]
 #[derive(Debug, Clone, Copy)]
 pub struct Prism([[f32; 4]; 4]);
@@ -34,7 +34,7 @@ impl Prism {
     }
 }
 
-/// Bins whose prisms are cached.
+/// Number of bins whose prisms are cached.
 const KEPT: usize = 12;
 
 /// Cache of the prisms of the bins that one thread queried last.
@@ -45,12 +45,12 @@ pub struct Prisms {
     /// Indices of the bins.
     bins: Vec<usize>,
     groups: Vec<BinPrisms>,
-    /// The one that was replaced last.
+    /// The entry that was replaced last.
     oldest: usize,
 }
 
 impl Prisms {
-    /// The prisms of a chain's bin; `prisms` makes them, each with its face's index and coefficient, if not cached.
+    /// The prisms of a chain's bin; if they are not cached, `prisms` makes them, each with its face's index and coefficient.
     pub fn of<I>(&mut self, chain: u64, bin: usize, prisms: impl FnOnce() -> I) -> &mut BinPrisms
     where
         I: Iterator<Item = (Prism, u32, i32)>,
@@ -95,9 +95,9 @@ struct Group {
     coef: [i32; LANES],
 }
 
-/// How winding numbers change along a segment, and from its end to two points near it.
+/// How winding numbers change along a segment, and from its end to a point near it.
 pub struct Change {
-    /// From its beginning to its end, by the faces that 32-bit arithmetic decides.
+    /// From its beginning to its end, through the faces that 32-bit arithmetic decides.
     pub along: i32,
     /// From its end to the point beside it.
     pub beside: i32,
@@ -111,7 +111,7 @@ impl BinPrisms {
         for (Prism(functions), face, coef) in prisms {
             let lane = self.faces.len() % LANES;
             if lane == 0 {
-                // Lanes without a face: everything is far in front of the plane.
+                // Lanes without a face: every point is far in front of the plane.
                 let mut none = [[0.0; LANES]; 16];
                 none[3] = [1e9; LANES];
                 self.groups.push(Group { functions: none, coef: [0; LANES] });
@@ -123,15 +123,15 @@ impl BinPrisms {
         }
     }
 
-    /// How winding numbers change from `begin` to `end`, and from there to `beside`, at most [`BESIDE`] away.
+    /// How winding numbers change from `begin` to `end`, and from there to `beside`, which is at most [`BESIDE`] away.
     pub fn query(&mut self, begin: [f32; 3], end: [f32; 3], beside: [f32; 3]) -> Change {
         self.unclear.clear();
         let [along, beside] = pass(&self.groups, begin, end, beside, &mut self.unclear);
         Change { along, beside }
     }
 
-    /// Faces, with their coefficients, that 32-bit arithmetic could not decide for the last query: its segment starts too
-    /// close to their plane or passes too close to an edge.
+    /// Faces, with their coefficients, that 32-bit arithmetic could not decide for the last query: its segment starts too close to their
+    /// plane or passes too close to an edge.
     pub fn unclear(&self) -> impl Iterator<Item = (u32, i32)> {
         self.unclear.iter().map(|&at| {
             let at = at as usize;
@@ -140,7 +140,7 @@ impl BinPrisms {
     }
 }
 
-/// Sums the changes along the segment and to the two points near its end, and lists the undecided prisms.
+/// Sums the changes along the segment and to the point near its end, and lists the undecided prisms.
 fn pass(
     groups: &[Group],
     begin: [f32; 3],
@@ -205,7 +205,7 @@ fn pass(
 mod tests {
     use super::*;
 
-    /// Eleven sheets, one cell apart, that face up; the one at height k counts k + 1 times.
+    /// Eleven upward-facing sheets, one cell apart; the one at height k counts k + 1 times.
     fn sheets() -> BinPrisms {
         let sheet = |k: i32| {
             let v = [[0, 0, k], [8, 0, k], [0, 8, k]].map(|p| p.map(|cells| cells * UNITS));

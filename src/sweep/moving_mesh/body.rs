@@ -1,4 +1,4 @@
-//! A moving body as the chain needs it: closed triangles, and poses at well-chosen times.
+//! A moving body as the chain needs it: closed triangles, and poses at suitable times.
 
 use std::sync::Arc;
 
@@ -18,20 +18,19 @@ use crate::geometry::mesh::{coincident, spacing};
 use crate::motion::Motion;
 use crate::sweep::chain::{Weights, Window, boundary};
 
-/// Length of a step's path relative to the pieces that edges are split into; this value gave the fewest faces and the
-/// least time.
+/// Length of a step's path relative to the pieces that edges are split into; by measurement, this value gave the fewest faces and the
+/// shortest time.
 const SHORTER: f64 = 1.5;
-/// Steps need be no shorter than this (cells), and no more than [`MOST_OF_ARCS`] times those that arcs need; measured
-/// too.
+/// Steps need not be shorter than this (cells), nor more than [`MOST_OF_ARCS`] times as many as arcs need; also measured.
 const LEAST_WAY: f64 = 4.0;
 const MOST_OF_ARCS: f64 = 1.5;
-/// Most steps in an interval between two breaks of a motion.
+/// Maximum number of steps in an interval between two breaks of a motion.
 const MOST_STEPS: f64 = 1024.0;
-/// Greatest rotation (radians) in an interval whose arcs are judged from five poses: a quarter turn.
+/// Maximum rotation (radians) in an interval whose arcs are judged from five poses: a quarter turn.
 const TURNING: f64 = std::f64::consts::FRAC_PI_2;
-/// Greatest rotation in a frame (radians): 64 turns.
+/// Maximum rotation in a frame (radians): 64 turns.
 const MOST_TURNING: f64 = 64.0 * std::f64::consts::TAU;
-/// Bytes per vertex of a pose: in cells, in fixed point, and its part of the faces.
+/// Bytes per vertex of a pose: in cells, in fixed point, and its share of the faces.
 const BYTES_PER_POSITION: usize = 100;
 /// Vertices or edges per task.
 const GRAIN: usize = 2048;
@@ -45,30 +44,30 @@ pub struct Body {
     name: Option<String>,
 }
 
-/// What stays the same while a body's vertices move: its topology and orientation.
+/// What does not change while a body's vertices move: its topology and orientation.
 pub struct Shape {
     /// Hash of the triangles.
     triangles: u128,
-    /// For each vertex the first one at the same position; itself when there is none before it.
+    /// For each vertex, the first vertex at the same position; itself if there is none before it.
     exact: Vec<u32>,
-    /// What these leave open.
+    /// The boundary that remains when these are joined.
     boundary: Boundary,
-    /// Which vertices are one corner, those within rounding of one another included.
+    /// Which vertices form one corner, including those within rounding of one another.
     weld: Weld,
-    /// How far welded vertices that are not at one position were apart (m), at most.
+    /// Maximum distance (m) between welded vertices that are not at the same position.
     slack: f64,
-    /// The triangles as they have to be turned, where they are not the motion's own.
+    /// The reoriented triangles, if they differ from the motion's own.
     oriented: Option<Vec<[u32; 3]>>,
     topology: Topology,
     contradictions: usize,
-    /// What of its orientation is not decided, in a sentence.
+    /// A sentence about the part of its orientation that is ambiguous.
     doubts: Option<String>,
 }
 
 impl Body {
-    /// Prepares a motion by its pose at `time` (s): welds vertices that coincide, or on open edges lie within rounding of each other
-    /// ([`Weld`]), leaves out doubled triangles, turns closed parts outward (see [`crate::geometry::check::orientation`]) and closes open loops;
-    /// open parts are turned round where the whole solid would have a negative volume.
+    /// Prepares a motion from its pose at `time` (s): welds vertices that coincide or, on open edges, lie within rounding of each other
+    /// ([`Weld`]), omits duplicate triangles, orients closed components outward (see [`crate::geometry::check::orientation`]) and closes
+    /// open loops; open components are flipped if the whole solid would otherwise have a negative volume.
     ///
     /// # Errors
     /// When the motion has no triangles, or its pose cannot be computed.
@@ -76,8 +75,8 @@ impl Body {
         Self::shaped(motion, time, None)
     }
 
-    /// As [`Body::new`]; `known` is the shape of an earlier body, which is shared if this body has the same one, and its
-    /// volume is not negative with it.
+    /// As [`Body::new`]; `known` is the shape of an earlier body, which is shared if this body has the same shape and, with it, a volume
+    /// that is not negative.
     ///
     /// # Errors
     /// As [`Body::new`].
@@ -140,28 +139,28 @@ impl Body {
         self.shape.topology.derived.len()
     }
 
-    /// Number of edges whose triangles disagree about inside and outside: two or more run along the edge one way without a
+    /// Number of edges whose triangles disagree about inside and outside: two or more run along the edge in one direction without a
     /// counterpart.
     pub fn contradictions(&self) -> usize {
         self.shape.contradictions
     }
 
-    /// For each vertex of its motion the first one that is the same corner; itself where there is none before it.
+    /// For each vertex of its motion, the first vertex of the same corner; itself if there is none before it.
     pub fn corners(&self) -> &[u32] {
         &self.shape.weld.firsts
     }
 
-    /// What to say about corners that rounding does not decide; none where there are none.
+    /// A warning about corners that are ambiguous within rounding; none if there are none.
     pub fn weld_warning(&self) -> Option<String> {
         self.shape.weld.warning()
     }
 
-    /// Its triangles with the caps of its open loops, counter-clockwise seen from outside; [`Body::closed_pose`] has their vertices.
+    /// Its triangles, including the caps of its open loops, counter-clockwise seen from outside; [`Body::closed_pose`] has their vertices.
     pub fn closed_triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         self.shape.topology.simplices.iter().map(Simplex::triangle)
     }
 
-    /// The pose (m) at a time (s), and the vertices in the middle of its caps.
+    /// The pose (m) at a time (s), followed by the centre vertices of its caps.
     ///
     /// # Errors
     /// When the pose cannot be computed.
@@ -171,7 +170,7 @@ impl Body {
         Ok(())
     }
 
-    /// Share of its surface at a pose of [`Body::closed_pose`] that is caps, 0..=1.
+    /// Share of its surface that consists of caps, 0..=1, at a pose of [`Body::closed_pose`].
     pub fn share_of_caps(&self, pose: &[DVec3]) -> f64 {
         let topology = &self.shape.topology;
         let area = |simplex: &Simplex| simplex.doubled_area(pose);
@@ -179,17 +178,17 @@ impl Body {
         if all > 0.0 { topology.caps().map(area).sum::<f64>() / all } else { 0.0 }
     }
 
-    /// Its motion's triangles, turned so that they face outward, without doubled ones.
+    /// Its motion's triangles, oriented outward and without duplicates.
     pub fn triangles(&self) -> &[[u32; 3]] {
         self.shape.oriented.as_deref().unwrap_or(self.motion.triangles())
     }
 
-    /// What of its orientation is not decided, in a sentence without its name.
+    /// A sentence about the part of its orientation that is ambiguous, without its name.
     pub fn doubts(&self) -> Option<&str> {
         self.shape.doubts.as_deref()
     }
 
-    /// What to say of triangles that do not agree about inside and outside, in a sentence without its name.
+    /// A warning about triangles that disagree about inside and outside, as a sentence without its name.
     pub fn warning(&self) -> Option<String> {
         let edges = self.contradictions();
         let disagree = || {
@@ -211,8 +210,8 @@ impl Body {
         &*self.motion
     }
 
-    /// Boundary of the chain that the body sweeps from `from` to `to` (s); the pose itself when they
-    /// are equal. `tolerance` (cells) bounds the error against true arcs and flat moving triangles.
+    /// Boundary of the chain that the body sweeps from `from` to `to` (s), or of the pose itself if they are equal. `tolerance` (cells)
+    /// bounds the error against true arcs and flat moving triangles.
     ///
     /// # Errors
     /// When a pose cannot be computed or a vertex is too far away for the lattice.
@@ -248,7 +247,7 @@ impl Body {
         boundary(ctx, refined.as_ref().unwrap_or(topology), &levels, weights, window)
     }
 
-    /// Poses (cells) at times so dense that straight steps stay within `tolerance` of the motion.
+    /// Poses (cells), dense enough in time that straight steps stay within `tolerance` of the motion.
     fn poses(
         &self,
         ctx: &Context,
@@ -309,8 +308,8 @@ impl Body {
         Ok(turning)
     }
 
-    /// Ends of the parts of an interval in which steps are chosen: the motion's breaks, and times between which it turns so
-    /// little that five poses show how far its paths are from straight lines.
+    /// Ends of the sub-intervals in which steps are chosen: the motion's breaks, and times between which it rotates so little that five
+    /// poses show how far its paths deviate from straight lines.
     fn ends(&self, from: f64, to: f64) -> Result<Vec<f64>> {
         self.turning(from, to)?;
         let mut ends = Vec::new();
@@ -339,7 +338,7 @@ impl Body {
         let arcs = (bend.sqrt() / tolerance).sqrt();
         let ends = [&probes[0][..], &probes[4][..]];
         let own = self.shape.topology.own_vertices as u32;
-        // Enough that the faces that edges sweep, once the edges are split, are well shaped.
+        // Enough steps that the faces swept by edges are well shaped once the edges are split.
         let twist = |edge: &[u32; 2]| {
             let error = if edge[1] < own { edge_error(ends, *edge) } else { 0.0 };
             if error <= tolerance || !near.sees(ends, edge) {
@@ -356,7 +355,7 @@ impl Body {
         arcs.max(twists).ceil().clamp(1.0, MOST_STEPS) as usize
     }
 
-    /// Whether welded vertices have moved apart in poses (cells), by more than the rounding of their coordinates.
+    /// Whether welded vertices move apart in the poses (cells) by more than the rounding of their coordinates.
     fn welds_part(&self, poses: &[Vec<DVec3>], lattice: &Lattice) -> bool {
         let Shape { weld, slack, .. } = &*self.shape;
         let origin = DVec3::from(lattice.origin.map(f64::from));
@@ -399,14 +398,14 @@ impl Near {
         self.touches(path.iter().copied(), self.longest)
     }
 
-    /// Whether what an edge sweeps in a step can touch the window.
+    /// Whether the patch that an edge sweeps in a step can touch the window.
     fn sees(&self, step: [&[DVec3]; 2], edge: &[u32; 2]) -> bool {
         self.touches(step.into_iter().flat_map(|pose| edge.map(|vertex| pose[vertex as usize])), 1.0)
     }
 }
 
 impl Shape {
-    /// Of a motion that has this pose at a time (s), where the hash of its triangles and its vertices at equal positions are known.
+    /// The shape of a motion with this pose at a time (s), given the hash of its triangles and its vertices at equal positions.
     fn new(motion: &dyn Motion, time: f64, pose: &[DVec3], triangles: u128, exact: Vec<u32>) -> Result<Self> {
         let own = motion.triangles();
         let (mut boundary, mut weld) =

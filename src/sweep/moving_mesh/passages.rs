@@ -1,4 +1,4 @@
-//! When the surface of a moving mesh passes points, between its poses.
+//! When the surface of a moving mesh passes given points, between its poses.
 
 use super::topology::{Simplex, Topology};
 use crate::distance::Face;
@@ -8,9 +8,9 @@ use crate::distance::region::each_block;
 use crate::geometry::DVec3;
 use crate::sweep::chain::STILL;
 
-/// Least edge (fixed-point units) of the boxes that tetrahedra and faces are sorted into.
+/// Minimum edge (fixed-point units) of the boxes that tetrahedra and faces are sorted into.
 const BOX: f64 = UNITS as f64;
-/// Most boxes per item that is sorted into them.
+/// Maximum number of boxes per item that is sorted into them.
 const BOXES: usize = 4;
 /// Sample points of a tetrahedron: barycentric weights, off all symmetries.
 const SAMPLES: [[f64; 4]; 5] = [
@@ -34,13 +34,13 @@ pub struct Place {
     pub triangle: u32,
     /// From this pose to the next.
     pub step: u32,
-    /// Which of the prism's three, from 0.
+    /// Which of the prism's three tetrahedra, from 0.
     pub part: u32,
 }
 
 /// A tetrahedron that the surface passes through.
 pub struct Passage {
-    /// Which one.
+    /// Identifies the tetrahedron.
     pub position: Place,
     /// 1 when the surface moves outward, -1 when inward.
     pub sign: i32,
@@ -49,12 +49,12 @@ pub struct Passage {
     weights: [DVec3; 3],
 }
 
-/// What a passage does to the winding number of a point.
+/// The effect of a passage on the winding number of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
     /// It rises above 0.
     Counts,
-    /// It returns to 0, or less; it was not negative at some earlier time in the same step.
+    /// It returns to 0 or less, and was not negative at some earlier time in the same step.
     Returns,
     /// It rises to 0 or less, and was negative since the step began.
     Rises,
@@ -89,12 +89,12 @@ impl Poses<'_> {
 /// A pose, prepared for queries at given points.
 pub struct Still {
     faces: Vec<[DVec3; 3]>,
-    /// Which of them are above or below each box.
+    /// The faces above or below each box.
     columns: Boxes,
 }
 
 impl Still {
-    /// Prepares a pose for these points.
+    /// Prepares a pose for queries at these points.
     pub fn new(poses: &Poses<'_>, level: usize, points: &[DVec3]) -> Self {
         let flat = |p: DVec3| DVec3::new(p.x, p.y, 0.0);
         let (least, most) = bounds(points);
@@ -124,7 +124,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// Prepares the step that begins at this pose for these points.
+    /// Prepares the step that begins at this pose for queries at these points.
     pub fn new(poses: &Poses<'_>, step: usize, points: &[DVec3]) -> Self {
         let (least, most) = bounds(points);
         let is_near = |triangle: &u32| {
@@ -144,12 +144,12 @@ impl Step {
         let near = self.boxes.at(p).iter().map(|&id| &self.passages[id as usize]);
         let mut passing: Vec<(f64, &Passage)> =
             near.filter_map(|passage| passage.time(p).map(|time| (time, passage))).collect();
-        // A stable sort: at equal times in the order of triangles.
+        // A stable sort: passages at equal times stay in the order of the triangles.
         passing.sort_by(|a, b| a.0.total_cmp(&b.0));
         passing
     }
 
-    /// What a passage does at one of the points.
+    /// The effect of a passage at one of the points.
     pub fn change(&self, position: Place, p: &DVec3) -> Change {
         let mut winding = self.before.winding(p);
         let mut was_nonnegative = winding >= 0;
@@ -183,12 +183,12 @@ struct Boxes {
     low: DVec3,
     edge: DVec3,
     size: [usize; 3],
-    /// The items that touch each box with a point.
+    /// The items that touch each box which contains a point.
     items: Lists<u32>,
 }
 
 impl Boxes {
-    /// Boxes about as large as the items, whose bounds are given.
+    /// Boxes about as large as the items with these bounds.
     fn new(points: impl Iterator<Item = DVec3> + Clone, items: &[(DVec3, DVec3)]) -> Self {
         let start = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
         let (low, high) = points.clone().fold(start, |(low, high), p| (low.inf(&p), high.sup(&p)));
@@ -236,14 +236,14 @@ impl Boxes {
     }
 }
 
-/// Corners of the three tetrahedra of a prism, in the order of [`crate::sweep::chain`]. Where a triangle of sign 1 moves outward
-/// the second has a negative volume, the others a positive one.
+/// Corners of the three tetrahedra of a prism, in the order of [`crate::sweep::chain`]. Where a triangle of sign 1 moves outward, the
+/// second has a negative volume and the others a positive one.
 fn tetrahedra([a0, a1, a2]: [DVec3; 3], [b0, b1, b2]: [DVec3; 3]) -> [[DVec3; 4]; 3] {
     [[a0, a1, a2, b2], [a0, a1, b1, b2], [a0, b0, b1, b2]]
 }
 
 impl Passage {
-    /// The tetrahedron of a triangle of this sign; none when the surface does not move in it.
+    /// The tetrahedron of a triangle of this sign; none if the surface does not move in it.
     fn new(position: Place, corners: [DVec3; 4], sign: i32, still: f64) -> Option<Self> {
         let [u, v, w] = [1, 2, 3].map(|corner| corners[corner] - corners[0]);
         let volume = u.cross(&v).dot(&w);
@@ -263,7 +263,7 @@ impl Passage {
         SAMPLES.iter().map(at)
     }
 
-    /// When the surface passes a point (0 to 1 within the step), if the point is inside: the weight of the later pose's
+    /// When the surface passes a point (0 to 1 within the step), if the point is inside: the sum of the weights of the later pose's
     /// corners, which are the last one, two or three.
     fn time(&self, p: &DVec3) -> Option<f64> {
         let way = p - self.corners[0];
@@ -273,7 +273,7 @@ impl Passage {
     }
 }
 
-/// 1 when a face above a point faces up, -1 when down; 0 when it is not above.
+/// 1 if a face above a point faces up, -1 if down; 0 if it is not above the point.
 fn above(p: &DVec3, a: &DVec3, b: &DVec3, c: &DVec3) -> i32 {
     let side = |s: &DVec3, t: &DVec3| (t.x - s.x) * (p.y - s.y) - (t.y - s.y) * (p.x - s.x);
     let sides = [side(a, b), side(b, c), side(c, a)];

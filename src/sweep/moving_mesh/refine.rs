@@ -1,7 +1,7 @@
 //! Splits edges whose ends move differently.
 //!
-//! A moving edge sweeps a bilinear patch; the chain has two triangles in its position, which differ from
-//! it by at most |db - da| / 4 (da, db: the displacements of the edge's ends in a step).
+//! A moving edge sweeps a bilinear patch; the chain replaces it by two triangles, which differ from it by at most |db - da| / 4 (da, db:
+//! the displacements of the edge's ends in a step).
 
 use rayon::prelude::*;
 
@@ -10,19 +10,19 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 
-/// Most pieces of an edge in one round.
+/// Maximum number of pieces of an edge in one round.
 const MOST_PIECES: f64 = 4096.0;
-/// Most rounds: the edges that one round adds are split by the next.
+/// Maximum number of rounds: the edges that one round adds are split by the next.
 const MOST_ROUNDS: usize = 12;
 
-/// What needs the memory, and what reduces it, for messages.
+/// For messages: what needs the memory, and how to reduce it.
 const WHAT: &str =
     "a body's edges, split where their ends move differently (larger cells or a shorter motion need less)";
 /// Bytes of a new vertex in each pose: as `f64` and in fixed point.
 const BYTES_PER_POSITION: u64 = 36;
 /// Bytes of a new vertex, and of the two triangles and three edges that come with it.
 const BYTES_PER_VERTEX: u64 = 150;
-/// Most bytes added in one round, whatever the context allows.
+/// Maximum number of bytes added in one round, whatever the context allows.
 const MOST_BYTES: u64 = 8 << 30;
 
 /// Difference (cells) between the patch that an edge sweeps in a step and its two triangles.
@@ -31,11 +31,11 @@ pub fn edge_error([before, after]: [&[DVec3]; 2], [i, j]: [u32; 2]) -> f64 {
     (edge(after) - edge(before)).norm() / 4.0
 }
 
-/// Splits edges into equal pieces until each error is within `tolerance` (cells), extending the poses; none when
-/// no edge needs it. `wanted` returns whether an edge matters in a step, from pose to pose.
+/// Splits edges into equal pieces until each error is within `tolerance` (cells), and extends the poses; none if no edge needs it. `wanted`
+/// returns whether an edge matters in a step, given its ends at both poses.
 ///
 /// # Errors
-/// Cancel; more pieces than memory should hold.
+/// Cancel; more pieces than fit in memory.
 pub fn refine(
     ctx: &Context,
     topology: &Topology,
@@ -98,7 +98,7 @@ impl Split {
         split
     }
 
-    /// The triangles, split where their edges are.
+    /// The triangles, split where their edges are split.
     fn triangles(&self, topology: &Topology) -> Vec<Simplex> {
         let mut edges = vec![[0; 3]; topology.simplices.len()];
         for edge in 0..topology.edges.len() {
@@ -109,7 +109,7 @@ impl Split {
         let mut out = Vec::with_capacity(topology.simplices.len() * 2);
         for (simplex, [e01, e12, e02]) in topology.simplices.iter().zip(edges) {
             let [a, b, c] = simplex.v;
-            // Corners counter-clockwise, and the edge that follows each.
+            // Corners in counter-clockwise order, and the edge after each.
             let (corners, edges) =
                 if simplex.sign > 0 { ([a, b, c], [e01, e12, e02]) } else { ([a, c, b], [e02, e12, e01]) };
             self.split_triangle(corners, edges, |triangle| out.extend(Simplex::new(triangle)));
@@ -117,7 +117,7 @@ impl Split {
         out
     }
 
-    /// Joins the two sides of a triangle with the most pieces by a strip from their common corner.
+    /// Connects the two sides of a triangle that have the most pieces by a strip that starts at their common corner.
     fn split_triangle(&self, v: [u32; 3], edges: [usize; 3], mut emit: impl FnMut([u32; 3])) {
         let pieces = edges.map(|edge| self.edges[edge].1);
         let base = (0..3).min_by_key(|&side| pieces[side]).unwrap_or(0);
@@ -140,7 +140,7 @@ impl Split {
         }
     }
 
-    /// The vertex that ends the first `position` pieces of an edge, counted from one of its ends to the other.
+    /// The vertex at the end of the first `position` pieces of an edge, counted from one of its ends to the other.
     fn vertex(&self, edge: usize, from: u32, to: u32, position: u32) -> u32 {
         let (first, pieces) = self.edges[edge];
         match position {

@@ -1,19 +1,18 @@
-//! What stays the same while a mesh moves: closed triangles, and the edges between them.
+//! The invariant part of a moving mesh: closed triangles, and the edges between them.
 //!
-//! The boundary of any set of oriented triangles is a set of cycles. Each cycle is closed by a cone
-//! to the (moving) centroid of its vertices, so that open meshes, non-manifold meshes and soups all
-//! become closed chains.
+//! The boundary of any set of oriented triangles is a set of cycles. Each cycle is closed by a cone to the (moving) centroid of its
+//! vertices, so that open meshes, non-manifold meshes and triangle soups all become closed chains.
 
 use std::collections::{BTreeMap, HashMap};
 
 use crate::geometry::DVec3;
 
-/// A triangle with its vertices in ascending order: their order decides how prisms are split.
+/// A triangle with its vertices in ascending order: this order determines how prisms are split.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Simplex {
     /// Vertex indices, v0 < v1 < v2.
     pub v: [u32; 3],
-    /// +1 when (v0, v1, v2) is counter-clockwise seen from outside, else -1.
+    /// +1 if (v0, v1, v2) is counter-clockwise seen from outside, else -1.
     pub sign: i8,
 }
 
@@ -30,7 +29,7 @@ impl Simplex {
         (b - a).cross(&(c - a)).norm()
     }
 
-    /// A counter-clockwise triangle; none when two corners are the same.
+    /// A counter-clockwise triangle; none if two corners are the same.
     pub fn new([a, b, c]: [u32; 3]) -> Option<Self> {
         if a == b || b == c || c == a {
             return None;
@@ -61,12 +60,12 @@ pub struct Incidence {
 pub enum Derived {
     /// Mean of the vertices of an open loop.
     Centroid(Vec<u32>),
-    /// On the edge from one vertex to another, at this fraction.
+    /// On the edge from one vertex to another, at this fraction of its length.
     Along(u32, u32, f64),
 }
 
 impl Derived {
-    /// Its position, from a pose of the vertices before it.
+    /// Its position, given a pose of the vertices before it.
     pub fn position(&self, pose: &[DVec3]) -> DVec3 {
         match self {
             Self::Centroid(vertices) => {
@@ -89,7 +88,7 @@ pub struct Topology {
     pub simplices: Vec<Simplex>,
     /// Unique edges (i < j).
     pub edges: Vec<[u32; 2]>,
-    /// `incidences[edge_start[e]..edge_start[e + 1]]` lie beside edge e.
+    /// `incidences[edge_start[e]..edge_start[e + 1]]` are the triangles beside edge e.
     pub edge_start: Vec<u32>,
     /// Triangles beside edges.
     pub incidences: Vec<Incidence>,
@@ -121,7 +120,7 @@ impl Topology {
 
     /// The caps of open loops: the triangles with a derived vertex.
     pub fn caps(&self) -> impl Iterator<Item = &Simplex> {
-        // The greatest vertex comes last.
+        // The highest vertex comes last.
         self.simplices.iter().filter(|simplex| simplex.v[2] as usize >= self.own_vertices)
     }
 
@@ -151,12 +150,12 @@ impl Topology {
         (0..self.edges.len()).all(|edge| self.imbalance(edge) == 0)
     }
 
-    /// Whether some edge has one triangle.
+    /// Whether some edge has only one triangle.
     pub fn has_lone_triangles(&self) -> bool {
         (0..self.edges.len()).any(|edge| self.beside(edge).len() == 1)
     }
 
-    /// Edges along which two or more triangles run one way without a counterpart.
+    /// Edges along which two or more triangles run in one direction without a counterpart.
     pub fn contradictions(&self) -> usize {
         (0..self.edges.len()).filter(|&edge| self.imbalance(edge).abs() > 1).count()
     }
@@ -207,7 +206,7 @@ impl Topology {
         self.edge_start.push(self.incidences.len() as u32);
     }
 
-    /// How many triangles run along edge (i, j) from i to j, minus how many from j to i.
+    /// The number of triangles that run along edge (i, j) from i to j, minus those from j to i.
     fn imbalance(&self, edge: usize) -> i32 {
         let along = |at: &Incidence| {
             let sign = i32::from(self.simplices[at.triangle as usize].sign);
@@ -237,7 +236,7 @@ impl Topology {
             let apex = self.vertex_count() as u32;
             self.derived.push(Derived::Centroid(rim));
             for ([i, j], imbalance) in edges {
-                // The cap runs j -> i along an edge that the mesh runs along i -> j.
+                // The cap runs j -> i along an edge along which the mesh runs i -> j.
                 for _ in 0..imbalance.abs() {
                     self.push_triangle(if imbalance > 0 { [j, i, apex] } else { [i, j, apex] });
                 }
@@ -247,7 +246,7 @@ impl Topology {
     }
 }
 
-/// Union-find over vertex indices; the least vertex represents its group.
+/// Union-find over vertex indices; the lowest vertex represents its group.
 #[derive(Default)]
 struct Groups {
     parent: HashMap<u32, u32>,

@@ -1,4 +1,4 @@
-//! Faces by the unit cubes (bins) around voxels that they may pass through, and the winding number at any point.
+//! Faces sorted by the unit cubes (bins) around voxels that they may pass through, and the winding number at any point.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -19,10 +19,10 @@ pub type Point = [f64; 3];
 const GRAIN: usize = 1024;
 /// A block with at most this many faces is one bin.
 const FEW: usize = 8;
-/// No slot.
+/// Sentinel: no slot.
 const NONE: u32 = u32::MAX;
-/// Offset (units) of a voxel from its lattice point: the symbolic shift of the scan lines (`distance/winding.rs`), mostly -z, then
-/// +x, then +y. Below one unit, so that no face lies between.
+/// Offset (units) of a voxel from its lattice point: the symbolic shift of the scan lines (`distance/winding.rs`), mostly -z, then +x, then
+/// +y. It is less than one unit, so no face lies in between.
 const NUDGE: Point = [0.25 / 64.0, 0.25 / 4096.0, -0.25];
 /// Tolerance (cells) for a plane that touches the corner of a cube.
 const TOUCH: f64 = 1e-5;
@@ -31,7 +31,7 @@ const TOUCH: f64 = 1e-5;
 pub struct Bins {
     /// Every face near the blocks.
     pub faces: Vec<Face>,
-    /// Their normals, of twice the faces' areas (units^2) in length.
+    /// Their normals; the length is twice the face's area (units^2).
     pub normals: Vec<Point>,
     /// The region that contains the blocks.
     pub region: Region,
@@ -53,9 +53,9 @@ struct BlockFaces {
     corner: [i32; 3],
     /// Faces near the block, ascending.
     ids: Vec<u32>,
-    /// Their prisms, seen from the block's first voxel.
+    /// Their prisms, relative to the block's first voxel.
     prisms: Vec<Prism>,
-    /// Which of them may pass through each bin: 512 bins, or one.
+    /// The faces that may pass through each bin: 512 bins, or one.
     bins: Lists<u32>,
 }
 
@@ -127,8 +127,8 @@ impl Bins {
         (slot != NONE).then(|| &self.blocks[slot as usize])
     }
 
-    /// Winding numbers of the chain at a point and at `beside`, at most [`crate::sweep::chain::prism::BESIDE`] cells from it
-    /// (fixed-point units): the nearest voxel's, changed by the faces between.
+    /// Winding numbers of the chain at a point and at `beside`, at most [`crate::sweep::chain::prism::BESIDE`] cells from it (fixed-point
+    /// units): that of the nearest voxel, corrected by the faces in between.
     pub fn windings(&self, point: Point, beside: Point, prisms: &mut Prisms) -> [i32; 2] {
         let voxel = voxel_of(point);
         let mut winding = self.lines.winding(voxel);
@@ -151,9 +151,9 @@ impl Bins {
         [winding, winding + change.beside]
     }
 
-    /// 1 when the segment from a voxel to a point enters the chain through a face, -1 when it leaves it, else 0.
+    /// 1 if the segment from a voxel to a point enters the chain through a face, -1 if it leaves it, otherwise 0.
     ///
-    /// A voxel in the plane of a face, or of an edge, is shifted as for the scan lines: see [`NUDGE`].
+    /// A voxel in the plane of a face or of an edge is shifted as for the scan lines: see [`NUDGE`].
     fn exact_crossing(&self, id: usize, voxel: [i32; 3], end: Point) -> i32 {
         let (normal, v) = (&self.normals[id], self.faces[id].v.map(|p| p.map(f64::from)));
         let centre = voxel.map(|value| f64::from(value) * f64::from(UNITS));
@@ -195,7 +195,7 @@ impl BlockFaces {
     }
 }
 
-/// For each bin of a block the block's faces that may pass through it.
+/// For each bin of a block, the block's faces that may pass through it.
 fn by_bin(corner: [i32; 3], ids: &[u32], faces: &[Face], normals: &[Point]) -> Lists<u32> {
     let mut pairs = Vec::with_capacity(ids.len() * 4);
     for (position, &id) in ids.iter().enumerate() {
@@ -207,7 +207,7 @@ fn by_bin(corner: [i32; 3], ids: &[u32], faces: &[Face], normals: &[Point]) -> L
 
 /// The voxel nearest to a point (fixed-point units).
 pub fn voxel_of(point: Point) -> [i32; 3] {
-    // Truncation of a large positive number rounds down, without the call that `round` is in the baseline set.
+    // Truncating a large positive number rounds down, and avoids the function call that `round` is in the baseline instruction set.
     const ABOVE: i64 = 1 << 40;
     let unit = i64::from(UNITS);
     point.map(|value| (((value + ABOVE as f64) as i64 + unit / 2).div_euclid(unit) - ABOVE / unit) as i32)
@@ -219,7 +219,7 @@ fn inner(voxel: [i32; 3]) -> usize {
     x << 6 | y << 3 | z
 }
 
-/// For each block in `slots` the faces that may pass through its bins, ascending.
+/// For each block in `slots`, the faces that may pass through its bins, ascending.
 fn by_block(faces: &[Face], normals: &[Point], region: &Region, slots: &[u32], count: usize) -> Lists<u32> {
     let pairs: Vec<Vec<(u32, u32)>> = faces
         .par_chunks(GRAIN)
@@ -264,7 +264,7 @@ pub fn each_voxel(v: &[Fixed; 3], normal: &Point, region: &Region, mut see: impl
     each_position(v, normal, region, |block| each_bin(v, normal, block.map(|b| b * 8), &mut see));
 }
 
-/// Tests which cubes of one size the plane of a triangle meets.
+/// Tests whether the plane of a triangle intersects cubes of a given size.
 struct Slab<'a> {
     normal: &'a Point,
     corner: Point,
@@ -283,7 +283,7 @@ impl<'a> Slab<'a> {
     }
 }
 
-/// Normal of a face, of twice its area (units^2) in length.
+/// Normal of a face; its length is twice the face's area (units^2).
 pub fn normal(face: &Face) -> Point {
     cross(difference(face.v[1], face.v[0]), difference(face.v[2], face.v[0]))
 }

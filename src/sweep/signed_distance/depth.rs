@@ -1,5 +1,5 @@
-//! Depths of voxels inside the volume. Facets that are clipped too generously reach into the volume: their points in there
-//! do not count as surface.
+//! Depths of voxels inside the volume. Facets that were clipped too generously extend into the volume: their points there do not count as
+//! surface.
 
 use std::borrow::Cow;
 use std::cell::RefCell;
@@ -14,21 +14,21 @@ use crate::distance::vectors::gap;
 use crate::sweep::chain::facets::{Corners, Facet, halves, is_open, is_small, open_parts};
 use crate::sweep::chain::prism::Prisms;
 
-/// Two query points on a facet closer than this (cells) share one answer.
+/// Two query points on a facet that are closer than this (cells) share one result.
 const SAME: f32 = 0.05;
 /// How far a nearest point is moved towards its facet's centre (units), away from the edges shared with neighbours.
 const INSET: f64 = 0.02 * UNITS as f64;
-/// Up to this depth (cells) facets are clipped exactly, where that may change the depth by more than [`SLACK`] (cells).
+/// Up to this depth (cells) facets are clipped exactly where that may change the depth by more than [`SLACK`] (cells).
 const CLIPPED: f32 = 0.6;
 /// See [`CLIPPED`].
 const SLACK: f32 = 0.1;
 
-/// A volume to measure depths in.
+/// The volume in which depths are measured.
 #[derive(Clone, Copy)]
 pub struct Volume<'a> {
     /// The chain's faces.
     pub bins: &'a Bins,
-    /// What lines find out about them.
+    /// What lines reveal about the faces.
     pub exposure: &'a Exposure,
     /// The volume's surface.
     pub facets: &'a [Facet],
@@ -40,17 +40,17 @@ pub struct Near<'a> {
     corner: [i32; 3],
     ids: &'a [u32],
     triangles: &'a [Triangle],
-    /// Greatest depth (cells) of interest.
+    /// Maximum depth (cells) of interest.
     limit: f32,
-    /// For each triangle the last query point, and whether it was open.
+    /// For each triangle the last query point, and whether it was open there.
     queried: RefCell<Vec<([f32; 3], bool)>>,
-    /// Facets that were not open at a query, clipped as far as needed.
+    /// Facets that were not open at a query, clipped as far as necessary.
     parts: RefCell<HashMap<u32, Part>>,
     prisms: RefCell<&'a mut Prisms>,
 }
 
 impl<'a> Near<'a> {
-    /// `ids` are the facets in reach; `triangles` are the same, relative to the block's corner.
+    /// `ids` are the facets in reach; `triangles` are the same facets, relative to the block's corner.
     pub fn new(
         volume: Volume<'a>,
         corner: [i32; 3],
@@ -87,7 +87,7 @@ impl<'a> Near<'a> {
         open
     }
 
-    /// Distance (cells) of a point from the open parts of a facet, or `most` if that is less.
+    /// Distance (cells) of a point from the open parts of a facet, or `most` if that is smaller.
     fn distance_of_open(&self, index: u32, p: [f32; 3], most: f32) -> f32 {
         let Volume { bins, exposure, facets } = self.volume;
         let facet = &facets[self.ids[index as usize] as usize];
@@ -99,7 +99,7 @@ impl<'a> Near<'a> {
     }
 }
 
-/// A facet, or a part of one, clipped as far as needed.
+/// A facet or a part of one, clipped as far as necessary.
 struct Part {
     v: Corners,
     triangle: Triangle,
@@ -110,7 +110,7 @@ struct Part {
 enum Inner {
     /// Nothing.
     Unknown,
-    /// It was too large for one sample to decide.
+    /// It was too large for a single sample.
     Halves(Box<[Part; 2]>),
     /// Its open parts.
     Open(Vec<Triangle>),
@@ -121,7 +121,7 @@ impl Part {
         Self { v, triangle: Triangle::new(&v, corner), inner: Inner::Unknown }
     }
 
-    /// As [`Near::distance_of_open`]; `open` gives the open parts of a small one.
+    /// As [`Near::distance_of_open`]; `open` returns the open parts of a small part.
     fn distance_of_open(
         &mut self,
         p: [f32; 3],
@@ -149,12 +149,12 @@ impl Part {
     }
 }
 
-/// Depths of a group's voxels: distances to their nearest facets, or, where a facet's nearest point is not open because
-/// the facet was clipped too generously, to the nearest open point.
+/// Depths of a group's voxels: distances to their nearest facets or, where the nearest point of a facet is not open because the facet was
+/// clipped too generously, to the nearest open point.
 pub struct Depths<'a, 'n> {
     near: &'a Near<'n>,
     group: &'a Group<'a>,
-    /// The near triangles, then all within the limit; made when needed.
+    /// The near triangles, then all within the limit; built on demand.
     candidates: [Option<Candidates<'a>>; 2],
 }
 
@@ -178,7 +178,7 @@ impl<'a, 'n> Depths<'a, 'n> {
         Self { near, group, candidates: [None, None] }
     }
 
-    /// Depth (cells) of a voxel, from the distance of its nearest facet.
+    /// Depth (cells) of a voxel, given the distance of its nearest facet.
     pub fn at(&mut self, lane: usize, distance: f32) -> f32 {
         let Self { near, group, candidates: [few, all] } = self;
         let Points { x, y, z } = &group.points;

@@ -1,10 +1,9 @@
-//! Where lines through voxels enter and leave the volume: which faces bound it there, and an upper bound on each voxel's
-//! distance from the surface.
+//! Where lines through voxels enter and leave the volume: which faces bound it there, and an upper bound on each voxel's distance from the
+//! surface.
 //!
-//! Each line through voxels, along x, y or z, meets the chain's faces in an order that is known exactly; the winding
-//! number passes between 0 and 1 at some of them (the meetings), however many sheets lie close together. Those faces
-//! are exposed. Between two neighbouring voxels of opposite sign there is a meeting, within a cell of both: the level set
-//! cannot jump there.
+//! Each line through voxels, along x, y or z, crosses the chain's faces in an order that is known exactly. At some crossings (the meetings)
+//! the winding number changes between 0 and 1, however many sheets lie close together. The faces there are exposed. Between two
+//! neighbouring voxels of opposite sign there is a meeting, within a cell of both, so the level set cannot jump there.
 
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU16, Ordering};
 
@@ -19,21 +18,21 @@ use crate::distance::vectors::dot;
 use crate::distance::winding::{Axis, each_crossing};
 use crate::numeric::blocks::offset;
 
-/// Flag of a face that is exposed, or less than [`THIN`] below one that is, somewhere.
+/// Flag of a face that is, somewhere, exposed or less than [`THIN`] below an exposed face.
 pub const OPEN: u8 = 1;
-/// Flag of a face that lies deeper, somewhere.
+/// Flag of a face that lies deeper somewhere.
 pub const BURIED: u8 = 2;
-/// Depth (cells) up to which a sheet counts as surface. A body that turns about an axis of near symmetry sweeps bundles
-/// of sheets that nearly coincide: each is outermost only in slivers between its neighbours, and lies below them by up
-/// to the motion's tolerance.
+/// Depth (cells) up to which a sheet counts as surface. A body that turns about an axis of near symmetry sweeps bundles of nearly
+/// coincident sheets: each is outermost only in slivers between its neighbours, and elsewhere lies below them by up to the motion's
+/// tolerance.
 pub const THIN: f64 = 0.05;
 
 /// Faces per task: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 2048;
-/// A bin is a stack from this many crossings in it and its six neighbours: a single sheet crosses about ten of their
-/// lines at most.
+/// A bin is a stack if it and its six neighbours contain at least this many crossings: a single sheet crosses at most about ten of their
+/// lines.
 const STACK: u32 = 40;
-/// [`BUNDLE`] sheets this close together (cells) are a bundle.
+/// [`BUNDLE`] sheets within this distance (cells) form a bundle.
 const CLOSE: f64 = 0.1;
 /// See [`CLOSE`].
 const BUNDLE: usize = 3;
@@ -41,18 +40,18 @@ const BUNDLE: usize = 3;
 const CROWD: usize = 32;
 /// A gap between sheets that is narrower than this (cells) and contains no voxel counts as closed.
 const CLOSED: f64 = 0.01;
-/// A spot makes a patch if its line is at least this steep to the face, relative to the steepest of the three axes.
+/// A spot makes a patch if the component of the face's normal along its line is at least this share of the largest of the three.
 const STEEPEST: f64 = 0.9;
 
-/// What lines through voxels find out about a chain.
+/// What lines through voxels reveal about a chain.
 pub struct Exposure {
-    /// [`OPEN`] and [`BURIED`], for each face; 0 for one that no line crosses.
+    /// [`OPEN`] and [`BURIED`] flags of each face; 0 for a face that no line crosses.
     pub faces: Vec<u8>,
     /// The meetings along each axis.
     along: Vec<Along>,
-    /// Whether each bin holds a stack: so many sheets that its surface is made of patches alone.
+    /// Whether each bin holds a stack: so many sheets that its surface is made only of patches.
     pub stacks: Vec<bool>,
-    /// Whether each bin holds a stack, or a bundle: sheets so close together that patches are added.
+    /// Whether each bin holds a stack or a bundle: sheets so close together that patches are added.
     bundles: Vec<bool>,
 }
 
@@ -60,7 +59,7 @@ pub struct Exposure {
 struct Along {
     axis: Axis,
     columns: Columns,
-    /// Of each line, ascending.
+    /// The meetings of each line, ascending.
     meetings: Lists<Meeting>,
 }
 
@@ -83,7 +82,7 @@ pub struct Spot {
     pub position: f64,
     /// Whether the line enters the volume there, in the direction of its axis.
     pub enters: bool,
-    /// The face that is outermost there.
+    /// The outermost face there.
     pub face: u32,
 }
 
@@ -104,7 +103,7 @@ struct Crossing {
     face: u32,
 }
 
-/// What lines find out about faces and bins; written by many tasks at once.
+/// What lines reveal about faces and bins; written by many tasks at once.
 struct Marks {
     faces: Vec<AtomicU8>,
     /// Crossings in each bin.
@@ -161,14 +160,13 @@ impl Exposure {
         spots.into_iter().map(|(_, spot)| spot).collect()
     }
 
-    /// Whether a line parallel to that of `spot` has a meeting of the same direction within `off` cells of `position`.
+    /// Whether the line at `line`, parallel to that of `spot`, has a meeting of the same direction within `off` cells of `position`.
     pub fn agrees(&self, spot: &Spot, line: [i32; 2], position: f64, off: f64) -> bool {
         let mut meetings = self.along[spot.axis.index()].line(line).iter();
         meetings.any(|other| (other.position - position).abs() <= off && other.enters == spot.enters)
     }
 
-    /// Calls `see` with the voxels of a block that are within a cell of a meeting on a line through them, and with that
-    /// distance (cells).
+    /// Calls `see` with each voxel of a block that is within a cell of a meeting on a line through it, and with the distance (cells) to it.
     pub fn each_meeting(&self, corner: [i32; 3], mut see: impl FnMut(usize, f32)) {
         for along in &self.along {
             let axis = along.axis;
@@ -286,7 +284,7 @@ fn stacks(bins: &Bins, counts: &[AtomicU16]) -> Vec<bool> {
     stacks.into_iter().map(AtomicBool::into_inner).collect()
 }
 
-/// Walks along one line: marks faces, and collects the meetings.
+/// Walks along one line, marks faces and collects the meetings.
 fn walk(
     bins: &Bins,
     axis: Axis,
@@ -301,7 +299,7 @@ fn walk(
         if known != Some(edge) {
             winding = bins.lines.winding(axis.voxel(coordinates, edge));
         }
-        // The crossings in other blocks are not in the list.
+        // The list has no crossings in other blocks.
         known = (edge & 7 != 7).then_some(edge + 1);
         let begin = out.len();
         for &Crossing { at, change, face } in run {
@@ -311,7 +309,7 @@ fn walk(
             if (before >= 1) == enters {
                 continue;
             }
-            // Entered again right after it was left: a closed gap.
+            // The line enters again right after it left: a closed gap.
             if enters && out[begin..].last().is_some_and(|last| at - last.position < CLOSED) {
                 out.pop();
             } else {

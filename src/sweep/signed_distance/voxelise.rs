@@ -22,7 +22,7 @@ use crate::numeric::lanes::LANES;
 use crate::sweep::chain::facets::{Facet, facets};
 use crate::sweep::chain::prism::Prisms;
 
-/// How far from the surface distances are wanted, on each side (cells).
+/// Distance from the surface up to which values are wanted, on each side (cells).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Band {
     /// Inside the solid.
@@ -47,7 +47,7 @@ pub enum Piece {
 }
 
 impl Piece {
-    /// Least corner, in voxels.
+    /// Minimum corner, in voxels.
     pub fn origin(&self) -> Origin {
         match self {
             Self::Near(origin, _) | Self::Inside(origin) => *origin,
@@ -69,7 +69,7 @@ pub struct Voxeliser {
     bins: Bins,
     exposure: Exposure,
     facets: Vec<Facet>,
-    /// Wanted blocks with facets in reach, counted in blocks from the origin voxel; ascending.
+    /// Wanted blocks with facets in reach, in blocks from the origin voxel; ascending.
     near: Vec<[i32; 3]>,
     /// `ids[start[i]..start[i + 1]]` are the facets of `near[i]`.
     start: Vec<u32>,
@@ -77,13 +77,13 @@ pub struct Voxeliser {
     inside: Vec<[i32; 3]>,
 }
 
-/// What needs the memory, and what reduces it, for messages.
+/// For messages: what needs the memory, and how to reduce it.
 const REGION: &str = "what the objects sweep (larger cells or a shorter motion need less)";
-/// Bytes per block of the region: marks, indices, and the tables of the columns of lines.
+/// Bytes per block of the region: marks, indices and the column tables of the lines.
 const BYTES_PER_BLOCK: usize = 24;
 /// Bytes per block near the surface: its distances, its bins with their faces, and their crossings.
 const BYTES_PER_NEAR_BLOCK: usize = 12_000;
-/// No block.
+/// Sentinel: no block.
 const NONE: u32 = u32::MAX;
 /// Faces per task: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 1024;
@@ -93,18 +93,18 @@ const BLOCK_RADIUS: f32 = 6.07;
 const SMALL: f32 = 1.0;
 /// A voxel nearer than this (cells) lies on the surface.
 const ON_FACE: f32 = 1e-4;
-/// Upper bound (cells) on the distance of a voxel whose neighbour is on the other side, where no line has a meeting
-/// between them: the surface then touches one of the two.
+/// Upper bound (cells) on the distance of a voxel whose neighbour has the opposite sign where no line has a meeting between them: the
+/// surface then touches one of the two.
 const UNSEEN: f32 = 1.0;
 /// All voxels of a block.
 pub const ALL: Mask = [u64::MAX; 8];
 
 impl Voxeliser {
-    /// Pieces of work that [`Voxeliser::new`] reports to the context: see [`Context::advance`].
+    /// Work units that [`Voxeliser::new`] reports to the context: see [`Context::advance`].
     pub const PARTS: usize = 4;
 
-    /// Sorts the faces into blocks and scans the winding numbers, inside the voxel box `low..=high`
-    /// (from the lattice's origin voxel). `wanted` returns for blocks, by origin, whether distances are wanted.
+    /// Sorts the faces into blocks and scans the winding numbers inside the voxel box `low..=high` (from the lattice's origin voxel).
+    /// `wanted` returns which blocks, given by their origins, need distances.
     ///
     /// # Errors
     /// When the box spans more than 2^28 blocks; those of `wanted`; cancel.
@@ -116,7 +116,7 @@ impl Voxeliser {
         [low, high]: [[i32; 3]; 2],
         wanted: impl Fn(&[Origin]) -> Result<Vec<bool>>,
     ) -> Result<Self> {
-        // Whether a face is open is decided from the winding numbers of the voxels around it.
+        // Whether a face is open depends on the winding numbers of the voxels around it.
         let reach = band.reach() + 2.0;
         let region = Region::around(&faces, reach, low, high)?;
         ctx.allow(REGION, (region.blocks() * BYTES_PER_BLOCK) as u64)?;
@@ -139,7 +139,7 @@ impl Voxeliser {
         Ok(voxeliser)
     }
 
-    /// Origins of the wanted blocks near the surface; [`Voxeliser::piece`] takes their indices.
+    /// Origins of the wanted blocks near the surface; [`Voxeliser::piece`] takes an index into them.
     pub fn near_blocks(&self) -> Vec<Origin> {
         self.near.iter().map(|&block| self.lattice.block_origin(block)).collect()
     }
@@ -154,7 +154,7 @@ impl Voxeliser {
         self.bins.faces.len()
     }
 
-    /// Lists for each marked block the facets in reach; returns each block's index in `near`, or [`NONE`].
+    /// Lists the facets in reach of each marked block; returns each block's index in `near`, or [`NONE`].
     fn sort_facets(&mut self, marked: &[bool]) -> Vec<u32> {
         let pairs: Vec<Vec<(u32, u32)>> = self
             .facets
@@ -188,7 +188,7 @@ impl Voxeliser {
         slots
     }
 
-    /// Calls `see` with each marked block in which the facet may be the nearest.
+    /// Calls `see` with each marked block in which the facet may be the nearest one.
     fn blocks_of(&self, facet: &Facet, marked: &[bool], mut see: impl FnMut(usize)) {
         let reach = self.band.reach() + 0.01;
         let (first, last) = self.bins.region.touched(extent(&facet.v), reach);
@@ -216,7 +216,7 @@ impl Voxeliser {
         }
     }
 
-    /// Finds the blocks without facets whose first voxel is inside.
+    /// Finds the blocks without facets that lie inside, by their first voxel.
     fn find_inside(&self, slots: &[u32]) -> Vec<[i32; 3]> {
         let mut inside = Vec::new();
         let Region { low, high } = self.bins.region;
@@ -232,8 +232,8 @@ impl Voxeliser {
         inside
     }
 
-    /// Distances at the wanted voxels of one of the [`Voxeliser::near_blocks`], the band's limit at the others;
-    /// none when all wanted ones are farther outside than the band.
+    /// Distances at the wanted voxels of one of the [`Voxeliser::near_blocks`], and the band's limit at the others; none if all wanted
+    /// voxels are farther outside than the band.
     pub fn piece(&self, index: usize, wanted: &Mask, scratch: &mut Scratch) -> Option<Piece> {
         if *wanted == [0; 8] {
             return None;
@@ -376,7 +376,7 @@ fn retain(faces: &mut Vec<Face>, keep: impl Fn(&Face) -> bool + Send + Sync) {
 fn set_signs(distances: &mut Values, inside: &Mask) {
     for (voxel, value) in distances.iter_mut().enumerate() {
         *value = match *value {
-            // Otherwise rounding would scatter specks of volume over a face that lies on voxels.
+            // Otherwise rounding would scatter specks of volume over a face that coincides with voxel centres.
             distance if distance < ON_FACE => 0.0,
             distance if holds(inside, voxel) => -distance,
             distance => distance,

@@ -1,4 +1,4 @@
-//! The process that decodes a foreign file: it limits itself, reads, and leaves a parcel in the file that is its input.
+//! The process that decodes a foreign file: it limits itself, reads the file and leaves a parcel in the file that is its input.
 
 use std::ffi::OsString;
 use std::fs::File;
@@ -12,9 +12,9 @@ use super::parcel::{Contents, pack};
 use crate::error::{Error, Result, one_line};
 use crate::vdb::vectors::AnyGrid;
 
-/// The first argument of a program that is to decode.
+/// First argument of a program that is started to decode.
 pub(in crate::vdb) const COMMAND: &str = "decode-vdb-for-another-process";
-/// Version of the arguments and of parcels: both sides must have the same.
+/// Version of the arguments and of parcels: it must be the same on both sides.
 pub(in crate::vdb) const PROTOCOL: &str = concat!("4-", env!("CARGO_PKG_VERSION"));
 
 /// What to read from a file.
@@ -37,7 +37,7 @@ pub(in crate::vdb) enum Wanted<'a> {
 }
 
 impl Wanted<'_> {
-    /// As two arguments.
+    /// Encoded as two arguments.
     pub(in crate::vdb) fn arguments(&self) -> [&str; 2] {
         match self {
             Self::Infos => ["infos", ""],
@@ -56,14 +56,14 @@ impl Wanted<'_> {
 /// Limits of the process.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::vdb) struct Limits {
-    /// Address space beyond what the program has when it begins (bytes).
+    /// Address space beyond what the program uses at its start (bytes).
     pub memory: u64,
-    /// Time of a core (s).
+    /// CPU time (s).
     pub seconds: u64,
 }
 
-/// Decodes, if the program was started for it: call it before anything else, with the arguments after the program's name.
-/// It returns the exit code of the program, which must then end.
+/// Decodes, if the program was started for this: call it before anything else, with the arguments after the program's name. Returns the
+/// exit code with which the program must then end.
 pub fn serve(arguments: impl Iterator<Item = OsString>) -> Option<u8> {
     let arguments: Vec<OsString> = arguments.take(7).collect();
     let (command, rest) = arguments.split_first()?;
@@ -98,12 +98,12 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> Option<u8> {
         Err(error) => Contents::Refusal(error.to_string()),
     };
     let packed = deliver(&contents);
-    // The process ends: no need to free the memory leaf by leaf.
+    // The process ends anyway: no need to free the memory leaf by leaf.
     std::mem::forget(contents);
     Some(if packed.is_ok() { 0 } else { 1 })
 }
 
-/// Address space of a thread: its stack. OpenVDB's helpers start one for each core.
+/// Address space of a thread: its stack. OpenVDB's helpers start one thread per core.
 const SPACE_OF_A_THREAD: u64 = 16 << 20;
 
 fn limit(limits: Limits) -> std::io::Result<()> {

@@ -1,5 +1,5 @@
-//! Decoding .vdb files in this process. The structure is checked first ([`super::layout`]); damage inside a grid's values
-//! is left to OpenVDB, which does not survive all of it: see [`super::guard`].
+//! Decoding of .vdb files in this process. The structure is checked first ([`super::layout`]); damage inside a grid's values is left to
+//! OpenVDB, which does not survive every kind of it: see [`super::guard`].
 
 use std::io::{BufReader, Cursor};
 use std::path::Path;
@@ -16,7 +16,7 @@ use crate::vdb::points;
 use crate::vdb::refusal::is_of_memory;
 use crate::vdb::vectors::AnyGrid;
 
-/// OpenVDB's names of the types of grids that are read; a suffix says that values are stored in 16 bits.
+/// OpenVDB's names of the grid types that can be read; a suffix means that values are stored in 16 bits.
 const FLOAT_TYPE: &str = "Tree_float_5_4_3";
 const VECTOR_TYPE: &str = "Tree_vec3s_5_4_3";
 const POINT_TYPE: &str = "Tree_ptdataidx32_5_4_3";
@@ -50,7 +50,7 @@ impl Kinds {
     }
 }
 
-/// The values of a grid, in words.
+/// The type of a grid's values, for messages.
 fn kind_of(header: &GridInfo) -> &str {
     let known = [
         ("Tree_float", "floats"),
@@ -68,14 +68,14 @@ fn kind_of(header: &GridInfo) -> &str {
     found.map_or(header.value_type.as_str(), |(_, words)| words)
 }
 
-/// A result whose error message follows the file's name.
+/// A result whose error message is appended to the file's name.
 type Told<T> = std::result::Result<T, String>;
 
 /// Where the grids of a file are.
 enum Source<'a> {
-    /// In a file of this name, whose structure was checked: OpenVDB may seek in it.
+    /// In a file of this name whose structure has been checked, so that OpenVDB may seek in it.
     File(&'a str),
-    /// In memory: the bytes were read from the first to the last.
+    /// In memory: the bytes were read sequentially.
     Stored(UniquePtr<ffi::Stored>),
 }
 
@@ -93,7 +93,7 @@ pub(in crate::vdb) fn check(path: &Path) -> Result<Layout> {
 
 fn source(path: &Path) -> Result<Source<'_>> {
     let layout = check(path)?;
-    // A stream is read from memory, where its end is noticed.
+    // A stream is read from memory, where its end is detected.
     if layout.is_stream() {
         let stored = stored(&crate::io::files::source::read(path)?);
         return stored.map_err(|what| Error::file(path, what));
@@ -106,7 +106,7 @@ fn stored(bytes: &[u8]) -> Told<Source<'static>> {
     ffi::read_bytes(bytes).map(Source::Stored).map_err(|error| cannot_read(&error))
 }
 
-/// The error for what OpenVDB could not read.
+/// The error for data that OpenVDB could not read.
 pub(in crate::vdb) fn cannot_read(error: &cxx::Exception) -> String {
     let what = error.what();
     log::info!("OpenVDB: {}", crate::error::one_line(what));
@@ -165,7 +165,7 @@ pub(in crate::vdb) fn read_any(path: &Path, name: Option<&str>) -> Result<AnyGri
     named(source(path)?, name, Kinds::FloatsAndVectors).map_err(|what| Error::file(path, what))
 }
 
-/// As [`crate::vdb::points::read`], and what is left out.
+/// As [`crate::vdb::points::read`], with the attributes that were omitted.
 pub(in crate::vdb) fn read_points(path: &Path, name: Option<&str>) -> Result<(Points, Vec<String>)> {
     let mut source = source(path)?;
     let read = choose(&source, name, Kinds::Points).and_then(|chosen| {
@@ -175,17 +175,17 @@ pub(in crate::vdb) fn read_points(path: &Path, name: Option<&str>) -> Result<(Po
     read.map_err(|what| Error::file(path, what))
 }
 
-/// As [`crate::vdb::file::from_bytes`]; the error message follows the name of the bytes.
+/// As [`crate::vdb::file::from_bytes`]; the error message is appended to the name of the bytes.
 pub(in crate::vdb) fn from_bytes(bytes: &[u8], name: Option<&str>) -> Told<FloatGrid> {
     named(whole(bytes)?, name, Kinds::Floats).and_then(floats)
 }
 
-/// As [`crate::vdb::file::any_from_bytes`]; the error message follows the name of the bytes.
+/// As [`crate::vdb::file::any_from_bytes`]; the error message is appended to the name of the bytes.
 pub(in crate::vdb) fn any_from_bytes(bytes: &[u8], name: Option<&str>) -> Told<AnyGrid> {
     named(whole(bytes)?, name, Kinds::FloatsAndVectors)
 }
 
-/// The grids of bytes whose structure was checked.
+/// The grids in bytes whose structure has been checked.
 fn whole(bytes: &[u8]) -> Told<Source<'static>> {
     layout::read(Cursor::new(bytes)).map_err(|fault| match fault {
         Fault::Io(error) => error.to_string(),
@@ -222,11 +222,11 @@ fn named(mut source: Source<'_>, name: Option<&str>, kinds: Kinds) -> Told<AnyGr
     load(&mut source, &chosen, kinds)
 }
 
-/// A grid of a file: its index, its description, and the name that no other grid of the file has.
+/// A grid of a file: its index, its description, and a name that is unique in the file.
 type Chosen = (usize, GridInfo, String);
 
-/// The grid of an index. Of several of one name OpenVDB lists the first, and then the others by what it has written behind their names,
-/// in the order of letters: [1], [10], [2]; nameless ones have a number from [0] on.
+/// The grid with this index. Of several grids with one name OpenVDB lists the first, then the others in lexical order of the suffixes that
+/// it has written: [1], [10], [2]; unnamed grids are numbered from [0].
 fn nth(mut headers: Vec<GridInfo>, at: usize) -> Option<Chosen> {
     let name = headers.get(at)?.name.clone();
     let of_name = |headers: &[GridInfo]| headers.iter().filter(|header| header.name == name).count();
@@ -241,7 +241,7 @@ fn nth(mut headers: Vec<GridInfo>, at: usize) -> Option<Chosen> {
     Some((at, headers.swap_remove(at), unique))
 }
 
-/// The grid of that name, or the first of the kinds.
+/// The grid of that name, or the first one of the accepted kinds.
 fn choose(source: &Source<'_>, name: Option<&str>, kinds: Kinds) -> Told<Chosen> {
     let headers = headers(source)?;
     let first = |wanted: &dyn Fn(&GridInfo) -> bool| headers.iter().position(wanted);
@@ -287,7 +287,7 @@ fn found(source: &mut Source<'_>, (at, header, unique): &Chosen, kinds: Kinds) -
     found.map_err(|error| cannot_read(&error))
 }
 
-/// The error for a grid that is not of the type in the file.
+/// The error for a grid whose type differs from the one that the file states.
 const ASTRAY: &str = "the .vdb file is damaged: a grid is not of the type that the file says";
 
 fn floats(grid: AnyGrid) -> Told<FloatGrid> {

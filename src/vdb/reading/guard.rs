@@ -1,9 +1,8 @@
 //! Foreign .vdb files are decoded by another process: OpenVDB does not survive every kind of damage.
 //!
-//! A program that calls [`install`] is started again for each file that is not its own, with a limit of memory and of
-//! time. The child decodes and passes the grids in shared memory; the parent copies each leaf once. A crash, an endless
-//! loop or excessive memory use of the child becomes one error message. This protects against damage, not against an
-//! attacker who controls the child.
+//! A program that calls [`install`] is started again for each file that is not its own, with limits of memory and time. The child decodes
+//! and passes the grids in shared memory; the parent copies each leaf once. A crash, an infinite loop or excessive memory use of the child
+//! becomes one error message. This protects against damage, not against an attacker who controls the child.
 
 use std::fs::File;
 use std::io::Read;
@@ -30,21 +29,21 @@ use crate::vdb::grid::FloatGrid;
 use crate::vdb::points;
 use crate::vdb::vectors::AnyGrid;
 
-/// Memory limit of a child for any file (bytes), and for each byte of the file: the most memory per byte is that of a node
-/// above the leaves, 260 kB for at least 8 kB, or of a leaf, 2.2 kB for at least 129 bytes.
+/// Memory limit of a child: for any file (bytes), and for each byte of the file. The maximum per byte is that of a node above the leaves,
+/// 260 kB for at least 8 kB, or of a leaf, 2.2 kB for at least 129 bytes.
 const FIXED_MEMORY: u64 = 384 << 20;
 const MEMORY_PER_BYTE: u64 = 64;
-/// CPU time (s) of a child for any file, and for each MB.
+/// CPU time (s) of a child: for any file, and for each MB.
 const FIXED_SECONDS: f64 = 2.0;
 const SECONDS_PER_MB: f64 = 0.5;
-/// Wall-clock time relative to that: a child may wait for a disk or for other work.
+/// Wall-clock limit relative to the CPU limit: a child may wait for a disk or for other work.
 const WAITING: f64 = 8.0;
-/// Time between two checks of a child: at first, and later.
+/// Polling interval of a child: at first, and later.
 const LOOKS: [Duration; 2] = [Duration::from_micros(500), Duration::from_millis(5)];
-/// Bytes that are kept of a child's stderr.
+/// Maximum number of bytes kept of a child's stderr.
 const MOST_WORDS: u64 = 1 << 14;
 
-/// The guard of this program.
+/// The guard installed in this process.
 static INSTALLED: OnceLock<Guard> = OnceLock::new();
 
 /// The program that decodes foreign files, and its limits.
@@ -56,17 +55,17 @@ pub struct Guard {
     pub memory: u64,
     /// Threads that build grids from the decoded data.
     pub threads: usize,
-    /// Set to stop: the child is ended, and the call returns [`Error::Cancelled`].
+    /// Set to stop: the child is killed, and the call returns [`Error::Cancelled`].
     pub cancel: Arc<AtomicBool>,
 }
 
-/// Lets [`crate::vdb::file`] decode foreign files through a guard from now on, in this whole process: for programs. Only the
-/// first call counts.
+/// From now on [`crate::vdb::file`] decodes foreign files through this guard, in the whole process: for programs. Only the first call has
+/// an effect.
 pub fn install(guard: Guard) {
     let _ = INSTALLED.set(guard);
 }
 
-/// The guard for a file: none when there is none, or the file is our own, known by the hash in its shot's record.
+/// The guard for a file: none if no guard is installed, or if the file is our own, known by the hash in its shot's record.
 pub(in crate::vdb) fn of(path: &Path) -> Option<&'static Guard> {
     INSTALLED.get().filter(|_| !manifest::knows(path))
 }
@@ -142,7 +141,7 @@ impl Guard {
 
     /// Lets a child read a file.
     fn ask(&self, path: &Path, wanted: Wanted<'_>) -> Result<Contents> {
-        // What can be checked without OpenVDB needs no child.
+        // Errors that can be found without OpenVDB need no child.
         decode::check(path)?;
         let length = std::fs::metadata(path).map_err(|error| Error::io(path, "read", error))?.len();
         let memory = FIXED_MEMORY.saturating_add(length.saturating_mul(MEMORY_PER_BYTE)).min(self.memory);
@@ -152,7 +151,7 @@ impl Guard {
             .map_err(|error| Error::io(path, "share memory to read", error.into()))?;
         let (status, words) = self.run(path, wanted, limits, &shared)?;
         let file = File::from(shared);
-        // SAFETY: the child has ended, and nobody else has the file.
+        // SAFETY: the child has ended, and nobody else can access the file.
         let parcel = unsafe { Mapping::new(&file) }.ok();
         let contents = parcel.as_ref().and_then(|parcel| unpack(parcel, self.threads));
         let warnings = || words.lines().map(one_line).filter(|line| !line.is_empty());
@@ -196,8 +195,8 @@ impl Guard {
         Ok((ended?, words))
     }
 
-    /// Waits for a child; ends it when it takes too long or the flag is set. None when other code in this process
-    /// took its status.
+    /// Waits for a child; kills it if it takes too long or the flag is set. None if other code in this process has already collected its
+    /// status.
     fn wait(&self, child: &mut Child, limits: Limits) -> Result<Option<ExitStatus>> {
         let start = Instant::now();
         let kill = |child: &mut Child| {
@@ -259,7 +258,7 @@ impl Guard {
     }
 }
 
-/// The first bytes from a pipe; the rest is read and dropped, so that the writer never blocks.
+/// The first bytes from a pipe; the rest is read and discarded, so that the writer never blocks.
 fn first_words(mut pipe: impl Read) -> String {
     let mut kept = Vec::new();
     let _ = pipe.by_ref().take(MOST_WORDS).read_to_end(&mut kept);
@@ -267,12 +266,12 @@ fn first_words(mut pipe: impl Read) -> String {
     String::from_utf8_lossy(&kept).into_owned()
 }
 
-/// Refuses a grid that is not one of floats.
+/// Rejects a grid that is not of floats.
 fn floats(path: &Path, grid: AnyGrid) -> Result<FloatGrid> {
     grid.floats().ok_or_else(|| astray(path))
 }
 
-/// The error for a parcel that is complete but contains something else.
+/// The error for a parcel that is complete but has other contents than requested.
 fn astray(path: &Path) -> Error {
     Error::file(path, "the .vdb file is damaged: decoding it came to nothing")
 }

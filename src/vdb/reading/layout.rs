@@ -1,23 +1,23 @@
-//! The structure of a .vdb file, read without OpenVDB: header, metadata, and where each grid lies.
+//! The structure of a .vdb file, read without OpenVDB: header, metadata, and the positions of the grids.
 //!
-//! OpenVDB does not notice the end of a file while it reads one: it takes missing data for an empty grid, or
-//! never ends. A file with offsets of its grids (all but streams) is checked here first.
+//! OpenVDB does not detect the end of a file while it reads: it takes missing data for an empty grid, or never returns. A file with offsets
+//! to its grids (all files except streams) is checked here first.
 
 use std::io::{Read, Seek, SeekFrom};
 
 /// OpenVDB's magic number, the first bytes of every file.
 pub(in crate::vdb) const MAGIC: [u8; 8] = [0x20, 0x42, 0x44, 0x56, 0, 0, 0, 0];
-/// Versions of the format whose structure is known here: the newest is the one that OpenVDB 10 writes.
+/// Versions of the format whose structure is known here; OpenVDB 10 writes the newest one.
 const KNOWN: std::ops::RangeInclusive<u32> = 211..=224;
 /// First version with a flag for offsets.
 const OFFSETS_FLAG: u32 = 212;
 /// First version in which grids can share the tree of another.
 const INSTANCES: u32 = 216;
-/// First version with an identifier of 36 letters; it was 16 bytes.
+/// First version with an identifier of 36 characters; before it was 16 bytes.
 const LONG_UUID: u32 = 218;
 /// Versions with one compression flag for the whole file.
 const FILE_COMPRESSION: std::ops::Range<u32> = 220..222;
-/// First version with compression flags for each grid.
+/// First version with compression flags per grid.
 const GRID_COMPRESSION: u32 = 222;
 /// Longest name that is read (bytes).
 const LONGEST_NAME: u64 = 1 << 16;
@@ -27,8 +27,8 @@ const LONGEST_NAME: u64 = 1 << 16;
 pub struct Layout {
     /// Version of the format.
     pub version: u32,
-    /// The grids in the file's order. None where the file has no offsets: a stream, or an unknown
-    /// version. Whether such a file is complete shows only when it is decoded.
+    /// The grids in the file's order. None if the file has no offsets: a stream, or an unknown version. Only decoding shows whether such a
+    /// file is complete.
     pub grids: Option<Vec<Place>>,
 }
 
@@ -39,7 +39,7 @@ impl Layout {
     }
 }
 
-/// Where a grid lies in its file.
+/// The position of a grid in its file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
     /// Its name, without the number that OpenVDB appends to names that are not unique.
@@ -57,9 +57,9 @@ pub struct Place {
 /// Why a structure cannot be used.
 #[derive(Debug)]
 pub enum Fault {
-    /// The system cannot read.
+    /// The operating system cannot read the file.
     Io(std::io::Error),
-    /// Not a .vdb file; the message follows the file's name.
+    /// Not a .vdb file; the message is appended to the file's name.
     Content(String),
 }
 
@@ -76,7 +76,7 @@ fn damaged(what: impl std::fmt::Display) -> Fault {
 /// Reads the structure of a file.
 ///
 /// # Errors
-/// [`Fault::Content`] for a file that is empty, of another kind, too short for its offsets, or that contradicts itself.
+/// [`Fault::Content`] for a file that is empty, of another kind, too short for its offsets, or inconsistent.
 pub fn read(source: impl Read + Seek) -> Result<Layout, Fault> {
     let mut walk = Walk::new(source)?;
     let (version, has_offsets) = walk.head()?;
@@ -98,10 +98,10 @@ pub fn read(source: impl Read + Seek) -> Result<Layout, Fault> {
     Ok(Layout { version, grids: Some(grids) })
 }
 
-/// Reads the metadata of a file: key, OpenVDB's name of the type, and bytes. None where the version is unknown.
+/// Reads the metadata of a file: key, OpenVDB's name of the type, and bytes. None if the version is unknown.
 ///
 /// # Errors
-/// As [`read`], up to where the metadata ends.
+/// As [`read`], up to the end of the metadata.
 pub fn metadata(source: impl Read + Seek) -> Result<Vec<(String, String, Vec<u8>)>, Fault> {
     const PART: &str = "metadata of the file";
     let mut walk = Walk::new(source)?;
@@ -163,9 +163,9 @@ impl<R: Read + Seek> Walk<R> {
         self.go_to(self.at + count)
     }
 
-    /// Goes to a position that is known to lie within the file.
+    /// Moves to a position that is known to lie within the file.
     fn go_to(&mut self, at: u64) -> Result<(), Fault> {
-        // Relative steps keep what is buffered.
+        // A relative seek keeps the buffer.
         self.source.seek_relative(at as i64 - self.at as i64)?;
         self.at = at;
         Ok(())
@@ -182,7 +182,7 @@ impl<R: Read + Seek> Walk<R> {
         Ok(String::from_utf8_lossy(&text).into_owned())
     }
 
-    /// Reads up to the metadata of the file: its version, and whether it has offsets; none where the version is unknown.
+    /// Reads up to the file's metadata: its version, and whether it has offsets; none if the version is unknown.
     fn head(&mut self) -> Result<(u32, Option<bool>), Fault> {
         let start = self.length.min(8) as usize;
         let mut magic = [0; 8];
@@ -205,12 +205,12 @@ impl<R: Read + Seek> Walk<R> {
         Ok((version, Some(has_offsets)))
     }
 
-    /// Reads the key, type and size of metadata, which follows.
+    /// Reads the key, type and size of a metadata entry, whose value follows.
     fn entry(&mut self, part: &str) -> Result<(String, String, u64), Fault> {
         Ok((self.name(part)?, self.name(part)?, self.u32(part)?.into()))
     }
 
-    /// Skips a list of metadata, which must end before a position.
+    /// Skips a list of metadata, which must end before `before`.
     fn metadata(&mut self, before: u64, part: &str) -> Result<(), Fault> {
         let count = self.u32(part)?;
         for _ in 0..count {

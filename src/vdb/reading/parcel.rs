@@ -1,9 +1,8 @@
-//! Data passed from one process to another: descriptions of a file's grids, or grids, with their leaves as plain
-//! blocks, or points.
+//! Data passed from one process to another: descriptions of a file's grids, or grids with their leaves as plain blocks, or points.
 //!
-//! A parcel is `MAGIC`, the length of its head, the head, and for each grid three arrays: origins, masks, values of its
-//! leaves. The magic number is written last: without it a parcel is incomplete. The reader checks every length,
-//! as a damaged file may have misled the process that wrote it.
+//! A parcel is `MAGIC`, the length of its head, the head, and for each grid three arrays: origins, masks and values of its leaves. The
+//! magic number is written last: without it a parcel is incomplete. The reader checks every length, because a damaged file may have misled
+//! the process that wrote it.
 
 use std::fs::File;
 use std::io::{IoSlice, Write};
@@ -23,11 +22,11 @@ use crate::vdb::vectors::{AnyGrid, VectorGrid};
 const MAGIC: [u8; 8] = *b"frzpack3";
 /// Arrays begin at multiples of this.
 pub(in crate::vdb) const ALIGN: usize = 64;
-/// Bytes of a leaf of such values in each of the three arrays.
+/// Bytes of a leaf with such values in each of the three arrays.
 const fn sizes<V>() -> [usize; 3] {
     [12, size_of::<Mask>(), size_of::<V>()]
 }
-/// Leaves that one write takes.
+/// Leaves per write.
 const BATCH: usize = 512;
 
 /// The contents of a parcel.
@@ -36,9 +35,9 @@ pub(in crate::vdb) enum Contents {
     Infos(Vec<GridInfo>),
     /// Grids.
     Grids(Vec<AnyGrid>),
-    /// Points, and the attributes that they are without.
+    /// Points, and the attributes that were omitted.
     Points(Points, Vec<String>),
-    /// Why there is neither; the message follows the file's name.
+    /// Why there is neither; the message is appended to the file's name.
     Refusal(String),
 }
 
@@ -59,7 +58,7 @@ pub(in crate::vdb) fn pack(mut file: &File, contents: &Contents) -> Result<(), S
             head.number(infos.len() as u64);
             infos.iter().for_each(|info| head.info(info));
         }
-        // Below, as they have no leaves.
+        // Written below: points have no leaves.
         Contents::Points(..) => {}
         Contents::Grids(grids) => {
             head.number(2);
@@ -140,7 +139,7 @@ fn write_leaves<V: LeafValues>(
     Ok(())
 }
 
-/// Opens a parcel; none when it is incomplete or contradicts itself.
+/// Opens a parcel; none if it is incomplete or inconsistent.
 pub(in crate::vdb) fn unpack(parcel: &Mapping, threads: usize) -> Option<Contents> {
     let mut start = Cursor(parcel);
     (start.take(8)? == MAGIC).then_some(())?;
@@ -166,7 +165,7 @@ pub(in crate::vdb) fn unpack(parcel: &Mapping, threads: usize) -> Option<Content
     }
 }
 
-/// Builds a grid: a copy for each leaf, nothing more.
+/// Builds a grid with one copy per leaf and nothing more.
 fn grid(head: &mut Cursor<'_>, parcel: &[u8], at: &mut usize, threads: usize) -> Option<AnyGrid> {
     let call = ffi::Call { threads: threads as i32, cancel: 0 };
     let is_vectors = head.number()? != 0;
@@ -190,7 +189,7 @@ fn grid(head: &mut Cursor<'_>, parcel: &[u8], at: &mut usize, threads: usize) ->
     Some(AnyGrid::Floats(FloatGrid { inner }))
 }
 
-/// Where the leaves of a grid lie.
+/// The positions of a grid's leaves.
 struct Arrays {
     origins: Vec<i32>,
     /// Addresses.
@@ -198,7 +197,7 @@ struct Arrays {
     masks: Vec<usize>,
 }
 
-/// The arrays of so many leaves, from an offset in the parcel; the offset moves past them.
+/// The arrays of this many leaves, from an offset in the parcel, which then moves past them.
 fn arrays<V>(parcel: &[u8], at: &mut usize, count: usize) -> Option<Arrays> {
     let sizes = sizes::<V>();
     let mut arrays = [&parcel[..0]; 3];

@@ -1,4 +1,4 @@
-//! Points in a parcel: the head describes them; their arrays follow it in the order of the head, each aligned.
+//! Points in a parcel: the head describes them; their arrays follow it in the same order, each aligned.
 
 use std::fs::File;
 use std::io::Write;
@@ -10,16 +10,16 @@ use crate::vdb::points::kind;
 /// A type whose values pass through a parcel as bytes.
 ///
 /// # Safety
-/// Each byte of a value can be read, and there is no padding.
+/// Every byte of a value is initialised: there is no padding.
 unsafe trait Plain: Copy {
-    /// A value from its bytes, as many as it has.
+    /// A value from its bytes, which must be exactly as many as it has.
     fn of(bytes: &[u8]) -> Option<Self>;
 }
 
 macro_rules! plain {
     ($($type:ty: $of:expr;)*) => {
         $(
-            // SAFETY: numbers, arrays of them and bools have no padding.
+            // SAFETY: numbers, arrays of numbers and bools have no padding.
             unsafe impl Plain for $type {
                 fn of(bytes: &[u8]) -> Option<Self> {
                     ($of)(bytes)
@@ -63,7 +63,7 @@ pub(in crate::vdb) fn describe(head: &mut Head, points: &Points, skipped: &[Stri
     }
 }
 
-/// The bytes of the values that are stored.
+/// The bytes of the stored values.
 fn stored(values: &Values) -> &[u8] {
     match values {
         Values::Float(column) => bytes_of(column.stored()),
@@ -86,8 +86,7 @@ pub(in crate::vdb) fn write(mut file: &File, at: &mut usize, points: &Points) ->
     Ok(())
 }
 
-/// Reads points that a head describes, with arrays that begin in the parcel at an offset, and the attributes that are left
-/// out. None when they contradict themselves.
+/// Reads points described by a head, whose arrays begin at an offset in the parcel, and the omitted attributes. None if they are inconsistent.
 pub(in crate::vdb) fn read(
     head: &mut Cursor<'_>,
     parcel: &[u8],

@@ -1,6 +1,7 @@
 //! Full disks, forbidden folders, too little memory, damaged files, signals: one sentence, the right exit
 //! code, whole frames only.
 
+use crate::common::skip::skipped;
 use crate::program::{CUBE, complains, frazil};
 use assert_cmd::Command;
 use std::fs;
@@ -99,7 +100,7 @@ fn a_grid_of_another_type_is_named_with_its_type() {
     let python =
         std::process::Command::new("/usr/bin/python3").current_dir(folder.path()).args(["-c", make]).output();
     if !python.is_ok_and(|output| output.status.success()) {
-        eprintln!("skipped: no pyopenvdb");
+        skipped("no pyopenvdb");
         return;
     }
     complains(

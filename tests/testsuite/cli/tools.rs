@@ -1,5 +1,6 @@
 //! `new`, `check`, `mesh check` and `convert`, and settings from the command line.
 
+use crate::common::skip::skipped;
 use std::fs;
 use std::path::Path;
 
@@ -211,7 +212,7 @@ fn mesh_check_says_what_joining_vertices_by_position_hides() {
 #[test]
 fn mesh_check_of_real_meshes_finds_their_known_faults() {
     let Some(bunny) = character::data("mesh/stanford-bunny.obj") else {
-        return eprintln!("skipped: no outside data");
+        return skipped("no outside data");
     };
     let folder = folder();
     let report: Value =
@@ -252,7 +253,7 @@ fn sequences_and_characters_become_files_a_frame() {
     fails(folder.path(), "convert ball.%04d.obj out.ply --frames 1-2", &["pattern"]);
     fails(folder.path(), "convert ball.%04d.obj out.%04d.ply", &["--frames"]);
     let Some(man) = character::data("character/CesiumMan.glb") else {
-        return eprintln!("skipped: no outside data");
+        return skipped("no outside data");
     };
     works(folder.path(), &format!("convert {} man.%04d.ply --frames 1001-1003", man.display()));
     let man = mesh::read(&folder.path().join("man.1003.ply")).unwrap();

@@ -1,5 +1,6 @@
 //! Meshes whose numbers are known, rays against brute force, mesh sequences, and meshes from the wild.
 
+use crate::common::skip::skipped;
 use std::f64::consts::PI;
 use std::path::PathBuf;
 
@@ -186,7 +187,7 @@ fn wild(name: &str) -> Option<TriMesh> {
         std::env::var_os("FRAZIL_DATA").map_or_else(|| PathBuf::from("../shared/data"), PathBuf::from);
     let path = folder.join("mesh").join(name);
     if !path.exists() {
-        println!("skipped: no {}", path.display());
+        skipped(&format!("no {}", path.display()));
         return None;
     }
     Some(mesh::read(&path).unwrap())

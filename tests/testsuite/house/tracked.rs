@@ -1,5 +1,6 @@
 //! What git tracks is written by people: nothing that a tool builds.
 
+use crate::common::skip::skipped;
 use std::path::Path;
 use std::process::Command;
 
@@ -18,7 +19,7 @@ fn git(arguments: &[&str]) -> Option<String> {
 #[test]
 fn no_built_file_is_tracked() {
     let Some(tracked) = git(&["ls-files"]).filter(|list| !list.is_empty()) else {
-        println!("skipped: the sources are not in a repository of git");
+        skipped("the sources are not in a repository of git");
         return;
     };
     let is_built = |path: &&str| {
@@ -49,7 +50,7 @@ fn what_tools_write_is_ignored() {
         "examples/c/press_snow.o",
     ];
     if git(&["ls-files"]).is_none_or(|list| list.is_empty()) {
-        println!("skipped: the sources are not in a repository of git");
+        skipped("the sources are not in a repository of git");
         return;
     }
     for path in written {

@@ -1,5 +1,6 @@
 //! Arrays of meshes in USD: `convert` writes each as a primvar.
 
+use crate::common::skip::skipped;
 use std::fs;
 
 use crate::common::clients;
@@ -69,7 +70,7 @@ fn convert_writes_the_arrays_of_a_mesh_as_primvars() {
     let large = fs::read_to_string(folder.join("large.usda")).unwrap();
     assert_eq!(numbers(&large, "velocities"), [0.0; 12]);
     assert_eq!(numbers(&large, "primvars:mask"), [0.25, 0.5, 1.0, -3.0]);
-    let Some(python) = clients::usd_python() else { return eprintln!("skipped: no usd-core") };
+    let Some(python) = clients::usd_python() else { return skipped("no usd-core") };
     fs::write(folder.join("wanted.json"), wanted().to_string()).unwrap();
     let (file, wanted) = (folder.join("rich.usda"), folder.join("wanted.json"));
     let said = clients::usd_reads_arrays(&python, &file, "/meshes/rich", 1, &wanted).unwrap();

@@ -1,5 +1,6 @@
 //! Files that are damaged, cut, or made to harm: one sentence, no crash, no hang, and nothing outside is touched.
 
+use crate::common::skip::skipped;
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
@@ -21,7 +22,7 @@ use frazil::{Context, Pool, io};
 fn outside(name: &str) -> Option<PathBuf> {
     let path = character::data(name);
     if path.is_none() {
-        eprintln!("skipped: no {name}");
+        skipped(&format!("no {name}"));
     }
     path
 }

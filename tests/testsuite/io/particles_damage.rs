@@ -1,5 +1,6 @@
 //! Damaged and outside particle caches: one sentence for each that is refused, no panic, no memory for what is not there.
 
+use crate::common::skip::skipped;
 use std::time::{Duration, Instant};
 
 use frazil::geometry::DVec3;
@@ -187,7 +188,7 @@ fn a_position_that_is_not_finite_is_named() {
 fn outside(name: &str) -> Option<Cloud> {
     let path = character::data(&format!("particles/{name}"));
     if path.is_none() {
-        eprintln!("skipped: no particles/{name}");
+        skipped(&format!("no particles/{name}"));
     }
     path.map(|path| particles::read(&path).unwrap())
 }

@@ -1,5 +1,6 @@
 //! glTF characters: against formulas, against Blender, and files that are wrong in every way.
 
+use crate::common::skip::skipped;
 use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
@@ -294,7 +295,7 @@ fn the_foot_that_stands_does_not_slip_when_keys_carry_the_figure_at_its_speed() 
 #[test]
 fn khronos_simple_skin_bends_as_its_keys_say() {
     let Some(path) = character::data("character/SimpleSkin.gltf") else {
-        return eprintln!("skipped: no outside data");
+        return skipped("no outside data");
     };
     let character = open(&path);
     assert_eq!((character.triangles().len(), character.vertex_count()), (8, 10));
@@ -310,7 +311,7 @@ fn khronos_simple_skin_bends_as_its_keys_say() {
 #[test]
 fn skinning_is_blenders() {
     let Some(path) = character::data("character/CesiumMan.glb") else {
-        return eprintln!("skipped: no outside data");
+        return skipped("no outside data");
     };
     let (farthest, height) = character::farthest_from_blender(&path);
     assert!(farthest < 1e-5 * height, "{farthest} m of {height} m");

@@ -1,6 +1,7 @@
 //! Fog in pictures: it lets through what the law of Beer and Lambert says, lies where its grid says, and is the same from
 //! both sides and from any number of threads.
 
+use crate::common::skip::skipped;
 use std::path::Path;
 
 use frazil::geometry::points::{Column, Points, Values};
@@ -182,7 +183,7 @@ fn a_fog_is_where_the_transform_of_its_grid_puts_it() {
         write('moved.vdb', [[.5,0,0,0],[0,.5,0,0],[0,0,.5,0],[.25,.25,.25,1]])\n\
         write('turned.vdb', [[0,0,-.5,0],[0,.25,0,0],[.5,0,0,0],[0,0,0,1]])";
     if !python(folder.path(), script) {
-        eprintln!("skipped: no pyopenvdb");
+        skipped("no pyopenvdb");
         return;
     }
     let expected = [

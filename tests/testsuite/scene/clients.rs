@@ -1,5 +1,6 @@
 //! Blender and usd-core open a shot; each is skipped where it is not installed.
 
+use crate::common::skip::skipped;
 use std::fs;
 use std::process::Command;
 
@@ -39,14 +40,14 @@ fn shot(tables: &str) -> TempDir {
 
 #[test]
 fn blender_imports_the_sequence_as_one_volume_and_renders_it() {
-    let Some(blender) = clients::blender() else { return eprintln!("skipped: no blender") };
+    let Some(blender) = clients::blender() else { return skipped("no blender") };
     let folder = shot("[output]");
     clients::blender_opens(&blender, &folder.path().join("out"), 3, 8).unwrap();
 }
 
 #[test]
 fn blender_renders_base_grains_and_mist_with_the_script_for_users() {
-    let Some(blender) = clients::blender() else { return eprintln!("skipped: no blender") };
+    let Some(blender) = clients::blender() else { return skipped("no blender") };
     let folder = shot(PARTS);
     let picture = folder.path().join("frame.png");
     let said = clients::blender_renders(&blender, &folder.path().join("out"), 8, &picture).unwrap();
@@ -56,7 +57,7 @@ fn blender_renders_base_grains_and_mist_with_the_script_for_users() {
 
 #[test]
 fn usd_core_composes_the_stage_with_velocities_and_files() {
-    let Some(python) = clients::usd_python() else { return eprintln!("skipped: no usd-core") };
+    let Some(python) = clients::usd_python() else { return skipped("no usd-core") };
     let folder = shot("[output]");
     let said = clients::usd_composes(&python, &folder.path().join("out"), 3, 8).unwrap();
     assert!(said.contains("3 with UVs"), "{said}");
@@ -64,7 +65,7 @@ fn usd_core_composes_the_stage_with_velocities_and_files() {
 
 #[test]
 fn usd_core_composes_grains_and_volumes_with_materials() {
-    let Some(python) = clients::usd_python() else { return eprintln!("skipped: no usd-core") };
+    let Some(python) = clients::usd_python() else { return skipped("no usd-core") };
     let folder = shot(VOLUMES);
     let said = clients::usd_composes(&python, &folder.path().join("out"), 3, 8).unwrap();
     assert!(said.contains(" grains") && !said.contains(" 0 grains"), "{said}");

@@ -1,5 +1,6 @@
 //! Scene files, records and states with random changes: 10,000 of each, and none may panic, hang or be taken for whole.
 
+use crate::common::skip::skipped;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -177,7 +178,7 @@ fn ten_thousand_changed_scenes_are_read_or_refused() {
 fn scenes_that_panicked_are_refused() {
     for index in ["172", "602", "906"] {
         let Some(path) = character::data(&format!("broken/toml_{index}.toml")) else {
-            println!("skipped: no data");
+            skipped("no data");
             return;
         };
         let folder = tempfile::tempdir().unwrap();

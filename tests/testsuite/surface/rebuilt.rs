@@ -1,5 +1,6 @@
 //! `frazil surface` where the liquid merges, splits, appears and is gone: the mesh is cut and rebuilt there, with all that it carries.
 
+use crate::common::skip::skipped;
 use std::fs;
 use std::path::Path;
 
@@ -390,7 +391,7 @@ fn usd_has_other_faces_from_frame_to_frame_and_primvars_that_fit_them() {
     }
     assert!(all[0] == all[1] && all.windows(2).filter(|pair| pair[0] != pair[1]).count() > 1);
     if python.is_none() {
-        eprintln!("skipped: no usd-core");
+        skipped("no usd-core");
     }
 }
 

@@ -1,5 +1,6 @@
 //! `frazil surface` in USD: all that the mesh carries, and what each frame adds, as primvars.
 
+use crate::common::skip::skipped;
 use std::fs;
 use std::path::Path;
 
@@ -125,7 +126,7 @@ fn the_arrays_of_a_mesh_and_of_each_frame_are_primvars() {
         }
     }
     if python.is_none() {
-        eprintln!("skipped: no usd-core");
+        skipped("no usd-core");
     }
 }
 

@@ -14,12 +14,12 @@ use crate::shallow::surface::rim::ledges::Ledges;
 #[derive(Default)]
 pub(in crate::capi) struct Ledged {
     ledges: Ledges,
-    /// Whether they are of the ground as it is.
+    /// Whether they match the current ground.
     pub is_current: bool,
 }
 
 impl Ledged {
-    /// The ledges of a surface that may want them, or the failure of one that does where there are none.
+    /// The ledges, if a surface needs them; a failure if it needs them and there are none.
     pub(in crate::capi) fn wanted(&self, is_skirted: bool, when: &str) -> Outcome<Option<&Ledges>> {
         if is_skirted && !self.is_current {
             return Err(Failure::argument(format!(
@@ -29,7 +29,7 @@ impl Ledged {
         Ok(is_skirted.then_some(&self.ledges))
     }
 
-    /// Takes those of another, if they are of its ground as it is.
+    /// Takes another object's ledges, if they match its current ground.
     pub(in crate::capi) fn copy_from(&mut self, other: &Self) {
         self.is_current = other.is_current;
         if self.is_current {
@@ -38,11 +38,13 @@ impl Ledged {
     }
 }
 
-/// Finds where the ground ends over nothing, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED. With the mesh that the liquid
-/// was made with it finds where between the middles of cells that is; on other ground the surface goes on for half a cell. In real time (frz_shallow): it
-/// looks at all triangles once; after frz_shallow_update_terrain or _set_bodies have moved something it is called again, before the next such surface.
+/// Finds the ledges, where the ground ends over nothing, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED.
+/// With the mesh that the liquid was created with, the edge is located between the centres of cells; on other ground the surface extends by
+/// half a cell. In real time (frz_shallow): it visits all triangles once. Call it again after frz_shallow_update_terrain or
+/// frz_shallow_set_bodies have moved something, before the next such surface.
 ///
-/// size: receives the most that this adds to frz_shallow_surface_bound, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// size: receives the maximum that this adds to frz_shallow_surface_bound, all zeroes after a failure; may be NULL. Its struct_size is set
+///     by the caller.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -52,7 +54,7 @@ pub unsafe extern "C" fn frz_shallow_find_ledges(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             if !size.is_null() {
                 fill(size, None, Counts::default().into())?;

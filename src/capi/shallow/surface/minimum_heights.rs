@@ -1,4 +1,4 @@
-//! Minimum heights of shallow liquid: how far its films are lifted so that the ground's mesh does not show through them.
+//! Minimum heights of shallow liquid: how far its films are raised so that the ground's mesh does not show through them.
 
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::change;
@@ -9,19 +9,19 @@ use crate::capi::shallow::liquid::{Spill, frz_shallow};
 use crate::capi::shallow::terrain::{Terrain, cells_in};
 use crate::shallow::surface::heights::minimum_heights::{Distance, Fitted, Lifts};
 
-/// What a thin film keeps from the ground's mesh, in edges of a cell, each finite and 0 or more.
+/// Distances between a thin film and the ground's mesh, in edges of a cell, each finite and 0 or more.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_distance {
     /// sizeof(frz_shallow_distance).
     pub struct_size: u32,
-    /// 0.
+    /// Must be 0.
     pub flags: u32,
-    /// How far the surface is over wet ground at least; 0.05 is usual.
+    /// Minimum height of the surface over wet ground; default 0.05.
     pub least: f64,
-    /// How far it is over the mesh's vertices; 0.01 is usual.
+    /// Height of the surface over the mesh's vertices; default 0.01.
     pub margin: f64,
-    /// How far its rim is below them and below dry ground; 0.1 is usual. More than the margin.
+    /// Depth of its rim below them and below dry ground; default 0.1. More than the margin.
     pub rim: f64,
 }
 
@@ -38,19 +38,19 @@ impl frz_shallow_distance {
     }
 }
 
-/// What became of the mesh's vertices that face up, of those that a call looked at.
+/// Statistics of the vertices of the mesh that face up, of those that a call visited.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_fitted {
     /// sizeof(frz_shallow_fitted), set by the caller.
     pub struct_size: u32,
-    /// Nothing.
+    /// Reserved.
     pub reserved: u32,
-    /// Count of them.
+    /// Their number.
     pub upward: u64,
-    /// Of these, those that are more than a cell above the ground around: they may be above the surface.
+    /// Those of them more than a cell above the surrounding ground: they may be above the surface.
     pub discarded: u64,
-    /// Of the others, those that lie too close under a ceiling.
+    /// Of the others, those too close below a ceiling.
     pub capped: u64,
 }
 
@@ -76,37 +76,37 @@ impl From<Fitted> for frz_shallow_fitted {
 #[derive(Default)]
 pub(in crate::capi) struct Lifted {
     lifts: Lifts,
-    /// Whether they are of the ground as it is.
+    /// Whether they match the current ground.
     pub is_current: bool,
 }
 
 impl Lifted {
-    /// Least and sunk depths, if they are of the ground as it is.
+    /// Minimum and sunk depths, if they match the current ground.
     pub(in crate::capi) fn known(&self) -> Option<(&[i32], &[i32])> {
         self.is_current.then(|| (self.lifts.least(), self.lifts.sunk()))
     }
 
-    /// The same, or the failure of a surface that wants them.
+    /// The same; a failure if they do not match.
     pub(in crate::capi) fn current(&self) -> Outcome<(&[i32], &[i32])> {
         self.known().ok_or_else(|| no_lifts("since the ground or a body moved"))
     }
 }
 
-/// The failure of a surface for which there are no minimum heights.
+/// The failure of a surface without minimum heights.
 pub(in crate::capi) fn no_lifts(when: &str) -> Failure {
     Failure::argument(format!(
         "FRZ_SHALLOW_LIFTED: frz_shallow_find_lifts has found no minimum heights {when}"
     ))
 }
 
-/// Finds the minimum heights of all columns, or of those that have changed, from the mesh that the liquid was made with, in real time (frz_shallow), for
-/// surfaces with FRZ_SHALLOW_LIFTED. They change what is shown, and nothing of the flow. It looks at all triangles once; after
-/// frz_shallow_update_terrain or _set_bodies have moved something it is called again, before the next such surface.
+/// Finds the minimum heights of all columns, or of those that have changed, from the mesh that the liquid was created with, in real time
+/// (frz_shallow), for surfaces with FRZ_SHALLOW_LIFTED. They change what is shown, not the flow. It visits all triangles once. Call it
+/// again after frz_shallow_update_terrain or frz_shallow_set_bodies have moved something, before the next such surface.
 ///
-/// distance: NULL for the usual one. Another one than before needs all columns.
-/// bounds: double[4], least x, least z, greatest x and greatest z (m) of all that has moved since the last call, triangles and bodies, where they were
-///     and where they are. NULL, and the first time: all columns.
-/// fitted: receives what became of the vertices, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
+/// distance: NULL for the defaults. If it differs from the one before, all columns must be found.
+/// bounds: double[4], minimum x, minimum z, maximum x and maximum z (m) of all triangles and bodies that have moved since the last call, at
+///     their old and their new positions. NULL, and the first time: all columns.
+/// fitted: receives statistics of the vertices, all zeroes after a failure; may be NULL. Its struct_size is set by the caller.
 ///
 /// One thread at a time.
 #[unsafe(no_mangle)]
@@ -118,7 +118,7 @@ pub unsafe extern "C" fn frz_shallow_find_lifts(
     fitted: *mut frz_shallow_fitted,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             if !fitted.is_null() {
                 fill(fitted, None, Fitted::default().into())?;

@@ -15,19 +15,19 @@ use crate::shallow::columns::Columns;
 use crate::shallow::scalars::MOST;
 use crate::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target, Up, bound};
 
-/// Flag of a layout: Z is up. The axes are then (x, -z, y) of those with Y up.
+/// Flag of a layout: Z is up. The axes are then (x, -z, y) in terms of those with Y up.
 pub const FRZ_SHALLOW_Z_UP: u32 = 1;
 
-/// Flag of a layout: left-handed axes, as of Unity (Y up) and Unreal (Z up): the horizontal axis that is not x points the other way, and
-/// faces are clockwise seen from above.
+/// Flag of a layout: left-handed axes, as in Unity (Y up) and Unreal (Z up): the horizontal axis that is not x is reversed, and faces are
+/// clockwise seen from above.
 pub const FRZ_SHALLOW_LEFT_HANDED: u32 = 2;
 
-/// Flag of a layout: films are shown at their minimum heights, which frz_shallow_find_lifts has found since the ground or a body moved last, in place
-/// of frz_shallow_layout.least_depth.
+/// Flag of a layout: films are shown at their minimum heights instead of frz_shallow_layout.least_depth. frz_shallow_find_lifts must have
+/// found them since the ground or a body last moved.
 pub const FRZ_SHALLOW_LIFTED: u32 = 4;
 
-/// Flag of a layout: where the ground ends over nothing, the surface goes on to its edge and comes down to it, in place of ending in the middle of the
-/// last cell, open below. frz_shallow_find_ledges has found where since the ground or a body moved last.
+/// Flag of a layout: where the ground ends over nothing, the surface extends to the ground's edge and comes down to it, instead of ending
+/// at the centre of the last cell, open below. frz_shallow_find_ledges must have found the edges since the ground or a body last moved.
 pub const FRZ_SHALLOW_SKIRTED: u32 = 8;
 
 /// How a surface is written.
@@ -36,17 +36,18 @@ pub const FRZ_SHALLOW_SKIRTED: u32 = 8;
 pub struct frz_shallow_layout {
     /// sizeof(frz_shallow_layout).
     pub struct_size: u32,
-    /// FRZ_SHALLOW_Z_UP, FRZ_SHALLOW_LEFT_HANDED, FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, several of them or 0, which is usual: Y up, right-handed.
+    /// FRZ_SHALLOW_Z_UP, FRZ_SHALLOW_LEFT_HANDED, FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, several of them or 0; default 0: Y up,
+    /// right-handed.
     pub flags: u32,
-    /// The host's units of length in a metre, over 0: 1 is usual, 100 for centimetres. For positions, depths and velocities.
+    /// The host's units of length per metre, over 0, for positions, depths and velocities; default 1. 100 for centimetres.
     pub scale: f64,
-    /// Least height of the surface over wet ground (m), 0 or more, against flicker where the ground is drawn too. 0 is usual; 0.05 of
-    /// a cell in the thesis.
+    /// Minimum height of the surface over wet ground (m), 0 or more, against flicker where the ground is drawn too; default 0. 0.05 of a
+    /// cell in the thesis.
     pub least_depth: f64,
-    /// Depth (m) from which frz_shallow_target.opacities are 1, over 0; 0.01 is usual.
+    /// Depth (m) from which frz_shallow_target.opacities are 1, over 0; default 0.01.
     pub opaque_depth: f64,
-    /// Depth (m) from which a wet vertex is at its full height, so that none jumps as its column wets or dries, 0 or more; 0 is usual: at once. With
-    /// FRZ_SHALLOW_LIFTED 0.02 of a cell does well.
+    /// Depth (m) from which a wet vertex has its full height, so that none jumps as its column wets or dries, 0 or more; default 0: at
+    /// once. With FRZ_SHALLOW_LIFTED 0.02 of a cell is a good value.
     pub fade_depth: f64,
 }
 
@@ -87,9 +88,9 @@ impl frz_shallow_layout {
     }
 }
 
-/// Buffers that a surface is written into. Those with data NULL are not wanted, and it begins zeroed: all of them. They may be mapped memory
-/// of a graphics device: each is written from its beginning, in order, and never read. Elements are packed (a stride of 0, or their size) and
-/// aligned to their numbers; no two buffers overlap. They may be longer than the surface; what is behind it is not touched.
+/// Buffers that a surface is written to. Zero it, then set struct_size; buffers with data NULL are not written. They may be mapped memory
+/// of a graphics device: each is written in order from its beginning, and never read. Elements are packed (a stride of 0, or their size)
+/// and aligned to their components; buffers must not overlap. They may be longer than the surface; the rest is not touched.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct frz_shallow_target {
@@ -97,25 +98,24 @@ pub struct frz_shallow_target {
     pub struct_size: u32,
     /// Bits of an index: 16, for at most 65536 vertices, or 32. 0 without indices.
     pub index_bits: u32,
-    /// float[3] a vertex: where it is (m x scale).
+    /// float[3] for each vertex: its position (m x scale).
     pub positions: frz_span,
-    /// float[3] a vertex: a unit vector.
+    /// float[3] for each vertex: its unit normal.
     pub normals: frz_span,
-    /// float a vertex: depth (m x scale); 0 where it is dry.
+    /// float for each vertex: depth (m x scale); 0 where it is dry.
     pub depths: frz_span,
-    /// float a vertex: depth over frz_shallow_layout.opaque_depth, at most 1.
+    /// float for each vertex: depth over frz_shallow_layout.opaque_depth, at most 1.
     pub opacities: frz_span,
-    /// float[3] a vertex: velocity at the surface (m/s x scale), 1.5 times the mean one, level.
+    /// float[3] for each vertex: velocity at the surface (m/s x scale), 1.5 times the mean one, horizontal.
     pub velocities: frz_span,
-    /// uint32_t a vertex: the layer of its column.
+    /// uint32_t for each vertex: the layer of its column.
     pub layers: frz_span,
-    /// uint32_t a vertex: the index of its column; 0xffffffff for one beside a wall or on the ground's edge,
-    /// which has none.
+    /// uint32_t for each vertex: the index of its column; 0xffffffff for one next to a wall or on the ground's edge, which has none.
     pub columns: frz_span,
-    /// uint16_t or uint32_t for each corner of each triangle: a vertex. Triangles face up.
+    /// uint16_t or uint32_t for each corner of each triangle: its vertex. Triangles face up.
     pub indices: frz_span,
-    /// float a vertex, of each scalar that frz_shallow_set_scalars has set: its concentration; of one that is dry or has no column, the mean of the wet
-    /// ones around.
+    /// float for each vertex, for each scalar of frz_shallow_set_scalars: its concentration; for a vertex that is dry or has no column, the
+    /// mean of the wet ones around it.
     pub scalars: [frz_span; 4],
 }
 
@@ -203,7 +203,7 @@ impl frz_shallow_target {
     /// The spans must describe memory that can be written and that nothing else uses, for `'a`.
     unsafe fn target<'a>(&self) -> Outcome<Target<'a>> {
         check_buffers(&self.buffers(), self.index_bits)?;
-        // SAFETY: the caller's promise, and they do not overlap.
+        // SAFETY: guaranteed by the caller, and they do not overlap.
         unsafe {
             let indices = match self.index_bits {
                 16 => self.indices.numbers("indices", 1)?.map_or(Indices::None, Indices::U16),
@@ -236,11 +236,11 @@ impl frz_shallow_target {
 pub struct frz_shallow_size {
     /// sizeof(frz_shallow_size), set by the caller.
     pub struct_size: u32,
-    /// Nothing.
+    /// Reserved.
     pub reserved: u32,
-    /// Count of vertices.
+    /// Number of vertices.
     pub vertices: u64,
-    /// Count of indices: three for each triangle.
+    /// Number of indices: three for each triangle.
     pub indices: u64,
 }
 
@@ -256,7 +256,7 @@ impl From<Counts> for frz_shallow_size {
     }
 }
 
-/// The library's own layout from a host's, with its flags; the usual one for NULL.
+/// The library's own layout from a host's, with its flags; the defaults for NULL.
 ///
 /// # Safety
 /// As [`sized`].
@@ -264,33 +264,33 @@ pub(in crate::capi) unsafe fn layout(pointer: *const frz_shallow_layout) -> Outc
     if pointer.is_null() {
         return Ok((Layout::default(), 0));
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let given = unsafe { sized(pointer, frz_shallow_layout::defaults()) }?;
     Ok((given.layout()?, given.flags))
 }
 
-/// What a surface is made of and into.
+/// What a surface is made from and into.
 pub(in crate::capi) struct Wanted {
     layout: Layout,
     given: frz_shallow_target,
     size: *mut frz_shallow_size,
-    /// Whether minimum heights are wanted.
+    /// Whether minimum heights are requested.
     pub(in crate::capi) is_lifted: bool,
-    /// Whether it comes down at ledges.
+    /// Whether the surface comes down at ledges.
     pub(in crate::capi) is_skirted: bool,
 }
 
 impl Wanted {
-    /// What a host wants.
+    /// The request of a host.
     ///
     /// # Safety
-    /// The pointers must be NULL or the caller's.
+    /// The pointers must be NULL or valid.
     pub(in crate::capi) unsafe fn new(
         layout: *const frz_shallow_layout,
         target: *const frz_shallow_target,
         size: *mut frz_shallow_size,
     ) -> Outcome<Self> {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe {
             if !size.is_null() {
                 fill(size, None, Counts::default().into())?;
@@ -303,12 +303,12 @@ impl Wanted {
         }
     }
 
-    /// Whether velocities are wanted.
+    /// Whether velocities are requested.
     pub(in crate::capi) fn velocities(&self) -> bool {
         !self.given.velocities.data.is_null()
     }
 
-    /// Whether the concentrations of a scalar are wanted.
+    /// Whether the concentrations of a scalar are requested.
     pub(in crate::capi) fn scalar(&self, scalar: usize) -> bool {
         !self.given.scalars[scalar].data.is_null()
     }
@@ -324,7 +324,7 @@ impl Wanted {
         depths: &Depths<'_>,
     ) -> Outcome {
         let surface = RefCell::new(surface);
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe {
             self.write_with(
                 |layout, target| surface.borrow_mut().build(columns, depths, layout, target),
@@ -333,7 +333,7 @@ impl Wanted {
         }
     }
 
-    /// Writes a surface and its size, by what builds one and what counts it.
+    /// Writes a surface and its size, given functions that build and count it.
     ///
     /// # Safety
     /// As [`Wanted::write`].
@@ -342,10 +342,10 @@ impl Wanted {
         build: impl FnOnce(&Layout, &mut Target<'_>) -> crate::Result<Counts>,
         count: impl FnOnce() -> crate::Result<Counts>,
     ) -> Outcome {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let mut target = unsafe { self.given.target() }?;
         let built = build(&self.layout, &mut target);
-        // What is too small is found out behind, so that a surface that fits is searched once.
+        // Too small a buffer is detected afterwards, so that a surface that fits is traversed once.
         let (counts, fits) = match built {
             Ok(counts) => (counts, Ok(())),
             Err(error) => {
@@ -357,28 +357,28 @@ impl Wanted {
             }
         };
         if !self.size.is_null() {
-            // SAFETY: the caller's promise.
+            // SAFETY: guaranteed by the caller.
             unsafe { fill(self.size, None, counts.into()) }?;
         }
         fits
     }
 }
 
-/// Fills a layout with the usual values.
+/// Fills a layout with the defaults.
 ///
-/// layout: receives them.
+/// layout: receives the defaults.
 /// size: sizeof(frz_shallow_layout).
 ///
 /// Any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_layout_init(layout: *mut frz_shallow_layout, size: usize) -> frz_status {
-    // SAFETY: the layout is NULL or has so many bytes.
+    // SAFETY: the layout is NULL or has `size` bytes.
     guard(|| unsafe { fill(layout, Some(size), frz_shallow_layout::defaults()) })
 }
 
-/// Reports the most that the surface of any liquid on this ground can have, so that buffers are made once. It holds until the ground
-/// or a body moves. On ground with uneven ceilings it is several times what a liquid comes to. With FRZ_SHALLOW_SKIRTED what
-/// frz_shallow_find_ledges reports comes on top.
+/// Reports the maximum size of the surface of any liquid on this ground, so that buffers can be allocated once. It holds until the ground
+/// or a body moves. On ground with uneven ceilings it is several times the size of an actual surface. With FRZ_SHALLOW_SKIRTED add what
+/// frz_shallow_find_ledges reports.
 ///
 /// size: receives it, all zeroes after a failure. Its struct_size is set by the caller.
 ///
@@ -389,7 +389,7 @@ pub unsafe extern "C" fn frz_shallow_surface_bound(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's.
+        // SAFETY: the pointers are NULL or valid.
         unsafe {
             fill(size, None, Counts::default().into())?;
             fill(size, None, bound(read(shallow)?.shallow.columns()).into())
@@ -398,12 +398,12 @@ pub unsafe extern "C" fn frz_shallow_surface_bound(
 }
 
 /// Writes the liquid's surface as triangles, in real time (frz_shallow): the wet columns and the dry ones around them. It ends at the
-/// middles of the outermost cells. Vertices come in the order of their columns' indices, those beside walls behind them, and those on the ground's
-/// edges last.
+/// centres of the outermost cells. Vertices are in the order of their columns' indices, followed by those next to walls, and last those on
+/// the ground's edges.
 ///
-/// layout: NULL for the usual one.
-/// target: the buffers. FRZ_ERROR_CAPACITY when one is too small: nothing is written, and size receives what is needed. With all data
-///     NULL it is the size only that is asked for.
+/// layout: NULL for the defaults.
+/// target: the buffers. FRZ_ERROR_CAPACITY if one is too small: nothing is written, and size receives what is needed. With all data NULL
+///     only the size is reported.
 /// size: receives the size of the surface, all zeroes after other failures; may be NULL. Its struct_size is set by the caller.
 ///
 /// One thread at a time.
@@ -416,7 +416,7 @@ pub unsafe extern "C" fn frz_shallow_surface(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     guard(|| {
-        // SAFETY: the pointers are NULL or the caller's; so is what the spans describe.
+        // SAFETY: the pointers are NULL or valid, and so are the spans.
         unsafe {
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;

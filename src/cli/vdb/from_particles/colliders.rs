@@ -14,27 +14,27 @@ use super::of_frame;
 use crate::cli::session::Session;
 use crate::cli::vdb::far_mesh;
 
-/// How much a length may differ (of itself) and be taken for the same.
+/// Relative tolerance for two lengths to be taken as equal.
 const ROUNDING: f64 = 1e-6;
 
-/// Voxels around a liquid in which a solid is made, too.
+/// Margin of voxels around a liquid in which a solid is resampled, too.
 const ROOM: i32 = 16;
 
 /// One file, or a file for each frame.
 struct Collider {
     path: PathBuf,
     is_sequence: bool,
-    /// Those of the one file, until the first frame takes them.
+    /// The solids of a single file, until the first frame takes them.
     first: Option<Vec<FloatGrid>>,
-    /// Those of the frame before, or of all frames.
+    /// The solids of the previous frame, or of all frames.
     solids: Vec<Solid>,
 }
 
 /// A solid that a liquid may be cut by.
 enum Solid {
-    /// On the liquid's cells, with a band as wide.
+    /// On the liquid's cells, with a band of the same width.
     Ready(FloatGrid),
-    /// The surface, and the last level set that was made of it with the box of voxels where it holds.
+    /// The surface, and the last level set made from it, with the box of voxels in which that is valid.
     Surface(TriMesh, Option<([[i32; 3]; 2], FloatGrid)>),
 }
 
@@ -42,7 +42,7 @@ enum Solid {
 pub struct Colliders(Vec<Collider>);
 
 impl Colliders {
-    /// Reads what all frames need; files of single frames are read when their turn comes.
+    /// Reads the files that all frames share; files of single frames are read in their turn.
     pub fn open(ctx: &Context, paths: &[PathBuf]) -> Result<Self> {
         let open = |path: &PathBuf| {
             let is_sequence = Pattern::parse(path).is_some();
@@ -57,7 +57,7 @@ impl Colliders {
         self.0.is_empty()
     }
 
-    /// Cuts those of a frame out of a liquid.
+    /// Cuts the solids of a frame out of a liquid.
     pub fn cut(&mut self, session: &Session, liquid: &mut FloatGrid, frame: i32) -> Result<()> {
         self.0.iter_mut().try_for_each(|collider| {
             let path = of_frame(&collider.path, frame);
@@ -67,7 +67,7 @@ impl Colliders {
 }
 
 impl Collider {
-    /// Cuts what a frame's file holds out of a liquid.
+    /// Cuts the level sets in a frame's file out of a liquid.
     fn cut(&mut self, ctx: &Context, liquid: &mut FloatGrid, path: &Path) -> Result<()> {
         let cell = liquid.voxel_size();
         if self.is_sequence || self.solids.is_empty() {
@@ -79,7 +79,7 @@ impl Collider {
             self.solids = grids.into_iter().map(solid).collect::<Result<_>>()?;
         }
         for solid in &mut self.solids {
-            // Nothing may be left by those before.
+            // The cuts before may have left nothing.
             let Some((low, high)) = liquid.active_bbox() else { return Ok(()) };
             let solid = solid.within(ctx, [low, high], cell)?;
             ctx.phase("subtract", || difference(ctx, liquid, solid))?;
@@ -89,11 +89,11 @@ impl Collider {
 }
 
 impl Solid {
-    /// A solid for a liquid of cells of an edge (m).
+    /// A solid for a liquid with cells of this edge (m).
     fn new(ctx: &Context, grid: FloatGrid, path: &Path, cell: f64) -> Result<Self> {
         let width = f64::from(HALF_WIDTH) * cell;
         let is_same = |a: f64, b: f64| (a - b).abs() <= ROUNDING * b;
-        // Combining asks for cells that are the same to nine digits.
+        // Combining requires cells that agree to nine digits.
         let has_cells = grid.is_world_fixed() && (grid.voxel_size() - cell).abs() <= 1e-9 * cell;
         if has_cells && is_same(f64::from(grid.background()), width) {
             return Ok(Self::Ready(grid));
@@ -109,7 +109,7 @@ impl Solid {
         Ok(Self::Surface(surface, None))
     }
 
-    /// Its level set in a box of a liquid's voxels, on its cells of an edge (m).
+    /// Its level set in a box of a liquid's voxels, on cells of this edge (m).
     fn within(&mut self, ctx: &Context, [low, high]: [[i32; 3]; 2], cell: f64) -> Result<FloatGrid> {
         let (mesh, made) = match self {
             Self::Ready(grid) => return grid.deep_copy(),
@@ -124,7 +124,7 @@ impl Solid {
         match made {
             Some((bounds, grid)) if holds(bounds) => grid.deep_copy(),
             _ => {
-                // A liquid that moves a little stays in it.
+                // A liquid that moves a little stays within the margin.
                 let bounds = [low.map(|at| at - ROOM), high.map(|at| at + ROOM)];
                 let settings = Settings { half_width: HALF_WIDTH, ..Settings::new(cell) };
                 let grid = voxelise_within(ctx, mesh.clone(), &settings, bounds)?;
@@ -148,7 +148,7 @@ fn of_solid(path: &Path, error: Error) -> Error {
     }
 }
 
-/// The names of the level sets of a file, ascending; those in other precision than ours are refused.
+/// The names of the level sets of a file, ascending; those of another precision than ours are refused.
 fn names(path: &Path) -> Result<Vec<String>> {
     let mut grids = file::describe(path)?;
     grids.retain(|grid| grid.class == "level set");

@@ -47,7 +47,7 @@ pub struct Args {
     /// a third of their radius]
     #[arg(long, value_name = "M", value_parser = positive)]
     cell: Option<f64>,
-    /// How particles become a surface
+    /// Method that makes a surface of particles
     #[arg(long, value_enum, default_value = "solenthaler")]
     method: Method,
     /// Radius of the spheres (m), 1.5 to 100 voxels [default: one spacing; 0.87 of it fills a cubic grid without holes]
@@ -59,16 +59,16 @@ pub struct Args {
     /// Level set to cut out of the liquid (.vdb), or a sequence of them (collider.%04d.vdb); can be given several times
     #[arg(long, value_name = "FILE")]
     subtract: Vec<PathBuf>,
-    /// Attributes of the particles that the mesh gets too (.ply), as means over those around each vertex: v, density, or all
+    /// Attributes of the particles to transfer to the mesh (.ply), as means over those around each vertex: v, density, or all
     #[arg(long, value_name = "A,B", value_delimiter = ',', requires = "mesh")]
     attributes: Vec<String>,
-    /// Leave out groups of fewer particles than this that lie apart from all others
+    /// Leave out groups of fewer particles than this that are apart from all others
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     min_drop: Option<u32>,
-    /// Only particles in a box: its least corner (m)
+    /// Only particles in a box: its minimum corner (m)
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true, requires = "box_max")]
     box_min: Option<DVec3>,
-    /// Only particles in a box: its greatest corner (m)
+    /// Only particles in a box: its maximum corner (m)
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true, requires = "box_min")]
     box_max: Option<DVec3>,
     /// Frames of a sequence
@@ -89,7 +89,7 @@ pub struct Args {
     packing: Packing,
 }
 
-/// Cells in the radius of a sphere, unless `--cell` says otherwise: with half of them a drop alone loses a third of its volume.
+/// Minimum cells in the radius of a sphere, unless `--cell` is given: with half of them a drop alone loses a third of its volume.
 const SPHERE_CELLS: f64 = 3.0;
 
 /// Runs the command.
@@ -142,7 +142,7 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
     each.finish()
 }
 
-/// What was made.
+/// Report of what was made.
 #[derive(Default)]
 struct Made {
     frames: usize,
@@ -151,15 +151,15 @@ struct Made {
     triangles: usize,
 }
 
-/// The file of a frame, of one file or of a sequence.
+/// The file of a frame, from one file or a sequence.
 fn of_frame(path: &Path, frame: i32) -> PathBuf {
     Pattern::parse(path).map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
 }
 
-/// How many times as large as the estimate, or as small, a spacing is that looks like a mistake.
+/// Ratio of a given spacing to the estimate, up or down, from which it looks like a mistake.
 const ODD: f64 = 2.0;
 
-/// Says so when a given spacing (m) is not that of the particles: a wrong unit makes single drops, or one lump.
+/// Warns if a given spacing (m) does not match the particles: a wrong unit makes single drops, or one lump.
 fn warn_of_spacing(path: &Path, positions: &[DVec3], spacing: f64) {
     let odd = |estimate: &f64| !(1.0 / ODD..=ODD).contains(&(spacing / estimate));
     if let Some(estimate) = rough_spacing(positions).filter(odd) {
@@ -191,7 +191,7 @@ impl Args {
         }
     }
 
-    /// The spacing (m) of the particles of the first frame that tells it.
+    /// The spacing (m) of the particles, from the first frame that allows an estimate.
     fn estimated(&self, session: &Session, frames: &FrameChoice) -> std::result::Result<f64, Failure> {
         let mut first: Option<Error> = None;
         for frame in frames.iter() {
@@ -232,7 +232,7 @@ impl Args {
             warn_of_spacing(&path, &cloud.positions, spacing);
         }
         let specks = self.leave_out(&mut cloud, spacing, &path)?;
-        // A file without particles need not say what they would carry.
+        // A file without particles may lack their attributes.
         let columns = if cloud.positions.is_empty() { Vec::new() } else { self.columns(&cloud, &path)? };
         let made = self.make(session, (&cloud.positions, &columns), spacing, (frame, colliders));
         let mesh = made.map_err(|error| match error {
@@ -242,7 +242,7 @@ impl Args {
         Ok(Made { frames: 1, particles: cloud.positions.len(), specks, triangles: mesh.triangles.len() })
     }
 
-    /// What options leave nothing of: one file is refused, and a frame of a sequence, which may well have no liquid there, is warned of.
+    /// Handles options that leave nothing: an error for a single file, a warning for a frame of a sequence, which may well have no liquid there.
     fn refuse_nothing(&self, path: &Path, what: &str) -> Result<()> {
         if Pattern::parse(&self.particles).is_none() {
             return Err(Error::file(path, what));
@@ -251,7 +251,7 @@ impl Args {
         Ok(())
     }
 
-    /// The particles of a file (m) that lie in the box; where there are none, it is warned of.
+    /// The particles of a file (m) that lie in the box; a warning if there are none.
     fn read(&self, path: &Path) -> Result<Cloud> {
         let mut cloud: Cloud =
             if extension(path) == "vdb" { points_of_vdb(path)?.into() } else { particles::read(path)? };
@@ -271,7 +271,7 @@ impl Args {
         Ok(cloud)
     }
 
-    /// Leaves small groups of particles out; the count of these particles.
+    /// Leaves small groups of particles out; returns the number of these particles.
     fn leave_out(&self, cloud: &mut Cloud, spacing: f64, path: &Path) -> Result<usize> {
         let Some(least) = self.min_drop else { return Ok(0) };
         let specks = specks(&cloud.positions, spacing, least as usize)?;
@@ -286,7 +286,7 @@ impl Args {
         Ok(count)
     }
 
-    /// The attributes that the mesh is to have, with the names of its arrays.
+    /// The attributes for the mesh, with the names of its arrays.
     fn columns(&self, cloud: &Cloud, path: &Path) -> Result<Vec<(String, Vec<f32>)>> {
         let count = cloud.positions.len();
         let wanted = |attribute: &&Attribute| {
@@ -333,7 +333,7 @@ impl Args {
         Ok(out)
     }
 
-    /// How the surface of particles of a spacing (m) is made.
+    /// The options that make a surface from particles of a spacing (m).
     fn recipe(&self, spacing: f64) -> Recipe {
         let radius = self.radius.unwrap_or(spacing);
         let cell = match self.method {
@@ -381,7 +381,7 @@ impl Args {
     }
 }
 
-/// What the particles around carry, as arrays of a mesh's vertices.
+/// The attributes of the particles around, as arrays of a mesh's vertices.
 fn means(
     ctx: &Context,
     positions: &[DVec3],

@@ -1,4 +1,4 @@
-//! The surface of one frame: a mesh, and the level set that fits it.
+//! The surface of one frame: a mesh, and the matching level set.
 
 use clap::ValueEnum;
 use frazil::geometry::{DVec3, TriMesh};
@@ -13,7 +13,7 @@ use frazil::{Error, Result};
 use crate::cli::session::Session;
 use crate::cli::vdb::check_surface;
 
-/// How particles become a surface.
+/// Method that makes a surface of particles.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 pub enum Method {
     /// Smooth, half a spacing above the outermost particles, without bridges between parts far from each other
@@ -22,7 +22,7 @@ pub enum Method {
     Spheres,
 }
 
-/// What a surface is made by.
+/// The parameters of a surface.
 #[derive(Clone, Copy)]
 pub struct Recipe {
     pub method: Method,
@@ -37,7 +37,7 @@ pub struct Recipe {
 }
 
 impl Recipe {
-    /// The surface of particles at positions (m), with its level set where that is wanted; both are empty without particles.
+    /// The surface of particles at positions (m), with its level set if requested; both are empty without particles.
     pub fn surface(
         &self,
         session: &Session,
@@ -50,7 +50,7 @@ impl Recipe {
         }
         let (mut mesh, grid) = match self.method {
             Method::Solenthaler => self.solenthaler(session, positions, wants_grid && self.passes == 0)?,
-            // Inside of a union the spheres' own values are no distances.
+            // Inside a union the spheres' own values are not distances.
             Method::Spheres => (self.union(session, positions)?, None),
         };
         if self.passes > 0 {
@@ -75,7 +75,7 @@ impl Recipe {
         ctx.phase("mesh", || to_mesh(ctx, &grid, 0.0, 0.0))
     }
 
-    /// Distances are exact to the triangles that become the mesh.
+    /// Distances are exact, to the triangles that become the mesh.
     fn solenthaler(
         &self,
         session: &Session,
@@ -95,7 +95,7 @@ impl Recipe {
     }
 }
 
-/// The level set of the solid that a mesh bounds, on cells of an edge (m); an empty one of an empty mesh.
+/// The level set of the solid that a mesh bounds, on cells of this edge (m); an empty one for an empty mesh.
 fn level_set_of(session: &Session, mesh: TriMesh, cell: f64) -> Result<FloatGrid> {
     if mesh.triangles.is_empty() {
         return FloatGrid::level_set(cell, HALF_WIDTH);

@@ -1,10 +1,10 @@
-//! Closed parts of a mesh are turned outward, one way for all that take meshes.
+//! Turns closed parts of a mesh outward, in the same way for everything that takes meshes.
 //!
-//! A part is what hangs together by edges, vertices at the same position joined. Parts that are closed by their indices are parts of their
-//! own, whatever they touch. Doubled triangles count once; triangles of a closed part that disagree about which side is out are made to
-//! agree; closed parts whose outermost corners lie in no other part are turned outward, so that cavities stay cavities, and a solid with
-//! cavities whose whole surface is inside out is turned with them. A mesh that is right stays as it is. Open sheets stay as
-//! they are, too: what faces out there is decided where they are used.
+//! A part is what edges connect, with vertices at the same position joined. Parts that are closed by their indices remain separate parts,
+//! whatever they touch. Doubled triangles count once. Triangles of a closed part that disagree on which side is out are made to agree.
+//! Closed parts whose outermost corners lie in no other part are turned outward, so that cavities stay cavities; a solid with cavities
+//! whose whole surface is inside out is turned together with them. A correct mesh is unchanged. Open sheets are unchanged too: which side
+//! is out is decided where they are used.
 
 mod nesting;
 mod pieces;
@@ -18,50 +18,50 @@ use pieces::Pieces;
 /// What an open part bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Closing {
-    /// Its loops are closed by cones.
+    /// Its loops are capped by cones.
     Caps,
-    /// All below its triangles that face up is solid.
+    /// All below its upward-facing triangles is solid.
     Below,
 }
 
-/// What becomes of a triangle.
+/// What happens to a triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Fate {
     Stays,
     Turned,
-    /// It is the double of one before it.
+    /// It duplicates an earlier one.
     LeftOut,
 }
 
-/// What a mesh leaves undecided.
+/// What remains ambiguous.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Doubts {
-    /// Parts in which no choice makes all triangles agree: they have one side only.
+    /// Parts with only one side, where no choice makes all triangles agree.
     pub one_sided: usize,
-    /// Edges with more than two triangles that do not say which side is out.
+    /// Non-manifold edges that do not determine which side is out.
     pub crowded_edges: usize,
-    /// Parts that are inside out and hold parts of which it is not clear whether they are cavities.
+    /// Inside-out parts whose inner parts may or may not be cavities.
     pub nested: usize,
 }
 
-/// How the triangles of a mesh have to be turned.
+/// Which triangles of a mesh must be flipped or left out.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Orientation {
     /// Empty: all triangles stay.
     fates: Vec<Fate>,
-    /// Whether each triangle is of an open part; empty: none is.
+    /// Whether each triangle belongs to an open part; empty: none does.
     open: Vec<bool>,
-    /// Signed volume of the closed parts (m3), before they were turned and now.
+    /// Signed volume of the closed parts (m3), before and after they were turned.
     volumes: [f64; 2],
     /// Parts turned as a whole.
     pub turned_parts: usize,
-    /// What is not decided.
+    /// What remains ambiguous.
     pub doubts: Doubts,
 }
 
 impl Orientation {
-    /// The orientation of triangles among vertices at positions (m), which are finite; `same` names the vertex that each one is
-    /// joined with, itself where there is none before it.
+    /// The orientation of triangles over vertices at positions (m), which must be finite; `same` names the vertex that each one is joined
+    /// with: itself if no earlier one is the same.
     pub fn of(positions: &[DVec3], triangles: &[[u32; 3]], same: &[u32], closing: Closing) -> Self {
         let joined = triangles.iter().map(|corners| corners.map(|vertex| same[vertex as usize]));
         let (named, numbers): (Vec<[u32; 3]>, Vec<u32>) =
@@ -87,7 +87,7 @@ impl Orientation {
         out
     }
 
-    /// As [`Orientation::of`], of a mesh as it was read: vertices that are one corner ([`Weld`]) are joined.
+    /// As [`Orientation::of`], for a mesh as it was read: vertices that are one corner ([`Weld`]) are joined.
     pub fn of_mesh(mesh: &TriMesh, closing: Closing) -> Self {
         let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
         let corners = Weld::of(&positions, &mesh.triangles).firsts;
@@ -99,17 +99,17 @@ impl Orientation {
         self.fates.is_empty()
     }
 
-    /// Whether a triangle is left out: it is the double of another.
+    /// Whether any triangle is left out as a duplicate.
     pub fn leaves_out(&self) -> bool {
         self.fates.contains(&Fate::LeftOut)
     }
 
-    /// Whether a triangle is turned round.
+    /// Whether a triangle is flipped.
     pub fn is_turned(&self, triangle: usize) -> bool {
         self.fates.get(triangle) == Some(&Fate::Turned)
     }
 
-    /// Whether a triangle is of an open part.
+    /// Whether a triangle belongs to an open part.
     pub fn is_open(&self, triangle: usize) -> bool {
         self.open.get(triangle) == Some(&true)
     }
@@ -119,12 +119,12 @@ impl Orientation {
         !self.open.is_empty()
     }
 
-    /// Signed volume of the closed parts (m3), before they were turned and now.
+    /// Signed volume of the closed parts (m3), before and after they were turned.
     pub fn volumes(&self) -> [f64; 2] {
         self.volumes
     }
 
-    /// Turns all triangles of open parts round.
+    /// Flips all triangles of open parts.
     pub fn turn_open(&mut self) {
         if self.fates.is_empty() {
             self.fates = vec![Fate::Stays; self.open.len()];
@@ -138,7 +138,7 @@ impl Orientation {
         }
     }
 
-    /// The triangles of the mesh as they have to be; a triangle that is turned keeps its first corner.
+    /// The corrected triangles; a flipped triangle keeps its first corner.
     pub fn applied(&self, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
         if self.fates.is_empty() {
             return triangles.to_vec();
@@ -149,12 +149,12 @@ impl Orientation {
             .collect()
     }
 
-    /// Whether it can be that of a mesh of so many triangles.
+    /// Whether it can belong to a mesh with this number of triangles.
     pub fn fits(&self, triangles: usize) -> bool {
         self.fates.is_empty() || self.fates.len() == triangles
     }
 
-    /// A mesh with its triangles, and what their corners carry, as they have to be.
+    /// A mesh with its triangles, and the data of their corners, corrected.
     pub fn applied_to_detailed(&self, mesh: DetailedMesh) -> DetailedMesh {
         if self.fates.is_empty() {
             return mesh;
@@ -172,7 +172,7 @@ impl Orientation {
         }
     }
 
-    /// The mesh with its triangles as they have to be.
+    /// The mesh with its triangles corrected.
     pub fn applied_to(&self, mut mesh: TriMesh) -> TriMesh {
         if !self.fates.is_empty() {
             mesh.triangles = self.applied(&mesh.triangles);
@@ -180,7 +180,7 @@ impl Orientation {
         mesh
     }
 
-    /// What is not decided, in a sentence without the mesh's name: none where all is.
+    /// What remains ambiguous, in a sentence without the mesh's name; `None` if nothing does.
     pub fn warning(&self) -> Option<String> {
         self.doubts.told()
     }

@@ -1,4 +1,4 @@
-//! Which parts of a mesh lie within others, and which of them have to be turned outward.
+//! Which parts of a mesh lie within others, and which must be turned outward.
 
 use rayon::prelude::*;
 
@@ -6,7 +6,7 @@ use crate::geometry::check::deviation::Facet;
 use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh, Vec3};
 
-/// Directions along which no edges of made meshes run: two of three decide.
+/// Directions that no edges of modelled meshes follow: two of three decide.
 pub(super) const ASLANT: [DVec3; 3] = [
     DVec3::new(0.5773, 0.6533, 0.4896),
     DVec3::new(-0.6123, 0.3871, 0.6894),
@@ -14,9 +14,9 @@ pub(super) const ASLANT: [DVec3; 3] = [
 ];
 /// Nearly straight up.
 const UP: DVec3 = DVec3::new(1.3e-5, 1.0, -0.7e-5);
-/// Points as near to a surface as this (of the size of all) lie on it: 32-bit coordinates are that coarse.
+/// Points within this fraction of the overall size lie on a surface: 32-bit coordinates are that coarse.
 const ON: f64 = 1.0e-6;
-/// Triangles whose middles are looked at where the outermost corners of a part all lie on others.
+/// Triangles whose centres are tested if the outermost corners of a part all lie on others.
 const MIDDLES: usize = 16;
 
 /// A part of a mesh, as the space that it bounds.
@@ -27,17 +27,17 @@ pub(super) struct Shape {
     pub(super) own: usize,
     /// Signed volume (m3); 0: it bounds nothing.
     pub(super) volume: f64,
-    /// Whether it may be turned round; others only hold parts.
+    /// Whether it may be turned; if not, it can only contain parts.
     pub(super) can_turn: bool,
-    /// An open sheet below whose faces that face up all is solid; its volume means nothing.
+    /// An open sheet with all below its upward-facing triangles solid; its volume means nothing.
     pub(super) is_bottomless: bool,
 }
 
 /// What to turn so that no part is empty that should be solid.
 pub(super) struct Turns {
-    /// Of each part whether it is to be turned.
+    /// For each part, whether it must be turned.
     pub(super) turned: Vec<bool>,
-    /// Parts to be turned of which it is not clear whether the parts within them are cavities.
+    /// Parts to be turned whose inner parts may or may not be cavities.
     pub(super) ambiguous: usize,
 }
 
@@ -46,13 +46,13 @@ pub(super) struct Turns {
 enum Position {
     /// One of its outermost corners lies in no other part.
     Outside,
-    /// Wholly within this part and none that is smaller.
+    /// Entirely within this part and no smaller one.
     Within(u32),
     /// Within several parts together.
     Between,
 }
 
-/// The turns of parts of which some are inside out.
+/// Which parts to turn, if some are inside out.
 pub(super) fn turns(shapes: &[Shape]) -> Turns {
     let space = Space::of(shapes);
     let bounds_space = |shape: &Shape| shape.can_turn && shape.volume != 0.0;
@@ -69,7 +69,7 @@ pub(super) fn turns(shapes: &[Shape]) -> Turns {
     }
     let mut out = Turns { turned: vec![false; shapes.len()], ambiguous: 0 };
     let mut signs: Vec<i32> = shapes.iter().map(Shape::sign).collect();
-    // How often the parts around it, as they are turned now, wind around a part.
+    // Winding number of the surrounding parts, as they are turned now, around each part.
     let mut around = vec![0i32; shapes.len()];
     let mut order: Vec<u32> =
         (0..shapes.len() as u32).filter(|part| bounds_space(&shapes[*part as usize])).collect();
@@ -92,8 +92,8 @@ pub(super) fn turns(shapes: &[Shape]) -> Turns {
         }
         let has = |parts: &[u32], sign: i32| parts.iter().any(|other| signs[*other as usize] == sign);
         let [has_solid, has_cavity] = [1, -1].map(|sign| has(&children[at], sign));
-        // With all that is in it, where that is turned the other way: a solid whose whole surface is inside out. Else
-        // what is inside out within it is a cavity already.
+        // Turn it with everything in it if that faces the other way: a solid whose whole surface is inside out. Otherwise inside-out parts
+        // within it are already cavities.
         let as_a_whole = has_solid && !has_cavity;
         let is_clear = as_a_whole || below.is_empty() || (!has_solid && has(&below, 1));
         out.ambiguous += usize::from(!is_clear);
@@ -122,11 +122,11 @@ impl Shape {
     }
 }
 
-/// All parts, near the origin of 32-bit coordinates.
+/// All parts, moved near the origin so that 32-bit coordinates suffice.
 struct Space<'a> {
     shapes: &'a [Shape],
     low: DVec3,
-    /// Distance (m) at which a point lies on a surface.
+    /// Distance (m) within which a point counts as on a surface.
     near: f64,
     corners: Vec<[Vec3; 3]>,
     tree: Bvh,
@@ -150,7 +150,7 @@ impl<'a> Space<'a> {
         Self { shapes, low, near: ON * (high - low).norm(), corners, tree, owner }
     }
 
-    /// The parts but one's own that hold a point, each with whether it lies strictly within and not on its surface; ascending.
+    /// The other parts that hold a point, ascending, each with whether the point is strictly inside and not on the surface.
     fn holders(&self, point: DVec3, own: u32) -> Vec<(u32, bool)> {
         let point = (point - self.low).cast::<f32>();
         let origin: DVec3 = point.cast();
@@ -197,7 +197,7 @@ impl<'a> Space<'a> {
             if is_high { shape.corners().max_by(by_axis) } else { shape.corners().min_by(by_axis) }
         };
         let ends = (0..3).flat_map(|axis| [end(axis, false), end(axis, true)]).flatten();
-        // Most parts are outside: one corner is enough.
+        // Most parts are outside: one corner is enough to tell.
         let holders = |point: DVec3| Some(self.holders(point, part)).filter(|held| !held.is_empty());
         let Some(mut held) = ends.map(holders).collect::<Option<Vec<Vec<(u32, bool)>>>>() else {
             return Position::Outside;

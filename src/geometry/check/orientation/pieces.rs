@@ -1,4 +1,4 @@
-//! The parts of a mesh, found where triangles are doubled, disagree, or crowd an edge, too.
+//! The parts of a mesh, even if it has doubled triangles, triangles that disagree, or non-manifold edges.
 
 use super::nesting::{ASLANT, Shape, Turns, turns};
 use super::{Closing, Fate, Orientation};
@@ -10,28 +10,28 @@ use crate::geometry::check::topology::Sets;
 use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh};
 
-/// Volumes of parts up to this many cubes of their size are none: rounding makes as much.
+/// Volumes of parts up to this many cubes of their size count as 0: rounding produces as much.
 const ROUNDING: f64 = 1e-12;
-/// An open part counts as closed where the caps that close it have at most this share of its area.
+/// An open part counts as closed if its caps have at most this share of its area.
 const CAPS: f64 = 0.05;
 
-/// The triangles that count, by parts.
+/// The triangles that count, by part.
 #[derive(Default)]
 pub(super) struct Pieces<'a> {
     positions: &'a [DVec3],
-    /// Their corners: vertices of the mesh where a part is closed by its indices, else joined ones, which count from the number of
-    /// vertices on where there are both.
+    /// Their corners: vertices of the mesh if a part is closed by its indices, else joined ones; if there are both, joined ones are
+    /// numbered from the number of vertices on.
     named: Vec<[u32; 3]>,
-    /// Which triangles of the mesh they are.
+    /// Their indices in the mesh.
     numbers: Vec<u32>,
     /// The part of each.
     part: Vec<u32>,
-    /// Of each part, by its name, whether it is open.
+    /// For each part, by its name, whether it is open.
     is_open: Vec<bool>,
 }
 
 impl<'a> Pieces<'a> {
-    /// Triangles of so many named corners, which have these numbers in the mesh.
+    /// Triangles with these named corners, and their indices in the mesh.
     pub(super) fn new(positions: &'a [DVec3], named: Vec<[u32; 3]>, numbers: Vec<u32>) -> Self {
         Self { positions, named, numbers, ..Self::default() }
     }
@@ -40,7 +40,7 @@ impl<'a> Pieces<'a> {
         self.named.len()
     }
 
-    /// Takes the parts of triangles that agree wherever they have neighbours.
+    /// Sets the parts of triangles that all agree with their neighbours.
     pub(super) fn take_parts(&mut self, part: Vec<u32>, uses: &[Use]) {
         self.is_open = vec![false; part.len()];
         self.part = part;
@@ -73,7 +73,7 @@ impl<'a> Pieces<'a> {
         *fate = if *fate == Fate::Turned { Fate::Stays } else { Fate::Turned };
     }
 
-    /// Finds the parts of triangles with doubled triangles, neighbours that disagree, or crowded edges.
+    /// Finds the parts of triangles that have duplicates, neighbours that disagree, or non-manifold edges.
     pub(super) fn sort_out(&mut self, triangles: &[[u32; 3]], closing: Closing, out: &mut Orientation) {
         let vertices = self.positions.len();
         let raw: Vec<[u32; 3]> = self.numbers.iter().map(|at| triangles[*at as usize]).collect();
@@ -114,7 +114,7 @@ impl<'a> Pieces<'a> {
         self.face_up(&agreement, &two_sided, closing, out);
     }
 
-    /// Names the parts: patches that are closed by themselves, or hang together with no other, and what is left of each body.
+    /// Names the parts: patches that are closed or connected to no other, and what remains of each component.
     fn divide(&mut self, uses: &[Use], agreement: &Agreement, out: &mut Orientation) {
         let count = self.named.len();
         let bodies = parts_of(count, uses);
@@ -138,7 +138,7 @@ impl<'a> Pieces<'a> {
         }
         one_sided.iter().for_each(|patch| is_closed[*patch as usize] = false);
         let is_left = |at: usize| is_crowded[bodies[at] as usize] && !is_closed[patch[at] as usize];
-        // What is left of a body has a name that no patch has.
+        // What remains of a component has a name that no patch has.
         self.part =
             (0..count).map(|at| if is_left(at) { count as u32 + bodies[at] } else { patch[at] }).collect();
         self.is_open = (0..count).map(|patch| !is_closed[patch]).chain(vec![false; count]).collect();
@@ -157,7 +157,7 @@ impl<'a> Pieces<'a> {
         }
     }
 
-    /// Of what is left of bodies, but is closed, the patches that have less than nothing on a side: parts of it are inside out.
+    /// Of the closed remainders of components, the patches with a negative winding number on a side: parts of them are inside out.
     fn backward(&self, left: &[u32], patch: &[u32]) -> usize {
         let mut order: Vec<u32> = left.to_vec();
         order.sort_by_key(|at| self.part[*at as usize]);
@@ -186,8 +186,8 @@ impl<'a> Pieces<'a> {
         found
     }
 
-    /// Turns open parts up, or so that they bound something, that say both or nothing: two-sided sheets, and those whose neighbours
-    /// disagreed.
+    /// Turns open parts up, or so that they bound a volume, if their own orientation does not decide: two-sided sheets, and parts whose
+    /// neighbours disagreed.
     fn face_up(&mut self, agreement: &Agreement, two_sided: &[u32], closing: Closing, out: &mut Orientation) {
         let count = self.named.len();
         let mut is_asked = vec![false; count];
@@ -218,7 +218,7 @@ impl<'a> Pieces<'a> {
         }
     }
 
-    /// Signed volume (m3) of triangles, 0 where rounding decides, with their least corner and their size (m).
+    /// Signed volume (m3) of triangles, 0 where rounding decides, with their minimum corner and their size (m).
     fn volume(&self, triangles: &[u32]) -> (f64, DVec3, f64) {
         let nowhere = (DVec3::repeat(f64::INFINITY), DVec3::repeat(f64::NEG_INFINITY));
         let corners = triangles.iter().flat_map(|at| self.corners(*at as usize));
@@ -268,7 +268,7 @@ impl<'a> Pieces<'a> {
         to_turn.into_iter().for_each(|at| self.turn(at as usize, out));
     }
 
-    /// A part without its triangles; those of what closes it are there.
+    /// A part without its own triangles, but with those that close it.
     fn shape(&self, part: &[u32], is_open: bool, closing: Closing) -> Shape {
         let (volume, low, size) = self.volume(part);
         let mut shape =
@@ -295,7 +295,7 @@ impl<'a> Pieces<'a> {
         Shape { triangles, own: part.len(), ..shape }
     }
 
-    /// Cones to the middles of a part's open loops.
+    /// Cones to the centres of a part's open loops.
     fn caps(&self, part: &[u32]) -> Vec<[DVec3; 3]> {
         let triangles: Vec<[u32; 3]> = part.iter().map(|at| self.named[*at as usize]).collect();
         let mut edges: Vec<([u32; 2], i32)> = triangles
@@ -329,13 +329,13 @@ impl<'a> Pieces<'a> {
     }
 }
 
-/// Six times the signed volume (m3) of the tetrahedron over a triangle, with its tip at an origin.
+/// Six times the signed volume (m3) of the tetrahedron over a triangle with its apex at an origin.
 fn six_of(corners: &[DVec3; 3], origin: DVec3) -> f64 {
     let [a, b, c] = corners.map(|p| p - origin);
     a.dot(&b.cross(&c))
 }
 
-/// The volume of a part of this size, but 0 where rounding decides.
+/// The volume of a part of this size, or 0 where rounding decides.
 fn substantial(volume: f64, size: f64) -> f64 {
     if volume.abs() > ROUNDING * size.powi(3) { volume } else { 0.0 }
 }

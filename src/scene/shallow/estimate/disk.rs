@@ -1,23 +1,24 @@
-//! How much space the files of a liquid on a terrain need at most: when all of it is wet.
+//! Maximum size of the files of a liquid on a terrain: when all of it is wet.
 
 use crate::scene::shallow::Shallow;
 use crate::shallow::free_fall::mesh::bound;
 
-/// Bytes of a 32-bit float in a text, with what stands around it, and of an index.
+/// Bytes of a 32-bit float in text with its separators, and of an index.
 const TEXT: u64 = 12;
 const INDEX: u64 = 8;
-/// Bytes of a column in the exact state, before it is packed, and of a scalar of it; of a drop, with what waits at a link.
+/// Bytes of a column in the exact state, unpacked; of a scalar in a column; and of a drop, with the volume waiting at a link.
 const STATE: u64 = 20;
 const SCALAR: u64 = 8;
 const DROP: u64 = 220;
-/// Bytes of a voxel of a leaf, of which there are some two for each column.
+/// Bytes of a voxel of a leaf; there are about two for each column.
 const VOXEL: u64 = 2 * 4;
-/// Bytes of a triangle of a terrain that is stained: its corners, and of its half a vertex the position, the stain, and that in the exact state.
+/// Bytes of a triangle of a stained terrain: its corners, and for half a vertex the position, the stain, and the stain in the exact state.
 const STAINED: u64 = 13 + (12 + 4 + 12) / 2;
 /// Bytes of a frame's report and record.
 const RECORDS: u64 = 3000;
 
-/// Bytes of a frame's files at most, with this many columns, on a mesh of so many triangles: when all are wet, and as many drops are in the air as there may be.
+/// Maximum bytes of a frame's files with these counts of columns and triangles of the terrain: if all columns are wet, and the air holds
+/// the maximum number of drops.
 pub(in crate::scene::shallow) fn frame(of: &Shallow, columns: u64, triangles: u64) -> u64 {
     let output = of.output;
     let scalars = of.scalars.len() as u64;
@@ -30,7 +31,7 @@ pub(in crate::scene::shallow) fn frame(of: &Shallow, columns: u64, triangles: u6
         + 4 * carried
         + falling;
     let vertex = 12 + if_asked(output.velocities, 12) + arrays;
-    // Two triangles a vertex, each with a byte that counts.
+    // Two triangles for each vertex, each with a byte for its count of corners.
     let ply = vertex + 2 * 13;
     let numbers = 6 + u64::from(output.depth) + u64::from(output.alpha) + u64::from(output.layer);
     let numbers = numbers + carried + falling;
@@ -38,7 +39,7 @@ pub(in crate::scene::shallow) fn frame(of: &Shallow, columns: u64, triangles: u6
     let state = STATE + SCALAR * scalars;
     let each = if_asked(output.ply, ply) + if_asked(output.usd, usd) + if_asked(output.vdb, VOXEL) + state;
     let drops = of.params.falls.map_or(0, |falls| falls.most);
-    // As many vertices as its mesh has, each with two triangles.
+    // For each vertex of its mesh two triangles.
     let in_air = bound(drops).vertices as u64 * (if_asked(output.ply, ply) + if_asked(output.usd, usd));
     let stained = if_asked(of.staining.is_some(), STAINED * triangles);
     columns * each + in_air + stained + drops as u64 * DROP + RECORDS

@@ -1,4 +1,4 @@
-//! How much memory a liquid on a terrain takes, before any of it is taken.
+//! Memory of a liquid on a terrain, estimated before any is allocated.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -8,25 +8,27 @@ use crate::shallow::params::Friction;
 
 /// Bytes that every run takes.
 const FIXED: u64 = 32_000_000;
-/// Bytes of a cell while the terrain becomes columns: its crossings and solids, in two copies.
+/// Bytes of a cell during conversion of the terrain to columns: its crossings and solids, in two copies.
 const CELL: u64 = 64;
-/// Bytes of a column: liquid, pipes and what steps need of it 100, its vertex and triangles while they are made 150, in up to three steps
-/// that wait for the writer 120 each, in files and states 100, its minimum heights 20.
+/// Bytes of a column: liquid, pipes and data of steps 100; its vertex and triangles while they are made 150; up to three steps that wait
+/// for the writer, 120 each; files and states 100; minimum heights 20.
 const COLUMN: u64 = 730;
-/// Bytes of a scalar of a column: its amount 8, its concentration 4, and in each of those steps, files and states 50.
+/// Bytes of a scalar in a column: its amount 8, its concentration 4, and 50 in those steps, files and states.
 const SCALAR: u64 = 62;
-/// Bytes of a column more for friction at walls, and for viscosity that depends on a scalar.
+/// Additional bytes of a column for friction at walls, and for viscosity that depends on a scalar.
 const WALLS: u64 = 108;
 const THICK: u64 = 12;
-/// Bytes of a drop: what it is 500, its ball and strand while they are made, and in up to three steps that wait for the writer, 5,600 each.
+/// Bytes of a drop: its own data 500; its ball and strand while they are made, and in up to three steps that wait for the writer, 5,600
+/// each.
 const DROP: u64 = 22_900;
-/// Bytes of a triangle of the terrain: corners and a position, twice while it is read, or while minimum heights are found, and what these need.
+/// Bytes of a triangle of the terrain: corners and a position, twice while it is read or while minimum heights are found, and the data that
+/// these need.
 const TRIANGLE: u64 = 110;
 
-/// Bytes of a triangle more where the liquid stains it: stains, and the mesh in up to three steps that wait for the writer.
+/// Additional bytes of a triangle that the liquid stains: stains, and the mesh in up to three steps that wait for the writer.
 const STAINED: u64 = 110;
 
-/// Refuses more cells than the context allows, before they are made.
+/// Refuses more cells than the context's memory limit allows, before they are made.
 ///
 /// # Errors
 /// [`crate::Error::Memory`], naming the cells.
@@ -36,7 +38,7 @@ pub(in crate::scene::shallow) fn allow_cells(ctx: &Context, grid: &Grid) -> Resu
     ctx.allow(&what, FIXED + (CELL + COLUMN) * grid.cells() as u64)
 }
 
-/// Bytes that a run takes, about.
+/// Estimated bytes of a run.
 pub(in crate::scene::shallow) fn estimate(of: &Shallow, grid: &Grid, columns: u64, triangles: u64) -> u64 {
     let walls = if of.params.friction == Friction::Walls { WALLS } else { 0 };
     let thick = if of.params.thickening.is_some() { THICK } else { 0 };

@@ -1,18 +1,18 @@
-//! Positions of a terrain that sources, drains and absorbers move with.
+//! Positions on a terrain that sources, drains and absorbers move with.
 
 use crate::context::Context;
 use crate::geometry::check::deviation::{Nearest, NearestTree};
 use crate::geometry::{DVec3, TriMesh};
 use crate::scene::shallow::Shallow;
 
-/// A triangle whose height is so small a share of its longest edge has no inside.
+/// A triangle is degenerate if its height is at most this fraction of its longest edge.
 const NEEDLE: f64 = 1e-10;
 
 /// A position on a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::scene::shallow) struct Attached {
     triangle: usize,
-    /// Of its corners in the place; their sum is 1.
+    /// Barycentric weights of its corners; they sum to 1.
     shares: [f64; 3],
 }
 
@@ -22,7 +22,7 @@ impl Attached {
         Self { triangle: nearest.triangle, shares }
     }
 
-    /// Where it is on a mesh with these triangles (m).
+    /// Its position on a mesh with these triangles (m).
     pub fn position(&self, mesh: &TriMesh) -> [f64; 3] {
         let [a, b, c] = corners(mesh, self.triangle);
         let [of_a, of_b, of_c] = self.shares;
@@ -30,7 +30,7 @@ impl Attached {
     }
 }
 
-/// Attaches the points of a scene that follow the terrain to the nearest position of its mesh at the first frame; one entry for each point.
+/// Attaches the points of a scene that follow the terrain to the nearest position on its mesh at the first frame; one entry for each point.
 pub(in crate::scene::shallow) fn attach(
     ctx: &Context,
     of: &Shallow,
@@ -48,7 +48,7 @@ fn corners(mesh: &TriMesh, triangle: usize) -> [DVec3; 3] {
     mesh.triangles[triangle].map(|vertex| mesh.positions[vertex as usize].cast())
 }
 
-/// Shares of a triangle's corners in a position on it.
+/// Barycentric weights of a position on a triangle.
 fn shares(corners: [DVec3; 3], position: DVec3) -> [f64; 3] {
     let [a, b, c] = corners;
     let normal = (b - a).cross(&(c - a));
@@ -57,7 +57,7 @@ fn shares(corners: [DVec3; 3], position: DVec3) -> [f64; 3] {
     let lengths = edges.map(|edge| edge.norm_squared());
     let longest = lengths.into_iter().fold(0.0, f64::max);
     if square <= NEEDLE * NEEDLE * longest * longest {
-        // A needle is as good as its longest edge, and a point is its own corner.
+        // A needle is treated as its longest edge, and a point as its own corner.
         let from = lengths.iter().position(|length| *length == longest).unwrap_or(0);
         let way = (position - corners[from]).dot(&edges[from]);
         let share = if longest > 0.0 { (way / longest).clamp(0.0, 1.0) } else { 0.0 };
@@ -86,7 +86,7 @@ mod tests {
         let flat =
             vec![corner(0.0, 0.0, 0.0), corner(0.0, 0.0, 2.0), corner(2.0, 0.0, 2.0), corner(2.0, 0.0, 0.0)];
         let mesh = TriMesh { positions: flat, triangles };
-        // Linear in the corners, so that positions of it go where the corners do.
+        // Linear in the corners, so that positions on it move with the corners.
         let bend = |position: DVec3| {
             let [x, _, z]: [f64; 3] = position.into();
             DVec3::new(3.0 + 0.5 * x, 0.25 * x - z, z + 0.5 * x)
@@ -98,7 +98,7 @@ mod tests {
             ([0.5, 3.0, 1.5], [0.5, 0.0, 1.5]),
             ([1.75, -1.0, 0.25], [1.75, 0.0, 0.25]),
             ([1.0, 0.0, 1.0], [1.0, 0.0, 1.0]),
-            // Beside it, on an edge and on a corner.
+            // Outside it, on an edge and on a corner.
             ([-1.0, 0.5, 0.75], [0.0, 0.0, 0.75]),
             ([5.0, 5.0, 5.0], [2.0, 0.0, 2.0]),
         ] {

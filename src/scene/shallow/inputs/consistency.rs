@@ -1,4 +1,4 @@
-//! What keys of `[shallow]` must keep together, told with file and line.
+//! Conditions that keys of `[shallow]` must meet together; errors name file and line.
 
 use super::scalars;
 use crate::error::Result;
@@ -8,7 +8,7 @@ use crate::scene::schema::{Table, Value, Values};
 use crate::scene::shallow::{Form, Obstacle, Shallow};
 
 impl Shallow {
-    /// Checks what single keys of `[shallow]` do not show.
+    /// Checks the keys of `[shallow]` in combination.
     ///
     /// # Errors
     /// Keys that exclude each other, or one that others need.
@@ -60,13 +60,13 @@ impl Shallow {
         if shallow.params.liquid.thinning.is_some() && shallow.look != "blood" {
             return Err(table.error("thinning", "is of blood only: leave it out"));
         }
-        // All others have their ranges.
+        // All others are limited by their ranges.
         shallow.params.validate().map_err(|_| {
             table.error("gravity", "must point down by 0.001 to 1000 m/s2, and lean by 45 degrees at most")
         })
     }
 
-    /// Checks what single keys of a table of which there may be many do not show.
+    /// Checks the keys of a table that may occur many times in combination.
     ///
     /// # Errors
     /// As [`Shallow::check`].

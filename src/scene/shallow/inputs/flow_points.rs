@@ -1,4 +1,4 @@
-//! Sources, drains and absorbers of a scene, at its frames.
+//! Sources, drains and absorbers of a scene, frame by frame.
 
 use crate::error::{Error, Result};
 use crate::geometry::TriMesh;
@@ -8,13 +8,14 @@ use crate::shallow;
 use crate::shallow::sources::FlowPoint;
 
 impl Point {
-    /// Its rate on the way to a frame (m3/s).
+    /// Its rate over the step to a frame (m3/s).
     fn rate(&self, frame: i32) -> f64 {
         if self.acts(frame) { self.point.rate } else { 0.0 }
     }
 }
 
-/// All of them, as they are on the way to a frame; those that follow the terrain on its mesh of that frame, which there is where it moves.
+/// All points, as they are over the step to a frame; those that follow the terrain lie on its mesh of that frame, which is given if it
+/// moves.
 pub(in crate::scene::shallow) fn at(
     of: &Shallow,
     inputs: &Inputs,
@@ -29,10 +30,10 @@ pub(in crate::scene::shallow) fn at(
     of.points.iter().enumerate().map(at).collect()
 }
 
-/// Puts them on a liquid's columns at the first frame.
+/// Sets the points on a liquid's columns at the first frame.
 ///
 /// # Errors
-/// One that lies inside solid or beyond the area, with its name.
+/// A point inside solid or outside the area, with its name.
 pub(in crate::scene::shallow) fn position(
     scene: &Scene,
     of: &Shallow,
@@ -46,7 +47,7 @@ pub(in crate::scene::shallow) fn position(
     })
 }
 
-/// Moves, opens and closes them, from how they were to how they are on the way to the next frame.
+/// Moves, opens and closes the points, from their last state to that over the step to the next frame.
 ///
 /// # Errors
 /// None.
@@ -66,7 +67,7 @@ pub(in crate::scene::shallow) fn turn(
     Ok(())
 }
 
-/// Those that should act on the way to a frame and cannot, as they lie inside solid or beyond the area.
+/// The points that should act over the step to a frame but cannot, as they lie inside solid or outside the area.
 pub(in crate::scene::shallow) fn resting<'a>(
     of: &'a Shallow,
     liquid: &'a shallow::Shallow,

@@ -28,43 +28,43 @@ use crate::shallow::terrain::{Solids, triangles};
 use attached::{Attached, attach};
 use terrain::{Terrain, read_mesh};
 
-/// Room above the terrain, where `top` is left out: share of the terrain's height, and the least (m).
+/// Space above the terrain by default: share of the terrain's height, and the minimum (m).
 const ROOM: (f64, f64) = (0.25, 0.1);
-/// A terrain wider than this (m) looks like one in millimetres or centimetres.
+/// A terrain wider than this (m) is probably in millimetres or centimetres.
 const WIDE: f64 = 20.0;
 
-/// What to say of a mesh (m) that 32-bit numbers round too much.
+/// The warning about a mesh (m) that 32-bit numbers round too much.
 fn too_far(path: &Path, mesh: &TriMesh, cell: f64) -> Option<String> {
     mesh::too_far(&path.display().to_string(), mesh.farthest(), 1.0, cell, mesh::BY_KEY)
 }
 
-/// What a scene's files hold.
+/// Contents of a scene's files.
 pub struct Inputs {
     /// The cells.
     pub grid: Grid,
     /// The heights of ground and liquid.
     pub heights: Heights,
-    /// Least and greatest corner of the terrain at the first frame (m).
+    /// Minimum and maximum corner of the terrain at the first frame (m).
     pub bounds: [DVec3; 2],
-    /// Triangles of the terrain, where it is a mesh.
+    /// Triangles of the terrain, if it is a mesh.
     pub triangles: Option<usize>,
     /// The terrain at the first frame, with the meshes that stand on it.
     pub(super) solids: Solids,
     /// The meshes that stand on it (m).
     pub(super) meshes: Vec<TriMesh>,
-    /// The terrain at the first frame, where it is a mesh that moves.
+    /// The terrain at the first frame, if it is a mesh that moves.
     pub(super) moving: Option<TriMesh>,
-    /// The terrain, where it is a mesh that does not move, and minimum heights or stains are wanted.
+    /// The terrain, if it is a mesh that does not move and minimum heights, skirts or stains are wanted.
     pub(super) still: Option<TriMesh>,
-    /// What each of the scene's points moves with, where it follows the terrain.
+    /// For each of the scene's points, its position on the terrain if it follows that.
     pub(super) attached: Vec<Option<Attached>>,
-    /// How the terrain's triangles are turned.
+    /// Which of the terrain's triangles are flipped.
     pub(super) orientation: Orientation,
-    /// Whether all of them are turned after that, as they face down.
+    /// Whether all of them are flipped after that, as they face down.
     pub(super) is_turned: bool,
-    /// What the files held when they were read.
+    /// Contents of the files when they were read.
     pub(in crate::scene) seen: Arc<Seen>,
-    /// What about the files should be told, a sentence each; the log has it too.
+    /// Warnings about the files, one sentence each; they are logged too.
     pub warnings: Vec<String>,
 }
 
@@ -72,8 +72,8 @@ impl Inputs {
     /// Reads the terrain of the first frame and the meshes on it, after checking that no file of any frame is missing.
     ///
     /// # Errors
-    /// What the files or keys have wrong, with file and key: a source inside solid, liquid that does not fit; cells that need more memory
-    /// than the context allows; cancel.
+    /// Errors in files or keys, with file and key: a source inside solid, liquid that does not fit; cells that need more memory than the
+    /// context allows; cancel.
     pub fn load(ctx: &Context, scene: &Scene) -> Result<Self> {
         let (shallow, frames) = (scene.shallow()?, scene.shot.frames);
         if shallow.output.vdb && !cfg!(feature = "vdb") {
@@ -93,7 +93,7 @@ impl Inputs {
         if let Terrain::Mesh(mesh) = &terrain {
             warnings.extend(too_far(&path, mesh, grid.cell));
         }
-        // What was meant in millimetres takes too much.
+        // A terrain in millimetres by mistake has too many cells.
         memory::allow_cells(ctx, &grid)
             .inspect_err(|_| warnings.iter().for_each(|warning| log::warn!("{warning}")))?;
         let orientation = terrain.turn_outward();
@@ -161,15 +161,15 @@ impl Inputs {
             warnings,
         };
         inputs.warnings.iter().for_each(|warning| log::warn!("{warning}"));
-        // A source inside solid is refused before anything is written.
+        // Refuses a source inside solid before anything is written.
         Course::begin(ctx, (scene, shallow, &inputs))?;
         Ok(inputs)
     }
 
-    /// The mesh of the terrain at a frame, where it moves: as many vertices, and the same triangles, as at the first frame.
+    /// The mesh of the terrain at a frame, if it moves: it must have as many vertices as at the first frame, and the same triangles.
     ///
     /// # Errors
-    /// A file that cannot be read; another mesh; one that reaches beyond the heights.
+    /// A file that cannot be read; a different mesh; a mesh that extends beyond the heights.
     pub(super) fn terrain_at(&self, shallow: &Shallow, frame: i32) -> Result<Option<TriMesh>> {
         let Some(first) = &self.moving else { return Ok(None) };
         let path = shallow.terrain_at(frame);
@@ -213,13 +213,13 @@ impl Inputs {
     }
 }
 
-/// What is solid in either.
+/// The union of both.
 pub(super) fn united(a: &Solids, b: &Solids) -> Solids {
     let of_cell = |cell: usize| a.cell(cell).iter().chain(b.cell(cell)).copied().collect();
     Solids::new(a.grid, a.heights, (0..a.grid.cells()).map(of_cell))
 }
 
-/// The cells: as many as fit the area best, in its middle.
+/// The cells: the number that fits the area best, centred in it.
 fn grid(shallow: &Shallow, bounds: &[DVec3; 2]) -> Result<Grid> {
     let [low, high] = bounds;
     let [x0, z0, x1, z1] = shallow.area.unwrap_or([low.x, low.z, high.x, high.z]);
@@ -239,7 +239,7 @@ fn grid(shallow: &Shallow, bounds: &[DVec3; 2]) -> Result<Grid> {
     Ok(grid)
 }
 
-/// Least and greatest x and z of cells (m): `[x0, z0, x1, z1]`.
+/// Minimum and maximum x and z of cells (m): `[x0, z0, x1, z1]`.
 pub(super) fn area(grid: &Grid) -> [f64; 4] {
     let [x, z] = grid.origin;
     [x, z, x + grid.size[0] as f64 * grid.cell, z + grid.size[1] as f64 * grid.cell]
@@ -260,7 +260,7 @@ fn heights(shallow: &Shallow, bounds: &[DVec3; 2]) -> Result<Heights> {
     Heights::between(bottom, top)
 }
 
-/// What to say of points that follow the terrain from a position beside their own, as it is on a slope and where they were given high above it.
+/// The warning about points that follow a position to the side of their own, as for points given high above a slope.
 fn beside(scene: &Scene, shallow: &Shallow, mesh: &TriMesh, attached: &[Option<Attached>]) -> Vec<String> {
     let told = |(point, attached): (&Point, &Option<Attached>)| {
         let [x, y, z] = attached.as_ref()?.position(mesh);
@@ -277,7 +277,7 @@ fn beside(scene: &Scene, shallow: &Shallow, mesh: &TriMesh, attached: &[Option<A
     shallow.points.iter().zip(attached).filter_map(told).collect()
 }
 
-/// What to say of a terrain that looks as if it were in another unit.
+/// The warning about a terrain that is probably in another unit.
 fn wide(shallow: &Shallow, path: &Path, [low, high]: &[DVec3; 2]) -> Option<String> {
     let size = high - low;
     let is_mesh = shallow.image.is_none() && shallow.space.scale == Space::OWN.scale;

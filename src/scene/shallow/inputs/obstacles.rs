@@ -1,4 +1,4 @@
-//! Obstacles of a scene, where they are at its frames.
+//! Obstacles of a scene, frame by frame.
 
 use nalgebra::Rotation3;
 
@@ -13,7 +13,7 @@ use crate::shallow::terrain::shapes::Shape;
 use super::terrain::read_mesh;
 
 impl Obstacle {
-    /// Turn and position (m) at a frame.
+    /// Rotation and position (m) at a frame.
     fn pose(&self, frame: i32) -> Result<(Rotation3<f64>, DVec3)> {
         let key = |pose: &KeyPose| Key {
             time: pose.frame,
@@ -24,7 +24,7 @@ impl Obstacle {
         Ok(keys.at(f64::from(frame)))
     }
 
-    /// Its shape at a frame; none of a mesh.
+    /// Its shape at a frame; `None` for a mesh.
     fn shape(&self, frame: i32) -> Result<Option<Shape>> {
         let (turn, at) = self.pose(frame)?;
         Ok(match self.form {
@@ -41,7 +41,7 @@ impl Obstacle {
         })
     }
 
-    /// Its mesh as it stands on the terrain from the first frame on (m); none of a shape.
+    /// Its mesh as it stands on the terrain from the first frame on (m); `None` for a shape.
     ///
     /// # Errors
     /// A file that cannot be read.
@@ -59,13 +59,13 @@ impl Obstacle {
 /// The shapes of a scene at a frame, in the file's order.
 ///
 /// # Errors
-/// None where the scene was read.
+/// None for a scene that was read.
 pub(in crate::scene::shallow) fn shapes_at(shallow: &Shallow, frame: i32) -> Result<Vec<Shape>> {
     let shapes = shallow.obstacles.iter().map(|obstacle| obstacle.shape(frame));
     Ok(shapes.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
 }
 
-/// The meshes that stand on the terrain, each by itself, in the file's order (m).
+/// The meshes that stand on the terrain, one each, in the file's order (m).
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -74,11 +74,11 @@ pub(in crate::scene::shallow) fn meshes(shallow: &Shallow, first: i32, seen: &Se
     Ok(meshes.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
 }
 
-/// Points around, and from the bottom to the middle, of a ball that is drawn.
+/// Points around a drawn sphere, and rings from its bottom to its middle.
 const AROUND: usize = 32;
 const RINGS: usize = 8;
 
-/// A shape as triangles, for a picture.
+/// A shape as triangles, for rendering.
 pub(in crate::scene::shallow) fn drawn(shape: &Shape) -> TriMesh {
     match shape {
         Shape::Sphere { centre, radius } => pill([*centre; 2], *radius),
@@ -95,7 +95,7 @@ pub(in crate::scene::shallow) fn drawn(shape: &Shape) -> TriMesh {
     }
 }
 
-/// Two halves of a ball, and what lies between.
+/// A capsule: two hemispheres, and the cylinder between.
 fn pill([from, to]: [DVec3; 2], radius: f64) -> TriMesh {
     let up = (to - from).try_normalize(0.0).unwrap_or_else(DVec3::y);
     let helper = if up.x.abs() < 0.7 { DVec3::x() } else { DVec3::z() };
@@ -104,7 +104,7 @@ fn pill([from, to]: [DVec3; 2], radius: f64) -> TriMesh {
     let mut positions: Vec<Vec3> = Vec::new();
     for ring in 0..2 * RINGS {
         let end = usize::from(ring >= RINGS);
-        // The middle ring is there twice: at both ends.
+        // The middle ring occurs twice: at both ends.
         let tilt = (ring - end) as f64 / (2 * RINGS - 2) as f64 * std::f64::consts::PI;
         let (wide, high) = (radius * libm::sin(tilt), -radius * libm::cos(tilt));
         for point in 0..AROUND {

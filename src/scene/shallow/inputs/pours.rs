@@ -1,14 +1,14 @@
-//! Liquid that a scene pours at frames.
+//! Liquid that a scene pours at given frames.
 
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::scene::shallow::{ML, Pour, Shallow};
 use crate::shallow::{self, columns::Columns};
 
-/// Pours what a frame has.
+/// Pours the liquid of a frame.
 ///
 /// # Errors
-/// One over nothing but solid, or beyond the area, or that does not fit, with its name.
+/// A pour above nothing but solid, outside the area, or that does not fit, with its name.
 pub(in crate::scene::shallow) fn pour(
     scene: &Scene,
     of: &Shallow,
@@ -28,7 +28,7 @@ pub(in crate::scene::shallow) fn pour(
         }
         liquid.set_poured(&pour.carries)?;
         let lacking = pour.volume - spread(liquid, &columns, pour.volume);
-        // What rounding of depths leaves is less than that.
+        // Rounding of depths leaves less than that.
         let (cell, unit) = (liquid.columns().grid.cell, liquid.columns().heights.unit);
         if lacking > 1e-6 * pour.volume + columns.len() as f64 * unit * cell * cell {
             let what = format!(
@@ -42,7 +42,7 @@ pub(in crate::scene::shallow) fn pour(
     Ok(())
 }
 
-/// Adds a volume (m3) to columns, as deep to each as fits; returns what was added.
+/// Adds a volume (m3) to columns, an equal depth to each as far as it fits; returns the added volume.
 fn spread(liquid: &mut shallow::Shallow, columns: &[usize], volume: f64) -> f64 {
     let cell = liquid.columns().grid.cell;
     let least = liquid.columns().heights.unit;
@@ -68,7 +68,7 @@ fn spread(liquid: &mut shallow::Shallow, columns: &[usize], volume: f64) -> f64 
 }
 
 impl Pour {
-    /// The columns in its circle, as a source has them: in each cell the one that its middle lies in, or is nearest to.
+    /// The columns in its circle, chosen as for a source: in each cell the one that contains its centre's height, or is nearest to it.
     fn columns(&self, columns: &Columns) -> Vec<usize> {
         let grid = &columns.grid;
         let [x, y, z] = self.at;

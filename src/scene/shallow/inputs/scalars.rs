@@ -1,4 +1,4 @@
-//! What the liquid of a scene carries: dyes, ages, and what decays.
+//! Scalars that the liquid of a scene carries: dyes, ages, and decaying quantities.
 
 use crate::error::{Error, Result};
 use crate::scene::Scene;
@@ -7,21 +7,21 @@ use crate::scene::shallow::{ML, Point, Shallow};
 use crate::shallow::scalars::MOST;
 use crate::shallow::{self, Law, Scalar, ScalarBalance, Thickening};
 
-/// Names that arrays of the surface have anyway, in some file.
+/// Names of arrays that the surface already has in some file format.
 const TAKEN: [&str; 13] =
     ["x", "y", "z", "v", "vx", "vy", "vz", "depth", "layer", "alpha", "falling", "points", "velocities"];
 
-/// Something that a scene's liquid carries.
+/// A scalar of a scene's liquid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Carried {
     /// Name, law and range.
     pub scalar: Scalar,
-    /// Concentration of what does not say its own.
+    /// Concentration of liquid that does not specify it.
     pub start: f64,
 }
 
 impl Carried {
-    /// Those of a scene, in the file's order.
+    /// The scalars of a scene, in the file's order.
     pub(in crate::scene::shallow) fn all_of(values: &Values) -> Vec<Self> {
         (0..values.count("scalar")).map(|index| Self::of(values, index)).collect()
     }
@@ -41,7 +41,7 @@ impl Carried {
     }
 }
 
-/// How one of the scalars thickens the liquid: the first that does.
+/// How a scalar thickens the liquid: the first that does.
 pub(in crate::scene::shallow) fn thickening(values: &Values) -> Option<Thickening> {
     (0..values.count("scalar")).find_map(|scalar| {
         let number = |name: &str| values.of_many("scalar", scalar, name).and_then(Value::number);
@@ -57,7 +57,7 @@ pub(in crate::scene::shallow) fn staining(values: &Values) -> Option<usize> {
         .find(|index| values.of_many("scalar", *index, "stains").and_then(Value::flag) == Some(true))
 }
 
-/// Concentrations of the scalars in what a pour or a source brings: those that its `carries` names, and the others' own.
+/// Concentrations of the scalars in the liquid of a pour or a source: those that its `carries` names, and the defaults of the others.
 pub(in crate::scene::shallow) fn brought(values: &Values, table: &str, index: usize) -> Vec<f64> {
     let named = values.of_many(table, index, "carries").and_then(Value::named);
     let own = |carried: Carried| {
@@ -66,10 +66,10 @@ pub(in crate::scene::shallow) fn brought(values: &Values, table: &str, index: us
     Carried::all_of(values).into_iter().map(own).collect()
 }
 
-/// Checks what single keys of a `[[scalar]]` do not show; those before it are read.
+/// Checks the keys of a `[[scalar]]` in combination; earlier ones have been read.
 ///
 /// # Errors
-/// A name that no array can have, or that another has; a key that its law has not, or lacks; one too many.
+/// A name that no array can have, or that is taken; a key that its law does not have, or a missing one; one scalar too many.
 pub(in crate::scene::shallow) fn check(index: usize, table: &Table, values: &Values) -> Result<()> {
     let all = Carried::all_of(values);
     let Carried { scalar, start } = &all[index];
@@ -117,10 +117,10 @@ pub(in crate::scene::shallow) fn check(index: usize, table: &Table, values: &Val
     check_thickening(index, table, values, scalar.range)
 }
 
-/// Checks how a scalar thickens the liquid; those before it are read.
+/// Checks how a scalar thickens the liquid; earlier ones have been read.
 ///
 /// # Errors
-/// A key without the others; a concentration out of range; a second scalar that thickens, or a liquid that cannot.
+/// A key without the others; a concentration out of range; a second scalar that thickens, or a liquid that cannot be thickened.
 fn check_thickening(index: usize, table: &Table, values: &Values, range: f64) -> Result<()> {
     let number = |name: &str| values.of_many("scalar", index, name).and_then(Value::number);
     if number("thickens_times").is_none() {
@@ -150,10 +150,10 @@ fn check_thickening(index: usize, table: &Table, values: &Values, range: f64) ->
     Ok(())
 }
 
-/// Checks what a pour or a source carries.
+/// Checks the scalars of a pour or a source.
 ///
 /// # Errors
-/// A name that no scalar has; a concentration beyond its range.
+/// A name that no scalar has; a concentration out of range.
 pub(in crate::scene::shallow) fn check_brought(
     name: &str,
     index: usize,
@@ -178,10 +178,10 @@ pub(in crate::scene::shallow) fn check_brought(
 }
 
 impl Shallow {
-    /// Sets what a dry liquid carries.
+    /// Sets the scalars of a dry liquid.
     ///
     /// # Errors
-    /// What the library refuses, with the scene's name.
+    /// Errors of the library, with the scene's name.
     pub(in crate::scene::shallow) fn carry(
         &self,
         scene: &Scene,
@@ -197,23 +197,23 @@ impl Shallow {
         })
     }
 
-    /// Sets what comes in through sources, once these are set.
+    /// Sets the scalars of sources, once the sources are set.
     ///
     /// # Errors
-    /// None where the scene was read.
+    /// None for a scene that was read.
     pub(in crate::scene::shallow) fn source_scalars(&self, liquid: &mut shallow::Shallow) -> Result<()> {
         let is_source = |(_, point): &(usize, &Point)| point.name.0 == "source" && !point.carries.is_empty();
         let mut sources = self.points.iter().enumerate().filter(is_source);
         sources.try_for_each(|(index, point)| liquid.set_sourced(index, &point.carries))
     }
 
-    /// What liquid carries that does not say it.
+    /// Concentrations of liquid that does not specify them.
     pub(in crate::scene::shallow) fn start(&self) -> Vec<f64> {
         self.scalars.iter().map(|carried| carried.start).collect()
     }
 }
 
-/// Where each scalar is, by its name: concentration x volume (its own measure x ml).
+/// Where each scalar is, by name: concentration x volume (its own unit x ml).
 pub(in crate::scene::shallow) fn told(
     liquid: &shallow::Shallow,
 ) -> Result<serde_json::Map<String, serde_json::Value>> {

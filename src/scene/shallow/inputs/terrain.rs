@@ -1,4 +1,4 @@
-//! The terrain of a scene, as its file has it at a frame.
+//! The terrain of a scene at a frame, from its file.
 
 use std::path::Path;
 
@@ -29,7 +29,7 @@ use crate::vdb::{FloatGrid, GridClass, file};
 pub(in crate::scene::shallow) enum Terrain {
     /// Triangles.
     Mesh(TriMesh),
-    /// A grey image around the origin.
+    /// A greyscale image centred at the origin.
     #[cfg(feature = "cli")]
     Image(image::Grey, ImagePlace),
     /// A level set.
@@ -38,10 +38,10 @@ pub(in crate::scene::shallow) enum Terrain {
 }
 
 impl Terrain {
-    /// Reads that of a frame.
+    /// Reads the terrain of a frame.
     ///
     /// # Errors
-    /// A file that cannot be read, has changed since it was read, or needs what this build lacks.
+    /// A file that cannot be read, has changed since it was read, or needs a feature that this build lacks.
     pub fn read(shallow: &Shallow, frame: i32, seen: &Seen) -> Result<Self> {
         let path = shallow.terrain_at(frame);
         match (&*extension(&path), shallow.image) {
@@ -51,7 +51,7 @@ impl Terrain {
         }
     }
 
-    /// Turns the closed parts of a mesh outward; returns how.
+    /// Turns the closed parts of a mesh outward; returns the orientation.
     pub fn turn_outward(&mut self) -> Orientation {
         match self {
             Self::Mesh(mesh) => {
@@ -64,7 +64,7 @@ impl Terrain {
         }
     }
 
-    /// Its least and its greatest corner (m).
+    /// Its minimum and maximum corner (m).
     pub fn bounds(&self) -> [DVec3; 2] {
         match self {
             Self::Mesh(mesh) => {
@@ -84,7 +84,7 @@ impl Terrain {
             }
             #[cfg(feature = "vdb")]
             Self::Grid(grid) => {
-                // The active voxels reach beyond the surface by the width of the band.
+                // The active voxels extend beyond the surface by the width of the band.
                 let (low, high) = grid.active_bbox().unwrap_or_default();
                 let band = f64::from(grid.background()).abs();
                 let corner = |at: [i32; 3]| grid.index_to_world(DVec3::from(at.map(f64::from)));
@@ -100,7 +100,7 @@ impl Terrain {
     /// The solids of all cells.
     ///
     /// # Errors
-    /// As those of [`crate::shallow::terrain`]; cancel.
+    /// As in [`crate::shallow::terrain`]; cancel.
     #[cfg_attr(not(feature = "vdb"), expect(unused_variables, reason = "OpenVDB's tools take it"))]
     pub fn solids(&self, ctx: &Context, grid: Grid, heights: Heights) -> Result<Solids> {
         match self {
@@ -128,10 +128,10 @@ impl Terrain {
         }
     }
 
-    /// As triangles, for a picture: an image's pixels, and the surface of a level set.
+    /// As triangles, for rendering: an image's pixels, or the surface of a level set.
     ///
     /// # Errors
-    /// Cancel, or what OpenVDB reports.
+    /// Cancel, or errors of OpenVDB.
     #[cfg_attr(not(feature = "vdb"), expect(unused_variables, reason = "OpenVDB's tools take it"))]
     pub fn mesh(self, ctx: &Context) -> Result<TriMesh> {
         match self {
@@ -144,8 +144,8 @@ impl Terrain {
     }
 }
 
-/// A mesh (m, Y up), whose vertices that are one corner but for rounding ([`Weld`]) have one position: a column between two triangles that
-/// should share an edge would have neither.
+/// A mesh (m, Y up); vertices that are one corner except for rounding ([`Weld`]) get one position: a column between two triangles that
+/// should share an edge would otherwise belong to neither.
 ///
 /// # Errors
 /// A file that cannot be read, or that has changed since it was read.
@@ -173,7 +173,7 @@ fn of_image(path: &Path, _position: ImagePlace, _seen: &Seen) -> Result<Terrain>
     Err(Error::file(path, "needs the feature cli, which this frazil was built without"))
 }
 
-/// A point of each pixel, at its middle.
+/// A point for each pixel, at its centre.
 #[cfg(feature = "cli")]
 fn relief(image: &image::Grey, position: ImagePlace) -> TriMesh {
     let [across, down] = image.size;
@@ -203,7 +203,7 @@ fn relief(image: &image::Grey, position: ImagePlace) -> TriMesh {
 
 #[cfg(feature = "vdb")]
 fn of_vdb(path: &Path, seen: &Seen) -> Result<Terrain> {
-    // OpenVDB reads the file itself: it must be the same before and after.
+    // OpenVDB reads the file itself: its content must be the same before and after.
     seen.hash(path)?;
     let grid = file::read_named(path, None)?;
     seen.note(path, hash::of_file(path)?)?;

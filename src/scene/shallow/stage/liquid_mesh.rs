@@ -1,4 +1,4 @@
-//! The surface of the liquid, and what is in the air of it, as one mesh, and its files.
+//! The surface of the liquid and its drops in the air as one mesh, and its files.
 
 use crate::error::Result;
 use crate::geometry::mesh::attributes::{Number, On};
@@ -12,12 +12,12 @@ use crate::shallow::surface::heights::minimum_heights::{Distance, Lifts};
 use crate::shallow::surface::rim::ledges::Ledges;
 use crate::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target};
 
-/// Least height of a wet vertex above its ground, in cells: the ground does not show through a film (thesis 4.2.4).
+/// Minimum height of a wet vertex above its ground, in cells: the ground does not show through a film (thesis 4.2.4).
 const LEAST_DEPTH: f64 = 0.05;
-/// Depth from which a wet vertex is at its full height, in cells, so that none jumps as its column wets or dries.
+/// Depth at which a wet vertex reaches its full height, in cells, so that none jumps when its column gets wet or dry.
 const FADE_DEPTH: f64 = 0.02;
 
-/// Makes meshes; keeps its memory from one to the next.
+/// Builds meshes; keeps its memory from one to the next.
 #[derive(Default)]
 pub(in crate::scene::shallow) struct Mesher {
     surface: Surface,
@@ -29,25 +29,25 @@ pub(in crate::scene::shallow) struct Mesher {
     drops: Vec<Droplet>,
 }
 
-/// The surface at a frame, and the drops in the air behind it (m, m/s).
+/// The surface at a frame, followed by the drops in the air (m, m/s).
 #[derive(Default)]
 pub(in crate::scene::shallow) struct Drawn {
     pub mesh: TriMesh,
     /// Velocities of the surface.
     pub velocities: Vec<Vec3>,
-    /// Depths; of drops their diameters.
+    /// Depths; for drops their diameters.
     pub depths: Vec<f32>,
-    /// Opacities: depth / the depth from which it is opaque, at most 1.
+    /// Opacities: depth / opaque depth, at most 1.
     pub alpha: Vec<f32>,
     pub layers: Vec<u32>,
-    /// Vertices from this one on are in the air; none where liquid does not fall.
+    /// Vertices from this one on are in the air; `None` if liquid does not fall.
     pub falling: Option<usize>,
     /// Scalars by name.
     pub scalars: Vec<(String, Vec<f32>)>,
 }
 
 impl Mesher {
-    /// Finds minimum heights over the ground, none where it is no mesh, and where it ends, if a shot wants them.
+    /// If a shot wants them, finds minimum heights above the ground (not if that is not a mesh) and where the ground ends.
     ///
     /// # Errors
     /// A mesh with a vertex that is not finite.
@@ -67,10 +67,10 @@ impl Mesher {
         Ok(())
     }
 
-    /// The surface of a liquid that is opaque from a depth on (m).
+    /// The surface of a liquid that is opaque from this depth on (m).
     ///
     /// # Errors
-    /// None of a liquid's own columns.
+    /// None for a liquid's own columns.
     pub fn draw(&mut self, liquid: &Shallow, opaque_depth: f64) -> Result<Drawn> {
         let Self { surface, balls, lifts, ledges, velocity, concentrations, drops } = self;
         let columns = liquid.columns();
@@ -143,20 +143,20 @@ impl Mesher {
     }
 }
 
-/// Counts of two meshes in one.
+/// Counts of two meshes together.
 fn sum(a: Counts, b: Counts) -> Counts {
     Counts { vertices: a.vertices + b.vertices, extras: a.extras + b.extras, indices: a.indices + b.indices }
 }
 
 impl Drawn {
-    /// Nothing, with the arrays that a scene's liquid has.
+    /// An empty mesh, with the arrays of a scene's liquid.
     pub fn empty(of: &Of) -> Self {
         let named = |name: &String| (name.clone(), Vec::new());
         let scalars = of.scalars.iter().map(|carried| named(&carried.scalar.name)).collect();
         Self { falling: of.params.falls.map(|_| 0), scalars, ..Self::default() }
     }
 
-    /// Room for a mesh of a liquid, of which so many vertices are its surface.
+    /// Buffers for a mesh of a liquid; the first `on_ground` vertices are its surface.
     fn with_room(liquid: &Shallow, counts: Counts, on_ground: usize) -> Self {
         let Counts { vertices, indices, .. } = counts;
         let scalar = |scalar: &crate::shallow::Scalar| (scalar.name.clone(), vec![0.0; vertices]);
@@ -171,7 +171,7 @@ impl Drawn {
         }
     }
 
-    /// The arrays that are asked for, besides velocities.
+    /// The requested arrays, besides velocities.
     pub fn arrays(&self, output: Files) -> Vec<MeshArray> {
         let array =
             |name: &str, number, values| MeshArray { name: name.into(), on: On::Vertices, number, values };

@@ -14,7 +14,7 @@ use crate::shallow::terrain::shapes::Shape;
 use crate::shallow::terrain::{Solids, triangles};
 use crate::shallow::{self, Report, Stains};
 
-/// A scene with its liquid and what its files hold.
+/// A scene with its liquid and the contents of its files.
 type Of<'a> = (&'a Scene, &'a Shallow, &'a Inputs);
 
 /// A scene's liquid, at a frame.
@@ -28,11 +28,11 @@ pub(in crate::scene::shallow) struct Course<'a> {
     /// Its sources, drains and absorbers.
     pub points: Vec<FlowPoint>,
     pub frame: i32,
-    /// What it leaves on the terrain.
+    /// Its stains on the terrain.
     pub stains: Option<Stains>,
-    /// The terrain, where it is a mesh that moves (m).
+    /// The terrain, if it is a mesh that moves (m).
     ground: Option<TriMesh>,
-    /// Whether ground or obstacles are others than when this was last looked at.
+    /// Whether ground or obstacles have changed since this was last taken.
     pub is_stirred: bool,
 }
 
@@ -40,7 +40,7 @@ impl<'a> Course<'a> {
     /// The liquid at the first frame.
     ///
     /// # Errors
-    /// A source inside solid, and whatever else a liquid refuses; cancel.
+    /// A source inside solid, and anything else that a liquid refuses; cancel.
     pub fn begin(ctx: &Context, (scene, of, inputs): Of<'a>) -> Result<Self> {
         let first = scene.shot.frames.first;
         let shapes = obstacles::shapes_at(of, first)?;
@@ -55,10 +55,10 @@ impl<'a> Course<'a> {
         Ok(course)
     }
 
-    /// Goes on from a state that was kept at a frame.
+    /// Resumes from a state saved at a frame.
     ///
     /// # Errors
-    /// Files that can no longer be read; a state of another terrain.
+    /// Files that can no longer be read; a state for another terrain.
     pub fn resume(ctx: &Context, (scene, of, inputs): Of<'a>, frame: i32, bytes: &[u8]) -> Result<Self> {
         let kept = saved_liquid::read(bytes)?;
         let mut course = Self::dry(ctx, (scene, of, inputs), frame, kept.shapes)?;
@@ -70,14 +70,14 @@ impl<'a> Course<'a> {
             stains.restore(&kept.stains)?;
         }
         if course.points != kept.points {
-            // Others from here on.
+            // The points have changed: these apply from here on.
             course.liquid.set_flows_resting(&course.points, |index| of.points[index].title())?;
         }
         of.source_scalars(&mut course.liquid)?;
         Ok(course)
     }
 
-    /// Dry ground as it is at a frame, with obstacles; its points are not set.
+    /// Dry ground at a frame, with obstacles; its points are not set.
     fn dry(ctx: &Context, (scene, of, inputs): Of<'a>, frame: i32, shapes: Vec<Shape>) -> Result<Self> {
         let (ground, solids) = inputs.moved(of, frame)?.unzip();
         let solids = solids.as_ref().unwrap_or(&inputs.solids);
@@ -111,10 +111,10 @@ impl<'a> Course<'a> {
         Ok(course)
     }
 
-    /// Goes on to the next frame; what the flow did, and what terrain and obstacles that moved did to the liquid.
+    /// Advances to the next frame; returns the report of the flow, and the effect of moving terrain and obstacles on the liquid.
     ///
     /// # Errors
-    /// Files that cannot be read; what a step refuses; cancel.
+    /// Files that cannot be read; errors of a step; cancel.
     pub fn go(&mut self, ctx: &Context) -> Result<(Report, Moved)> {
         let moved = ctx.phase("terrain", || self.go_still())?;
         let report = ctx.phase("flow", || self.liquid.step(ctx, 1.0 / self.scene.shot.fps))?;
@@ -126,7 +126,7 @@ impl<'a> Course<'a> {
         Ok((report, moved))
     }
 
-    /// Takes terrain, obstacles and points to the next frame, and lets nothing flow or be poured; what that did to the liquid.
+    /// Moves terrain, obstacles and points to the next frame without any flow or pour; returns the effect on the liquid.
     ///
     /// # Errors
     /// Files that cannot be read.
@@ -148,12 +148,12 @@ impl<'a> Course<'a> {
         Ok(Moved { displaced: of_terrain.displaced + of_obstacles.displaced, ..last })
     }
 
-    /// Names of the points that should act on the way to its frame and rest, as they lie inside solid or beyond the area.
+    /// Names of the points that should act over the step to its frame but rest, as they lie inside solid or outside the area.
     pub fn resting(&self) -> Vec<String> {
         flow_points::resting(self.of, &self.liquid, self.frame).map(Point::title).collect()
     }
 
-    /// Puts obstacles in the place of those that there are.
+    /// Replaces the obstacles.
     fn put(&mut self, shapes: Vec<Shape>) -> Result<Moved> {
         if shapes == self.shapes {
             return Ok(Moved::default());
@@ -164,10 +164,10 @@ impl<'a> Course<'a> {
         Ok(moved)
     }
 
-    /// The terrain with how stained each of its vertices is; none where nothing stains it.
+    /// The terrain with the stain of each of its vertices; `None` if nothing stains it.
     ///
     /// # Errors
-    /// None of its own stains.
+    /// None for its own stains.
     pub fn stained(&self) -> Result<Option<(TriMesh, Vec<f32>)>> {
         let mesh = self.ground.as_ref().or(self.inputs.still.as_ref());
         let Some((stains, mesh)) = self.stains.as_ref().zip(mesh) else { return Ok(None) };
@@ -176,7 +176,7 @@ impl<'a> Course<'a> {
         Ok(Some((mesh.clone(), out)))
     }
 
-    /// The ground as one mesh, with those that stand on it (m); none where it is no mesh.
+    /// The ground as one mesh, with the meshes that stand on it (m); `None` if it is not a mesh.
     pub fn ground(&self) -> Option<TriMesh> {
         let mut all = self.ground.as_ref().or(self.inputs.still.as_ref())?.clone();
         for mesh in &self.inputs.meshes {
@@ -189,7 +189,7 @@ impl<'a> Course<'a> {
 }
 
 impl Inputs {
-    /// The terrain's mesh at a frame, and the solids of it and of the meshes that stand on it; none where it does not move.
+    /// The terrain's mesh at a frame, and the solids of it and of the meshes that stand on it; `None` if it does not move.
     fn moved(&self, of: &Shallow, frame: i32) -> Result<Option<(TriMesh, Solids)>> {
         let Some(mesh) = self.terrain_at(of, frame)? else { return Ok(None) };
         let mut solids = triangles::solids(&mesh.positions, &mesh.triangles, self.grid, self.heights)?;

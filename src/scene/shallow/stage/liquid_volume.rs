@@ -1,4 +1,4 @@
-//! The liquid as a fog volume: how much of each voxel is filled.
+//! The liquid as a fog volume: the filled fraction of each voxel.
 
 use std::collections::BTreeMap;
 
@@ -14,12 +14,12 @@ use crate::shallow;
 use crate::vdb::file::{WriteOptions, to_bytes};
 use crate::vdb::{DENSITY_SCALE_KEY, FloatGrid, GridClass, MetaValue};
 
-/// The one grid, and what shaders call it.
+/// Name of the only grid, as shaders expect it.
 const GRID: &str = "density";
-/// Extinction over a depth from which the liquid is opaque: a twentieth of the light comes through.
+/// Optical depth at the opaque depth: a twentieth of the light passes through.
 const OPAQUE: f64 = 3.0;
 
-/// What `shot.usda` says of the volumes.
+/// The volume's description in `shot.usda`.
 pub(in crate::scene::shallow) fn of_shot(kind: &'static str) -> Volume {
     const FIELDS: &[Field] = &[Field::of(GRID, Holds::Density(1.0))];
     Volume { kind, prim: "liquid_volume", fields: FIELDS, is_guide: false }
@@ -28,7 +28,7 @@ pub(in crate::scene::shallow) fn of_shot(kind: &'static str) -> Volume {
 /// The bytes of a frame's .vdb file.
 ///
 /// # Errors
-/// When memory runs out; cancel.
+/// Out of memory; cancel.
 pub(in crate::scene::shallow) fn bytes(
     ctx: &Context,
     scene: &Scene,
@@ -53,8 +53,8 @@ pub(in crate::scene::shallow) fn bytes(
     to_bytes(&[&grid], &WriteOptions { metadata, ..WriteOptions::default() })
 }
 
-/// The share of each voxel that is liquid. Voxels have the edge of a cell, and lie on cells; their middles are at whole multiples of it in
-/// height. A value of 1 loses `scale` of its light in a metre (1/m).
+/// The fraction of each voxel that is liquid. Voxels have the edge of a cell and are aligned with cells; in height, their centres are at
+/// multiples of it. A value of 1 means an extinction of `scale` (1/m).
 fn density(ctx: &Context, liquid: &shallow::Shallow, scale: f64) -> Result<FloatGrid> {
     let (columns, depths) = (liquid.columns(), liquid.depths());
     let (grid, heights) = (columns.grid, columns.heights);
@@ -72,7 +72,7 @@ fn density(ctx: &Context, liquid: &shallow::Shallow, scale: f64) -> Result<Float
             add(&mut blocks, [x, y, z], share);
         }
     }
-    // What is in the air, each drop in the voxel of its middle.
+    // Liquid in the air: each drop goes to the voxel of its centre.
     for drop in liquid.drops() {
         let [x, y, z] = drop.position;
         let along = |axis: usize, at: f64| ((at - grid.origin[axis]) / grid.cell).floor() as i32;
@@ -90,7 +90,7 @@ fn density(ctx: &Context, liquid: &shallow::Shallow, scale: f64) -> Result<Float
     Ok(out)
 }
 
-/// Adds a share of a voxel that is liquid.
+/// Adds a liquid fraction to a voxel.
 fn add(blocks: &mut BTreeMap<Origin, Block>, at: [i32; 3], share: f32) {
     let origin = origin_of(at);
     let block = blocks.entry(origin).or_insert_with(|| Block {

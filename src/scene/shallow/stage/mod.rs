@@ -29,13 +29,13 @@ use crate::shallow::remap::Moved;
 use liquid_mesh::{Drawn, Mesher};
 use liquid_over_time::Course;
 
-/// Name of the stage, and kind of its files.
+/// Name of the stage, and of the kind of its files.
 const NAME: &str = "liquid";
-/// Kind of its volumes.
+/// Kind of the volume files.
 const VOLUME: &str = "volume";
-/// Kind of the files of a terrain with stains.
+/// Kind of the files of a stained terrain.
 const TERRAIN: &str = "terrain";
-/// What the clips of `liquid/` share.
+/// Manifest shared by the clips in `liquid/`.
 const MANIFEST: &str = "liquid/liquid.manifest.usda";
 
 /// The stage for a scene.
@@ -69,7 +69,7 @@ impl<'a> Liquid<'a> {
         Self { scene, of, inputs }
     }
 
-    /// Takes the liquid to a frame, which may be the one that it is at, and tells of points that cannot act any more.
+    /// Advances the liquid to a frame, which may be the current one, and warns of points that can no longer act.
     fn go(&self, ctx: &Context, course: &mut Course<'a>, frame: i32) -> Result<(shallow::Report, Moved)> {
         if frame <= course.frame {
             return Ok(Default::default());
@@ -85,7 +85,7 @@ impl<'a> Liquid<'a> {
         Ok(did)
     }
 
-    /// What a frame's files are made from.
+    /// The data that a frame's files are made from.
     fn written(&self, ctx: &Context, state: &mut State<'a>, to: &To<'_>, made_from: &str) -> Result<Written> {
         let State { course, mesher } = state;
         if std::mem::take(&mut course.is_stirred) {
@@ -123,7 +123,7 @@ impl<'a> Liquid<'a> {
         Ok(None)
     }
 
-    /// What the liquid looks like in USD.
+    /// The liquid's material in USD.
     fn look(&self) -> Look {
         match &*self.of.look {
             "water" => Look::Water,
@@ -295,7 +295,7 @@ impl<'a> Stepping for Liquid<'a> {
     }
 }
 
-/// What the report of a frame says.
+/// The report of a frame.
 fn told(
     course: &Course<'_>,
     (report, moved): (shallow::Report, Moved),

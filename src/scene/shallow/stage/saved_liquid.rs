@@ -1,4 +1,4 @@
-//! The liquid at a frame as bytes: its own state, and the obstacles and flow points that it had, which others may take the place of.
+//! The liquid at a frame as bytes: its own state, and its obstacles and flow points at that time, which may be replaced later.
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
@@ -11,10 +11,10 @@ use crate::shallow::{Shallow, Stains};
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzsha01";
-/// What messages call it.
+/// Noun for messages.
 const NOUN: &str = "liquid";
 
-/// A liquid that was kept.
+/// A saved liquid.
 #[derive(Debug, PartialEq)]
 pub(in crate::scene::shallow) struct Kept {
     /// The obstacles that stood in it.
@@ -23,7 +23,7 @@ pub(in crate::scene::shallow) struct Kept {
     pub points: Vec<FlowPoint>,
     /// Its own state.
     pub liquid: Vec<u8>,
-    /// Its stains; empty where it leaves none.
+    /// Its stains; empty if it leaves none.
     pub stains: Vec<u8>,
 }
 
@@ -70,7 +70,7 @@ pub(in crate::scene::shallow) fn save(
 /// Reads what [`save`] wrote.
 ///
 /// # Errors
-/// Bytes that are no such state.
+/// Bytes that are not such a state.
 pub(in crate::scene::shallow) fn read(bytes: &[u8]) -> Result<Kept> {
     let bytes = packed::unpack(bytes, MAGIC, NOUN)?;
     let mut from = Reader::new(&bytes);

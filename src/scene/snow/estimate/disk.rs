@@ -1,4 +1,4 @@
-//! How much space a shot's files will need.
+//! Estimates the disk space of a shot's files.
 
 use super::memory;
 use crate::scene::snow::Inputs;
@@ -6,7 +6,7 @@ use crate::scene::snow::keys::volumes::Needs;
 use crate::scene::snow::stages::grain_files::WHOLE_EVERY;
 use crate::scene::{BaseMode, Scene};
 
-/// Bytes of a whole base file for each column of cells, and of what a frame changes and removes besides.
+/// Bytes of a whole base file for each column of cells, and of the changes and removed snow of a frame.
 const BYTES_PER_COLUMN: f64 = 20.0;
 const BYTES_PER_CHANGE: f64 = 4e5;
 /// Bytes of a whole base file for each leaf: two surfaces cross 3.2 leaves of 64 columns.
@@ -14,11 +14,11 @@ const BYTES_PER_LEAF: f64 = BYTES_PER_COLUMN * 64.0 / 3.2;
 /// Bytes for each vertex of an object in a .usda and a .ply file.
 const USDA_PER_VERTEX: f64 = 110.0;
 const PLY_PER_VERTEX: f64 = 50.0;
-/// Bytes for texture coordinates, and for a corner's index into them.
+/// Bytes of texture coordinates, and of a corner's index into them.
 const USDA_PER_POSITION: f64 = 20.0;
 const USDA_PER_INDEX: f64 = 7.0;
 const PLY_PER_POSITION: f64 = 8.0;
-/// Bytes of a grain in each kind of file (of changes: while a character walks), and in a packed state.
+/// Bytes of a grain in each kind of file (for changes: while a character walks), and in a packed state.
 const GRAIN_VDB: f64 = 49.0;
 const GRAIN_CHANGES: f64 = 28.0;
 const GRAIN_PLY: f64 = 50.0;
@@ -27,15 +27,15 @@ const GRAIN_STATE: f64 = 90.0;
 /// Bytes of a grain in a fog and in a united surface.
 const GRAIN_FOG: f64 = 190.0;
 const GRAIN_UNITED: f64 = 60.0;
-/// Share of a whole base file that the density of the base takes.
+/// Size of the density of the base, as a fraction of a whole base file.
 const FOG_SHARE: f64 = 0.3;
 /// Bytes for each column of cells in a mesh of the base.
 const MESH_PLY: f64 = 90.0;
 const MESH_USDA: f64 = 180.0;
-/// States of grains that are kept.
+/// Number of states of grains that are kept.
 const STATES: f64 = 2.0;
 
-/// Estimates the space of grains' files and states (bytes), of so many after each frame.
+/// Estimates the disk space of grains' files and states (bytes); `there` has their count after each frame.
 pub(in crate::scene::snow) fn of_grains(scene: &Scene, there: &[f64]) -> u64 {
     let output = scene.output;
     let vdb = |frame: usize| match output.grains_delta && !frame.is_multiple_of(WHOLE_EVERY as usize) {
@@ -54,7 +54,7 @@ pub(in crate::scene::snow) fn of_grains(scene: &Scene, there: &[f64]) -> u64 {
     (files + STATES * most * GRAIN_STATE) as u64
 }
 
-/// Estimates the space of all files (bytes) but those of grains.
+/// Estimates the disk space of all files (bytes) except those of grains.
 pub fn estimate(scene: &Scene, inputs: &Inputs) -> u64 {
     let (output, frames) = (scene.output, scene.shot.frames.count() as f64);
     let whole = whole_base(inputs) * if output.half { 0.6 } else { 1.0 };
@@ -89,7 +89,7 @@ fn of_volumes(scene: &Scene, inputs: &Inputs) -> f64 {
         + f64::from(asked.mesh_usd) * columns * MESH_USDA
 }
 
-/// Bytes of a whole base file: by its columns, or by the leaves of a layer that is given.
+/// Bytes of a whole base file: by its columns, or by the leaves of a layer given as a level set.
 fn whole_base(inputs: &Inputs) -> f64 {
     match (inputs.given(), inputs.area()) {
         (Some(grid), _) => grid.leaf_count() as f64 * BYTES_PER_LEAF,

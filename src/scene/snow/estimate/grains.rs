@@ -1,5 +1,4 @@
-//! Forecast of the count, memory and disk space of the grains that a base makes, from its reports, before the first grain is
-//! made.
+//! Forecast of the count, memory and disk space of the grains that a base makes, from the base's reports, before the first grain is made.
 
 use serde::Serialize;
 
@@ -21,7 +20,7 @@ pub struct Forecast {
     pub to_frame: i32,
     /// Snow removed after the first frame (m3).
     pub removed_m3: f64,
-    /// Share of it that does not become grains: the least of all objects that remove snow.
+    /// Share of it that does not become grains: the minimum over all objects that remove snow.
     pub compression: f64,
     /// Largest count of grains at one time.
     pub grains: u64,
@@ -79,7 +78,7 @@ impl Forecast {
     /// Fails if there are too many grains for the limits; if the forecast is an upper bound, that is only likely.
     ///
     /// # Errors
-    /// More than `grains.max` by over a tenth, which estimates are not off by; more memory than the limit (bytes).
+    /// More than `grains.max` by over a tenth, which exceeds the error of estimates; more memory than the limit (bytes).
     pub fn check(&self, scene: &Scene, limit: u64) -> Result<()> {
         if self.grains as f64 > (1.0 + OFF) * most(scene) as f64 {
             return Err(Error::argument(self.too_many(scene)));
@@ -91,7 +90,7 @@ impl Forecast {
         Ok(())
     }
 
-    /// The warning for an estimate that is over `grains.max`, but by no more than its error.
+    /// The warning for an estimate over `grains.max` by no more than its error.
     pub fn warning(&self, scene: &Scene) -> Option<String> {
         let (grains, most) = (self.grains, most(scene));
         let is_close = grains > most && grains as f64 <= (1.0 + OFF) * most as f64;
@@ -115,7 +114,7 @@ impl Forecast {
     }
 }
 
-/// The most grains that a scene may have.
+/// The maximum number of grains of a scene.
 fn most(scene: &Scene) -> u64 {
     let most = scene.values.get("grains.max").and_then(|value| value.whole());
     most.map_or(u64::MAX, |most| most as u64)

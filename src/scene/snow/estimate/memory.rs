@@ -1,4 +1,4 @@
-//! How much memory a scene will need, before any of it is taken.
+//! Memory of a scene, estimated before any is allocated.
 
 use crate::error::{Error, Result};
 use crate::scene::snow::keys::volumes::Needs;
@@ -8,27 +8,26 @@ use crate::scene::{BaseMode, Layer, Scene};
 use crate::snow;
 use crate::vdb::file;
 
-/// Bytes for each column of cells: two surfaces, each across two leaves, and what making them takes.
+/// Bytes for each column of cells: two surfaces, each across two leaves, and the work to make them.
 const BYTES_PER_COLUMN: f64 = 260.0;
-/// Bytes for each triangle that moves: its poses, and what it sweeps in a frame.
+/// Bytes for each triangle that moves: its poses, and its sweep in a frame.
 const BYTES_PER_TRIANGLE: f64 = 2000.0;
-/// Bytes for each grain besides those of a step: a copy of the grains that is written while the next frame is made, their
-/// points and files.
+/// Bytes for each grain besides those of a step: a copy of the grains that is written while the next frame is made, their points and files.
 const BYTES_PER_WRITTEN: u64 = 400;
-/// Bytes of each column of cells in a mesh of the base, and in its files.
+/// Bytes for each column of cells in a mesh of the base, and in its files.
 const BYTES_OF_MESH: f64 = 500.0;
-/// Bytes of each grain as a point that was read, and in each kind of volume with its file.
+/// Bytes for each grain as a point that was read, and in each kind of volume with its file.
 const BYTES_OF_POINT: u64 = 150;
 const BYTES_OF_FOG: u64 = 1200;
 const BYTES_OF_UNITED: u64 = 700;
 /// Bytes that every run takes.
 const FIXED: f64 = 64e6;
 
-/// Estimates a scene's memory (bytes), without grains that come from the snow: how many those are is known when the base is
-/// there, see [`Forecast`](super::grains::Forecast).
+/// Estimates a scene's memory (bytes), without grains that come from the snow: their number is known only once the base exists, see
+/// [`Forecast`](super::grains::Forecast).
 ///
 /// # Errors
-/// When the layer's file cannot be read.
+/// A layer file that cannot be read.
 pub fn estimate(scene: &Scene, inputs: &Inputs) -> Result<u64> {
     // Whole frames are written from a copy while the next one is made.
     let output = scene.output;
@@ -39,7 +38,7 @@ pub fn estimate(scene: &Scene, inputs: &Inputs) -> Result<u64> {
     Ok(grains.max(base as u64).max(of_volumes(scene, inputs, drift)?))
 }
 
-/// Estimates the memory (bytes) of the stage volumes, with so many grains; 0 without one.
+/// Estimates the memory (bytes) of the stage volumes with this many grains; 0 without that stage.
 ///
 /// # Errors
 /// As [`estimate`].
@@ -66,14 +65,14 @@ pub(in crate::scene::snow) fn of_volumes(scene: &Scene, inputs: &Inputs, grains:
     Ok(if there { (base + FIXED) as u64 + grains * each } else { 0 })
 }
 
-/// Voxels of the united surface along a cell's edge.
+/// Voxels of the united surface along the edge of a cell.
 pub(in crate::scene::snow) fn division(scene: &Scene, inputs: &Inputs) -> usize {
     let cell = inputs.snow.cell;
     snow::render_volumes::united::division(cell, params(scene, cell).radius)
 }
 
-/// Estimates the memory (bytes) of the stage grains, with so many of them: it has the base before and after a frame, and
-/// hands copies of the grains to what writes them.
+/// Estimates the memory (bytes) of the stage grains with this many grains: it holds the base before and after a frame, and passes copies of
+/// the grains to the writer.
 ///
 /// # Errors
 /// As [`estimate`].
@@ -83,7 +82,7 @@ pub(in crate::scene::snow) fn of_grains(inputs: &Inputs, grains: u64) -> Result<
         + grains * BYTES_PER_WRITTEN)
 }
 
-/// Bytes of what a run takes besides its layers.
+/// Bytes of a run besides its layers.
 fn around(inputs: &Inputs) -> f64 {
     let triangles: usize = inputs.bodies.iter().map(|body| body.motion().triangles().len()).sum();
     triangles as f64 * BYTES_PER_TRIANGLE + FIXED
@@ -103,7 +102,7 @@ fn layer(inputs: &Inputs) -> Result<f64> {
     })
 }
 
-/// Refuses a scene that would need more than it may.
+/// Refuses a scene that would need more memory than the limit.
 ///
 /// # Errors
 /// [`Error::Memory`] names the cell size; or as [`estimate`].

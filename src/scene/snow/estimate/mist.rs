@@ -1,6 +1,6 @@
-//! Forecast of what mist takes. What a cell of air takes is known; how far mist spreads is not, before it is made. So the count of
-//! cells is that of mist which a folder already holds, be it of the shot's first frames or of coarser cells, or else a figure to go
-//! by: the cells that fill the boxes of all objects, wherever they were while mist lasts.
+//! Forecast of the memory and disk space of mist. The cost of a cell of air is known; how far mist spreads is not, until it is made. So the
+//! count of cells is that of mist that a folder already holds, even if only of the shot's first frames or of coarser cells, or else a guide
+//! value: the cells that fill the boxes of all objects, along their paths while mist lasts.
 
 use std::collections::HashMap;
 
@@ -16,21 +16,21 @@ use crate::scene::snow::keys::mist::mist_params;
 use crate::snow::mist::{self, LEAST, Params};
 use crate::vdb::file;
 
-/// Cells along the edge of a tile, and in it. Air is computed in whole tiles, and one more around those that hold mist.
+/// Cells along the edge of a tile, and in a tile. Air is computed in whole tiles, plus one more layer around those that hold mist.
 const EDGE: f64 = 8.0;
 const CELLS: u64 = 512;
-/// Bytes of a cell while a frame is written and the next one made: a copy of velocity, pressure and density with those around
-/// (40), density and velocity as blocks, as grids and as a file (16 each).
+/// Bytes of a cell while a frame is written and the next one made: a copy of velocity, pressure and density with their neighbours (40);
+/// density and velocity as blocks, as grids and as a file (16 each).
 const WRITING: u64 = 40 + 3 * 16;
-/// Bytes of a cell in mist/ (density and velocity), and in fog/: whole floats, which hardly pack.
+/// Bytes of a cell in mist/ (density and velocity), and in fog/: 32-bit floats, which hardly compress.
 const IN_MIST: u64 = 16;
 const IN_FOG: u64 = 4;
-/// Bytes of a cell in an exact state, and how many of those are kept.
+/// Bytes of a cell in an exact state, and number of states kept.
 const IN_STATE: u64 = 40;
 const STATES: u64 = 2;
-/// Cubes of a box that are counted at most: larger boxes are counted in larger cubes.
+/// Maximum cubes counted in a box: larger boxes are counted in larger cubes.
 const COUNTED: f64 = 4096.0;
-/// Times of a shot at which boxes are counted at most: of a longer one several frames count as one.
+/// Maximum moments of a shot at which boxes are counted: in longer shots several frames count as one.
 const MOMENTS: usize = 512;
 
 /// Estimated memory and disk of the mist stage.
@@ -38,26 +38,26 @@ const MOMENTS: usize = 512;
 pub struct MistForecast {
     /// Edge of a cell of air (m).
     pub cell_m: f64,
-    /// Memory that a step reckons with for each cell (bytes): one that would need more than the limit is refused.
+    /// Memory that a step reserves for each cell (bytes): a step that would need more than the limit is refused.
     pub step_bytes_per_cell: u64,
-    /// Memory of each cell of the run (bytes), with what is being written.
+    /// Memory of the run for each cell (bytes), including data being written.
     pub memory_bytes_per_cell: u64,
-    /// Disk space of each cell in the files of a frame, at most (bytes).
+    /// Maximum disk space of each cell in the files of a frame (bytes).
     pub disk_bytes_per_cell: u64,
-    /// The last frame of the mist that was made, from which the count of cells is; none: it is that of the objects' boxes.
+    /// The last frame of existing mist, if the count of cells is from that; `None`: it is from the objects' boxes.
     pub made_to_frame: Option<i32>,
-    /// Most cells at once.
+    /// Maximum cells at one time.
     pub cells: u64,
     /// Their volume (m3).
     pub air_m3: f64,
-    /// Memory of so many (bytes), beside the base layer and the grains.
+    /// Memory of that many cells (bytes), besides the base layer and the grains.
     pub memory_bytes: u64,
-    /// Disk space of all frames and states, at most (bytes), with so many.
+    /// Maximum disk space of all frames and states with that many cells (bytes).
     pub disk_bytes: u64,
 }
 
 impl MistForecast {
-    /// Forecast for a scene with these objects, from the mist that a folder holds where it has some. None for a scene without mist.
+    /// Forecast for a scene with these objects, from the mist in a folder if there is some. `None` for a scene without mist.
     ///
     /// # Errors
     /// A damaged report or file of that mist; cancel.
@@ -70,7 +70,7 @@ impl MistForecast {
         let Some(params) = mist_params(&scene.values) else { return Ok(None) };
         let last = scene.shot.frames.last;
         let made = stored.map(|stored| made(stored, params.cell, last)).transpose()?.flatten();
-        // The most cells at once, and those of all frames.
+        // The maximum number of cells at one time, and the sum over all frames.
         let (most, all) = match made {
             Some((_, cells)) => (cells, cells * scene.shot.frames.count() as f64),
             None => {
@@ -97,10 +97,10 @@ impl MistForecast {
         }))
     }
 
-    /// Fails where so many cells would need more memory than a limit (bytes).
+    /// Fails if that many cells would need more memory than a limit (bytes).
     ///
     /// # Errors
-    /// [`Error::Memory`] names the count of cells and where it is from.
+    /// [`Error::Memory`] names the count of cells and its origin.
     pub fn check(&self, limit: u64) -> Result<()> {
         if self.memory_bytes <= limit {
             return Ok(());
@@ -113,7 +113,7 @@ impl MistForecast {
         Err(Error::Memory { what, needed: self.memory_bytes, limit })
     }
 
-    /// The most cells that a step may have under a limit of memory (bytes).
+    /// The maximum cells of a step under a memory limit (bytes).
     pub fn most_cells(&self, limit: u64) -> u64 {
         limit / self.step_bytes_per_cell
     }
@@ -124,8 +124,8 @@ fn rounded(length: f64) -> f64 {
     format!("{length:.2e}").parse().unwrap_or(length)
 }
 
-/// The last frame, up to `last`, of mist that was made, and the most cells that a frame of it has, as cells of an edge `cell` (m);
-/// none where no mist was raised yet, or no file says how large its cells are.
+/// The last frame of existing mist, up to `last`, and the maximum cells of its frames, converted to cells of an edge `cell` (m); `None` if
+/// no mist was raised yet, or no file has the size of its cells.
 fn made(stored: &Stored, cell: f64, last: i32) -> Result<Option<(i32, f64)>> {
     let (mut end, mut counts) = (None, Vec::new());
     for frame in stored.frames().filter(|frame| *frame <= last) {
@@ -147,18 +147,18 @@ fn made(stored: &Stored, cell: f64, last: i32) -> Result<Option<(i32, f64)>> {
     Ok(Some((end, most * factor.powi(3))))
 }
 
-/// The cells at each frame, if mist fills the boxes of all objects that push grains near the snow from when they are there until it
-/// has dissipated, carried along by a wind that is the same everywhere.
+/// The cells at each frame, if mist fills the boxes of all objects that push grains near the snow, from then until it has dissipated, and
+/// drifts with a uniform wind.
 fn in_boxes(ctx: &Context, scene: &Scene, courses: &[Course], params: &Params) -> Result<Vec<f64>> {
     let (frames, fps) = (scene.shot.frames, scene.shot.fps);
     let count = frames.count();
     let each = count.div_ceil(MOMENTS).max(1);
-    // From full to the density under which there is none.
+    // From full density to the density that counts as none.
     let lasts = params.half_life * libm::log2(1.0 / f64::from(LEAST)) * fps;
     let lasts = (lasts.ceil() as usize).min(count);
     let tile = EDGE * params.cell;
     let of_air = |(frame, [low, high]): (i32, [DVec3; 2])| {
-        // As the air sees it.
+        // In the frame of reference of the air.
         let drift = DVec3::from(params.wind) * (f64::from(frame) / fps);
         let margin = DVec3::repeat(tile);
         ((frame - frames.first) as usize / each, [low - margin - drift, high + margin - drift])
@@ -174,7 +174,7 @@ fn in_boxes(ctx: &Context, scene: &Scene, courses: &[Course], params: &Params) -
     Ok((0..count).map(|at| cubes[at / each] as f64 * cells).collect())
 }
 
-/// The boxes of an object (m, ascending by moment), with one around all those of a moment.
+/// The boxes of an object (m, ascending by moment), those of a moment united.
 fn joined(boxes: impl Iterator<Item = (usize, [DVec3; 2])>) -> Vec<(usize, [DVec3; 2])> {
     let mut all: Vec<(usize, [DVec3; 2])> = Vec::new();
     for (at, [low, high]) in boxes {
@@ -188,15 +188,15 @@ fn joined(boxes: impl Iterator<Item = (usize, [DVec3; 2])>) -> Vec<(usize, [DVec
     all
 }
 
-/// Count of cubes of an edge (m) that are filled at each of `count` moments: those in any box (m, ascending by moment) of that one
-/// or of `lasts` moments before it.
+/// Number of cubes of an edge (m) that are filled at each of `count` moments: those in any box (m, ascending by moment) of that moment or
+/// of the `lasts` moments before it.
 fn filled(
     ctx: &Context,
     boxes: &[(usize, [DVec3; 2])],
     edge: f64,
     [count, lasts]: [usize; 2],
 ) -> Result<Vec<i64>> {
-    // When each was in a box last, and how many more there are at a moment than before.
+    // The moment when each was last in a box, and the change in their number at each moment.
     let mut latest: HashMap<[i32; 3], usize> = HashMap::new();
     let mut more = vec![0i64; count];
     for (at, [low, high]) in boxes {
@@ -249,9 +249,9 @@ mod tests {
         let at = |frame: usize, x: f64| (frame, [DVec3::new(x, 0.0, 0.0), DVec3::new(x + 1.5, 0.5, 0.5)]);
         let filled =
             |boxes: &[(usize, [DVec3; 2])], lasts: usize| filled(&ctx, boxes, 1.0, [8, lasts]).unwrap();
-        // Two cubes at once, for the frame and two more.
+        // Two cubes at once, for that frame and two more.
         assert_eq!(filled(&[at(1, 0.0)], 2), [0, 2, 2, 2, 0, 0, 0, 0]);
-        // A box that moves by one cube a frame, and one that comes back when its cubes are empty again, or are not yet.
+        // A box that moves by one cube a frame, and one that comes back after, or before, its cubes are empty again.
         assert_eq!(filled(&[at(0, 0.0), at(1, 1.0), at(2, 2.0)], 1), [2, 3, 3, 2, 0, 0, 0, 0]);
         assert_eq!(filled(&[at(0, 0.0), at(5, 0.0)], 2), [2, 2, 2, 0, 0, 2, 2, 2]);
         assert_eq!(filled(&[at(0, 0.0), at(3, 0.0)], 2), [2, 2, 2, 2, 2, 2, 0, 0]);

@@ -1,4 +1,4 @@
-//! Forecasts: memory and disk of each stage, before any of it is taken.
+//! Forecasts: memory and disk space of each stage, before any is used.
 
 pub(in crate::scene::snow) mod disk;
 pub(in crate::scene::snow) mod grains;

@@ -1,4 +1,4 @@
-//! Whether a character's feet stand where they are put: its clip's own speed, and that of its keys.
+//! Whether a character's feet stay where they stand: the speed of its clip against that of its keys.
 
 use serde::Serialize;
 
@@ -7,30 +7,30 @@ use crate::geometry::DVec3;
 use crate::motion::{Character, Keys, Motion, Placed, Play, gait, is_gltf};
 use crate::scene::{Object, Scene};
 
-/// Feet that slip slower than this (m/s), or than this part of their clip's speed, are let be.
+/// Feet that slip slower than this (m/s), or than this fraction of their clip's speed, are ignored.
 const SLOW: f64 = 0.05;
 const PART: f64 = 0.25;
 
 /// How a clip must be carried, and how it is.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Walk {
-    /// Velocity (m/s) that keeps its standing parts where they are, before any turn of the keys.
+    /// Velocity (m/s) that keeps standing parts in position, before any rotation by the keys.
     pub carry_m_per_s: [f64; 3],
-    /// How far that is in one round of the clip (m), and how long a round is (s).
+    /// Distance covered in one cycle of the clip (m), and the duration of a cycle (s).
     pub stride_m: f64,
     /// See [`Walk::stride_m`].
     pub round_s: f64,
-    /// Part of the time that something stands.
+    /// Fraction of the time that something stands.
     pub standing: f64,
-    /// Speed (m/s) of what stands as the scene's keys carry it.
+    /// Speed (m/s) of standing parts when carried by the scene's keys.
     pub slips_m_per_s: f64,
-    /// Keys that carry it so, straight on from the scene's first key.
+    /// Keys that carry it correctly, straight on from the scene's first key.
     pub keys: String,
-    /// Whether the feet slip enough to tell.
+    /// Whether the feet slip enough to report.
     pub slips: bool,
 }
 
-/// Looks at a character's clip; none for what has none, or stands nowhere for long, or too unevenly.
+/// Analyses a character's clip; `None` if it has none, or stands nowhere for long, or too unevenly.
 ///
 /// # Errors
 /// As [`Character::open`].
@@ -63,7 +63,7 @@ pub(in crate::scene::snow) fn walk(
     }))
 }
 
-/// Keys at the first and last frame that carry a figure at a velocity (m/s, before the first key's turn).
+/// Keys at the first and last frame that carry a figure at a velocity (m/s, before the first key's rotation).
 fn keys(scene: &Scene, object: &Object, carry: DVec3) -> Result<String> {
     let (frames, fps) = (scene.shot.frames, scene.shot.fps);
     let first = object.keys.first();
@@ -74,7 +74,7 @@ fn keys(scene: &Scene, object: &Object, carry: DVec3) -> Result<String> {
     let seconds = (f64::from(frames.last) - f64::from(frames.first)) / fps;
     let last = DVec3::from(at) + rotation * carry * seconds;
     let key = |frame: i32, at: DVec3| {
-        // Adding 0 makes -0 a 0.
+        // Adding 0 turns -0 into 0.
         let [x, y, z] = <[f64; 3]>::from(at.map(|v| (v * 1e4).round() / 1e4 + 0.0));
         let turn = if turn == [0.0; 3] { String::new() } else { format!(", turn_deg = {turn:?}") };
         format!("{{ frame = {frame}, at = [{x}, {y}, {z}]{turn} }}")

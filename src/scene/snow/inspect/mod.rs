@@ -1,4 +1,4 @@
-//! What a check says of a scene: heights, paths of objects, feet, and keys without effect.
+//! Parts of a check of a scene: heights, paths of objects, feet, and keys without effect.
 
 pub(in crate::scene::snow) mod foot_slip;
 pub(in crate::scene::snow) mod object_path;

@@ -18,7 +18,7 @@ use crate::sweep::{Body, REACH};
 
 /// Frames that one task poses in sequence.
 const RUN: usize = 12;
-/// Largest turn of a body between two samples of its path (radians), and most samples between two of its kinks.
+/// Maximum rotation of a body between two samples of its path (radians), and maximum samples between two of its kinks.
 const TURN: f64 = std::f64::consts::PI / 6.0;
 const MOST_PARTS: f64 = 1000.0;
 /// An object larger than the first or smaller than the second (m) probably uses another unit.
@@ -108,7 +108,7 @@ impl<'a> Course<'a> {
         Ok(all.into_iter().flatten().collect())
     }
 
-    /// Least and greatest corner over the shot (m).
+    /// Minimum and maximum corner over the shot (m).
     fn bounds(&self) -> (DVec3, DVec3) {
         let first = self.extents[0];
         self.extents.iter().fold((first.low, first.high), |(l, h), e| (l.inf(&e.low), h.sup(&e.high)))
@@ -130,8 +130,8 @@ impl<'a> Course<'a> {
         Some([first.frame, last.frame])
     }
 
-    /// Least and greatest corner (m) at each frame from the first to the last at which its bounds overlap those of the snow; none for
-    /// an object that pushes no grains.
+    /// Minimum and maximum corner (m) at each frame from the first to the last at which its bounds overlap those of the snow; none for an
+    /// object that pushes no grains.
     pub fn passing(&self) -> impl Iterator<Item = (i32, [DVec3; 2])> {
         let touches = self.touches().filter(|_| self.object.role.pushes());
         let is_near = move |frame: i32| touches.is_some_and(|[first, last]| (first..=last).contains(&frame));
@@ -183,7 +183,7 @@ impl<'a> Course<'a> {
         Ok(None)
     }
 
-    /// The first frame in which a body turns too far for one step.
+    /// The first frame in which a body rotates too far for one step.
     fn too_fast(&self) -> Option<String> {
         let Self { scene, body, .. } = self;
         let time = |frame: i32| f64::from(frame) / scene.shot.fps;

@@ -1,11 +1,11 @@
-//! Heights of the ground and of the snow's top, for `check`: what an object goes into.
+//! Heights of the ground and of the snow's top, for `check`: what an object moves through.
 
 use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh};
 use crate::scene::snow::Inputs;
 use crate::snow::base_layer::initial::{Cover, Ground};
 
-/// The ground and the snow on it, as far as heights at a position are known before the layer is made.
+/// The ground and the snow on it, as far as heights are known before the layer is made.
 pub(in crate::scene::snow) struct Relief<'a> {
     ground: Surface<'a>,
     /// Depth of the snow above the ground (m), or its top.
@@ -58,7 +58,7 @@ impl<'a> Relief<'a> {
         Some(Self { ground, snow })
     }
 
-    /// Heights (m) of the ground and of the snow's top at a position; none beside them. Static objects are left out.
+    /// Heights (m) of the ground and of the snow's top at a position; `None` outside them. Static objects are ignored.
     pub fn at(&self, x: f64, z: f64) -> Option<(f64, f64)> {
         let ground = match &self.ground {
             Surface::Plane { height, area: [x0, z0, x1, z1] } => {

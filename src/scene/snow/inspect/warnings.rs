@@ -1,4 +1,4 @@
-//! What of a scene's grains has no effect, or not the one that was likely meant.
+//! Settings of a scene's grains that have no effect, or probably not the intended one.
 
 use crate::error::Result;
 use crate::motion::span;
@@ -8,7 +8,7 @@ use crate::scene::snow::GRAIN_KEYS;
 use crate::scene::{Object, Scene};
 use crate::sweep::Body;
 
-/// What to say of keys that another one stands in place of, unless they are as they would be if they were left out.
+/// Warnings about keys that another one replaces, unless they have their defaults.
 pub(in crate::scene::snow) fn replaced(values: &Values) -> Vec<String> {
     let number = |name: &str| values.number(&format!("grains.{name}"));
     let pairs = [("friction", "repose_angle_deg"), ("attraction", "stands")];
@@ -21,7 +21,7 @@ pub(in crate::scene::snow) fn replaced(values: &Values) -> Vec<String> {
         .collect()
 }
 
-/// The number that a key of `[grains]` has where it is left out.
+/// The default of a number of `[grains]`, given the preset.
 fn left_out(values: &Values, name: &str) -> Option<f64> {
     let key = GRAIN_KEYS.iter().find(|key| key.table == "grains" && key.name == name)?;
     let chosen = values.get("grains.preset").and_then(|preset| preset.text());
@@ -33,7 +33,7 @@ fn left_out(values: &Values, name: &str) -> Option<f64> {
     }
 }
 
-/// What to say of an object that takes snow and is smaller than a grain at a time (s).
+/// The warning about an object that removes snow and is smaller than a grain at a time (s).
 pub(in crate::scene::snow) fn too_small(
     scene: &Scene,
     object: &Object,

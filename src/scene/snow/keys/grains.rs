@@ -1,4 +1,4 @@
-//! The keys of `[grains]`, and those that grains have of each object.
+//! The keys of `[grains]`, and the keys of objects that concern grains.
 
 use crate::error::Result;
 use crate::scene::schema::key::{Key, Kind, OBJECT, Scope};
@@ -9,7 +9,7 @@ type Scopes = &'static [(&'static str, Scope)];
 const FIRST: Scopes = &[("grains", Scope::First)];
 const STEP: Scopes = &[("grains", Scope::Step)];
 
-/// Greatest attraction (weights of a grain).
+/// Maximum attraction (weights of a grain).
 const MOST_ATTRACTION: f64 = 1000.0;
 
 /// All of them.
@@ -18,19 +18,19 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "preset",
         Kind::Choice(&["powder", "packed", "wet"]),
-        "kind of snow: what is left out below is then as it has it",
+        "kind of snow: sets the defaults of the keys below",
     )
     .or_nothing()
     .such_as("\"powder\"")
     .concerns(STEP),
-    Key::new("grains", "radius", Kind::Cells(0.02, 0.5), "of a grain (m); a third of a cell")
+    Key::new("grains", "radius", Kind::Cells(0.02, 0.5), "radius of a grain (m); default: a third of a cell")
         .or_cells(1.0 / 3.0)
         .concerns(FIRST),
     Key::new(
         "grains",
         "compression",
         Kind::Number(0.0, 1.0, ""),
-        "share of the removed snow that is pressed together and becomes no grains",
+        "share of the removed snow that is compressed and does not become grains",
     )
     .or("0.75")
     .with_presets(&[("powder", "0.8"), ("packed", "0.5"), ("wet", "0.7")])
@@ -48,7 +48,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "stands",
         Kind::Number(0.0, 1000.0, "m"),
-        "height of a wall of grains that just stands (m)",
+        "height of the tallest wall of grains that stays up (m)",
     )
     .or("0.0")
     .with_presets(&[("packed", "0.1"), ("wet", "0.25")])
@@ -57,7 +57,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "friction",
         Kind::Number(0.0, 1.0, ""),
-        "between grains, in place of repose_angle_deg; they do not turn, so that little holds much",
+        "between grains, in place of repose_angle_deg; grains do not rotate, so low values suffice",
     )
     .or_nothing()
     .such_as("0.2")
@@ -66,7 +66,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "attraction",
         Kind::Number(0.0, MOST_ATTRACTION, "weights of a grain"),
-        "with which grains that all but touch hold each other, in place of stands",
+        "between grains that nearly touch, in place of stands",
     )
     .or_nothing()
     .such_as("4.0")
@@ -75,7 +75,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "restitution",
         Kind::Number(0.0, 1.0, ""),
-        "share of their speed with which grains bounce off",
+        "share of their speed that grains keep when they bounce",
     )
     .or("0.0")
     .concerns(STEP),
@@ -83,7 +83,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "air",
         Kind::Number(0.0, 1.0, ""),
-        "share of its velocity that a grain keeps in a second",
+        "air drag: share of its velocity that a grain keeps over a second",
     )
     .or("0.5")
     .with_presets(&[("powder", "0.3"), ("wet", "0.8")])
@@ -92,7 +92,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "air_by_density",
         Kind::Flag,
-        "whether grains among others feel less of the air than those of a thin spray",
+        "whether grains in dense groups feel less air drag than those in thin spray",
     )
     .or("false")
     .concerns(STEP),
@@ -111,7 +111,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "active_distance",
         Kind::Number(1.0e-5, FAR, "m"),
-        "slow grains farther than this (m) from objects and fast grains rest at once; of no effect with rest = false",
+        "slow grains farther than this (m) from objects and fast grains rest at once; no effect with rest = false",
     )
     .or_nothing()
     .such_as("0.15")
@@ -120,7 +120,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "substeps",
         Kind::Whole(1, 1000),
-        "of a frame, in place of the rule by size, time and speed",
+        "sub-steps of a frame; default: from size, time and speed",
     )
     .or_nothing()
     .such_as("20")
@@ -129,15 +129,15 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "max",
         Kind::Whole(1, 60_000_000),
-        "most grains: a frame that would have more is an error",
+        "maximum number of grains: a frame that would have more is an error",
     )
-    // No frame that is there depends on it.
+    // No existing frame depends on it.
     .or("20000000"),
     Key::new(
         "grains",
         "lifetime",
         Kind::Number(0.001, 1.0e6, "s"),
-        "a grain is taken away when it is so old (s)",
+        "age at which a grain is removed (s)",
     )
     .or_nothing()
     .such_as("10.0")
@@ -146,7 +146,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "keep_box",
         Kind::Numbers(6, FAR, "m"),
-        "grains outside of it are taken away: x0, y0, z0, x1, y1, z1 (m)",
+        "grains outside this box are removed: x0, y0, z0, x1, y1, z1 (m)",
     )
     .or_nothing()
     .such_as("[-3.0, -1.0, -3.0, 3.0, 3.0, 3.0]")
@@ -155,19 +155,19 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "initial",
         Kind::File(&["ply", "vdb"]),
-        "points that are grains at the first frame, with their velocities v, if they have some",
+        "points that become grains at the first frame, with their velocities v, if any",
     )
     .or_nothing()
     .such_as("\"drift.ply\"")
     .concerns(FIRST),
-    Key::new("grains", "seed", Kind::Whole(0, i32::MAX as i64), "another one scatters new grains otherwise")
+    Key::new("grains", "seed", Kind::Whole(0, i32::MAX as i64), "another seed scatters new grains differently")
         .or("0")
         .concerns(STEP),
     Key::new(
         OBJECT,
         "compression",
         Kind::Number(0.0, 1.0, ""),
-        "in place of grains.compression, of the snow that it removes",
+        "in place of grains.compression, for the snow that it removes",
     )
     .or_nothing()
     .such_as("0.9")
@@ -176,7 +176,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         OBJECT,
         "stick",
         Kind::Number(0.0, 1000.0, "weights of a grain"),
-        "with which it holds the grains that touch it",
+        "attraction between it and the grains that touch it",
     )
     .or("0.0")
     .concerns(STEP),
@@ -184,13 +184,13 @@ pub const GRAIN_KEYS: &[Key] = &[
         OBJECT,
         "friction",
         Kind::Number(0.0, 10.0, ""),
-        "of grains against it; loose ones that slide over it while it stands still meet that between grains",
+        "between it and grains; loose grains that slide over it while it stands still have the friction between grains",
     )
     .or("0.3")
     .concerns(STEP),
 ];
 
-/// Checks what single keys do not show.
+/// Checks the keys in combination.
 ///
 /// # Errors
 /// A box without a volume.
@@ -206,7 +206,7 @@ pub fn check_grains(table: &Table, values: &Values) -> Result<()> {
     if material(values, radius)[1] > MOST_ATTRACTION {
         let repose = repose_of(values);
         let highest = grain_cohesion::wall_of(MOST_ATTRACTION, 2.0 * radius, repose);
-        // A little less, so that what is printed is accepted.
+        // Slightly less, so that the printed value is accepted.
         let highest = rounded(highest * (1.0 - 1.0e-4));
         let what = format!(
             "is too high: grains with a radius of {} m and an angle of repose of {} degrees stand at most {highest} m high",
@@ -218,8 +218,8 @@ pub fn check_grains(table: &Table, values: &Values) -> Result<()> {
     Ok(())
 }
 
-/// Friction between grains of a radius (m) and their attraction (weights of a grain): as given, or derived from the angle of
-/// repose and the height of a wall.
+/// Friction between grains of a radius (m), and their attraction (weights of a grain): as given, or derived from the angle of repose and
+/// the height of a wall.
 pub fn material(values: &Values, radius: f64) -> [f64; 2] {
     let number = |name: &str| values.number(&format!("grains.{name}"));
     let repose = repose_of(values);
@@ -229,7 +229,7 @@ pub fn material(values: &Values, radius: f64) -> [f64; 2] {
     [friction, attraction]
 }
 
-/// The angle of repose (degrees): as given, or that of the friction.
+/// The angle of repose (degrees): as given, or from the friction.
 fn repose_of(values: &Values) -> f64 {
     let number = |name: &str| values.number(&format!("grains.{name}"));
     let of_friction = number("friction").map(|friction| grain_friction::repose_of(friction, true));

@@ -19,11 +19,13 @@ pub const MIST_KEYS: &[Key] = &[
         "mist",
         "from_speed",
         Kind::Number(0.0, 1000.0, "m/s"),
-        "grains that are faster raise mist along their way (m/s)",
+        "grains faster than this raise mist along their path (m/s)",
     )
     .or("2.0")
     .concerns(STEP),
-    Key::new("mist", "falling", Kind::Flag, "whether falling grains raise mist too").or("false").concerns(STEP),
+    Key::new("mist", "falling", Kind::Flag, "whether falling grains raise mist too")
+        .or("false")
+        .concerns(STEP),
     Key::new("mist", "gravity", Kind::Number(-100.0, 100.0, "m/s2"), "of the air where there is mist (m/s2)")
         .or("-2.0")
         .concerns(STEP),
@@ -39,7 +41,7 @@ pub const MIST_KEYS: &[Key] = &[
         "mist",
         "wind",
         Kind::NumbersOrFile(3, FASTEST_WIND, "m/s", &["vdb"]),
-        "velocity of the air (m/s), or a grid of velocities, by which the air is carried along where there is mist",
+        "velocity (m/s), or a grid of velocities, that carries the air along where there is mist",
     )
     .or("[0.0, 0.0, 0.0]")
     .concerns(FIRST),
@@ -55,7 +57,7 @@ pub const MIST_KEYS: &[Key] = &[
         "mist",
         "turbulence_size",
         Kind::Cells(2.0, 1.0e6),
-        "of the eddies (m), at least 8 cells of air; left out: 24 of them",
+        "size of the eddies (m), at least 8 cells of air; default: 24 cells of air",
     )
     .or_nothing()
     .such_as("0.4")
@@ -64,7 +66,7 @@ pub const MIST_KEYS: &[Key] = &[
         "mist",
         "confinement",
         Kind::Number(0.0, 100.0, "1/s"),
-        "strength with which small eddies are kept alive (1/s); 0 = not at all",
+        "strength of vorticity confinement, which keeps small eddies alive (1/s); 0 = off",
     )
     .or("0.0")
     .concerns(STEP),
@@ -72,7 +74,7 @@ pub const MIST_KEYS: &[Key] = &[
         "mist",
         "noise",
         Kind::Number(0.0, 1.0, ""),
-        "share of the density of new mist that noise takes away at most",
+        "maximum share of the density of new mist that noise removes",
     )
     .or("0.3")
     .concerns(STEP),
@@ -80,20 +82,20 @@ pub const MIST_KEYS: &[Key] = &[
         "mist",
         "noise_size",
         Kind::Cells(0.25, 1.0e6),
-        "of that noise (m), at least a cell of air; left out: 4 of them",
+        "size of that noise (m), at least a cell of air; default: 4 cells of air",
     )
     .or_nothing()
     .such_as("0.05")
     .concerns(STEP),
-    Key::new("mist", "seed", Kind::Whole(0, i32::MAX as i64), "another one gives other noise and eddies")
+    Key::new("mist", "seed", Kind::Whole(0, i32::MAX as i64), "another seed gives other noise and eddies")
         .or("0")
         .concerns(STEP),
 ];
 
-/// Checks what single keys do not show.
+/// Checks the keys in combination.
 ///
 /// # Errors
-/// Mist without grains; sizes that the cell does not allow.
+/// Mist without grains; sizes too small for the cell.
 pub fn check_mist(table: &Table, values: &Values) -> Result<()> {
     if !has_grains(values) {
         return Err(table.error("from_speed", "is of grains that raise mist: the scene needs `[grains]` too"));
@@ -109,7 +111,7 @@ pub fn check_mist(table: &Table, values: &Values) -> Result<()> {
     })
 }
 
-/// The parameters of a scene's mist; none where it has no mist. A wind that is a grid is none here.
+/// The parameters of a scene's mist; `None` if it has none. A wind given as a grid is not included.
 pub fn mist_params(values: &Values) -> Option<Params> {
     let number = |name: &str| values.number(&format!("mist.{name}"));
     let value = |name: &str| values.get(&format!("mist.{name}"));

@@ -1,4 +1,4 @@
-//! The keys of scenes with snow: of the layer, grains, mist, objects and output.
+//! The keys of snow scenes: layer, grains, mist, objects and output.
 
 pub(in crate::scene::snow) mod grains;
 pub(in crate::scene::snow) mod mist;

@@ -20,7 +20,7 @@ pub const OUTPUT_KEYS: &[Key] = &[
         "output",
         "base_mode",
         Kind::Choice(&["full", "delta"]),
-        "full, or delta: first frame whole, then what changed (`frazil vdb rebuild`)",
+        "full, or delta: first frame whole, then only changes (`frazil vdb rebuild`)",
     )
     .or("\"full\"")
     .concerns(BASE_OUTPUT),
@@ -31,7 +31,7 @@ pub const OUTPUT_KEYS: &[Key] = &[
         "output",
         "removed",
         Kind::Choices(&["vdb"]),
-        "removed/removed.%04d.vdb: what each frame took away",
+        "removed/removed.%04d.vdb: the snow that each frame removed",
     )
     .or("[\"vdb\"]")
     .concerns(BASE_OUTPUT),
@@ -47,7 +47,7 @@ pub const OUTPUT_KEYS: &[Key] = &[
         "output",
         "grains_mode",
         Kind::Choice(&["full", "delta"]),
-        "full, or delta: .vdb files of the first and every 24th frame whole, then what changed (`frazil vdb rebuild`)",
+        "full, or delta: .vdb files of the first and every 24th frame whole, then only changes (`frazil vdb rebuild`)",
     )
     .or("\"full\"")
     .concerns(&[("grains", Scope::Output)]),
@@ -63,7 +63,7 @@ pub const OUTPUT_KEYS: &[Key] = &[
         "output",
         "fog",
         Kind::Choices(&["base", "grains", "mist"]),
-        "fog/fog.%04d.vdb: densities to render, of each of these a grid (see docs/snow.md)",
+        "fog/fog.%04d.vdb: densities for rendering, a grid for each of these (see docs/snow.md)",
     )
     .or("[]")
     .concerns(VOLUMES_OUTPUT),
@@ -71,7 +71,7 @@ pub const OUTPUT_KEYS: &[Key] = &[
         "output",
         "snow",
         Kind::Flag,
-        "snow/snow.%04d.vdb: one level set of the base and the grains that rest, on voxels fine enough for these (large)",
+        "snow/snow.%04d.vdb: one level set of the base and the resting grains, on voxels fine enough for the grains (large)",
     )
     .or("false")
     .concerns(VOLUMES_OUTPUT),
@@ -79,7 +79,7 @@ pub const OUTPUT_KEYS: &[Key] = &[
         "output",
         "mesh",
         Kind::Choices(&["ply", "usd"]),
-        "\"ply\", \"usd\": mesh/, the surface of the base in triangles (large)",
+        "\"ply\", \"usd\": mesh/, the triangulated surface of the base (large)",
     )
     .or("[]")
     .concerns(VOLUMES_OUTPUT),
@@ -87,7 +87,7 @@ pub const OUTPUT_KEYS: &[Key] = &[
         "output",
         "objects",
         Kind::Choices(&["usd", "ply"]),
-        "\"usd\", \"ply\": objects/, as they moved, with velocities",
+        "\"usd\", \"ply\": objects/, the moving objects, with velocities",
     )
     .or("[]")
     .concerns(&[("objects", Scope::Output)]),

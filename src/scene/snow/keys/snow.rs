@@ -1,4 +1,4 @@
-//! The keys of `[snow]` and those that it has of each object, and the layer that they describe.
+//! The keys of `[snow]`, the keys of objects that concern the layer, and the layer that they describe.
 
 use super::mist::mist_params;
 use crate::error::Result;
@@ -30,11 +30,11 @@ pub const KEYS: &[Key] = &[
     .or_nothing()
     .begins_with("0.0")
     .concerns(GROUND),
-    Key::new("snow", "area", Kind::Numbers(4, FAR, "m"), "of the plane: x0, z0, x1, z1 (m)")
+    Key::new("snow", "area", Kind::Numbers(4, FAR, "m"), "extent of the plane: x0, z0, x1, z1 (m)")
         .or_nothing()
         .begins_with("[-3.0, -3.0, 3.0, 3.0]")
         .concerns(GROUND),
-    Key::new("snow", "depth", Kind::Number(1.0e-4, 1000.0, "m"), "above ground and static objects (m)")
+    Key::new("snow", "depth", Kind::Number(1.0e-4, 1000.0, "m"), "depth above ground and static objects (m)")
         .or_nothing()
         .begins_with("0.3")
         .concerns(FIRST),
@@ -58,31 +58,31 @@ pub const KEYS: &[Key] = &[
     Key::new("snow", "cell", Kind::Number(CELLS.0, CELLS.1, "m"), "edge of a voxel (m)")
         .begins_with("0.0075")
         .concerns(FIRST),
-    Key::new("snow", "min_crumb", Kind::Whole(0, 10_000), "islands of fewer voxels are taken away; 0 = none")
+    Key::new("snow", "min_crumb", Kind::Whole(0, 10_000), "islands of fewer voxels are removed; 0 = off")
         .or("0")
         .concerns(STEP),
     Key::new(
         "snow.noise",
         "amplitude",
         Kind::Cells(0.0, 32.0),
-        "greatest displacement, outward only (m); 0 = off",
+        "maximum displacement, outward only (m); 0 = off",
     )
     .or_cells(2.0)
     .concerns(STEP),
     Key::new("snow.noise", "size", Kind::Cells(2.0, 10_000.0), "size of the largest features (m)")
         .or_cells(8.0)
         .concerns(STEP),
-    Key::new("snow.noise", "octaves", Kind::Whole(1, 8), "each of half the size of the one before")
+    Key::new("snow.noise", "octaves", Kind::Whole(1, 8), "octaves, each half the size of the one before")
         .or("3")
         .concerns(STEP),
-    Key::new("snow.noise", "seed", Kind::Whole(0, i32::MAX as i64), "another one gives another pattern")
+    Key::new("snow.noise", "seed", Kind::Whole(0, i32::MAX as i64), "another seed gives another pattern")
         .or("0")
         .concerns(STEP),
-    Key::new(OBJECT, "noise", Kind::Flag, "ragged edges of its prints").or("true").concerns(STEP),
+    Key::new(OBJECT, "noise", Kind::Flag, "whether its prints have ragged edges").or("true").concerns(STEP),
 ];
 
 impl Snow {
-    /// The layer that a scene's values describe; none where it has no snow.
+    /// The layer that a scene's values describe; `None` if it has no snow.
     pub(in crate::scene) fn of(values: &Values) -> Option<Self> {
         let cell = values.number("snow.cell")?;
         let path = |key: &str| values.get(key).and_then(Value::path).map(|path| path.to_path_buf());
@@ -99,10 +99,10 @@ impl Snow {
         Some(Self { ground, layer, origin, cell, noise: noise(values)?, min_crumb })
     }
 
-    /// Checks what single keys do not show.
+    /// Checks the keys in combination.
     ///
     /// # Errors
-    /// Keys that exclude each other, or one that others need; noise that would leave islands.
+    /// Keys that exclude each other, or a key without one that it needs; noise that would leave islands.
     pub(in crate::scene) fn check(snow: &Table, values: &Values) -> Result<()> {
         let value = |name: &str| values.get(&format!("snow.{name}"));
         match (value("depth"), value("top")) {
@@ -162,7 +162,7 @@ impl Snow {
     /// Makes the cells `factor` times as large; noise too fine for them becomes coarser.
     ///
     /// # Errors
-    /// Says why it cannot.
+    /// The reason.
     pub(in crate::scene) fn coarsen(
         &self,
         factor: f64,

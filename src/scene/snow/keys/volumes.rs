@@ -1,4 +1,4 @@
-//! What the keys of `[output]` that ask for volumes to render need of the rest of a scene.
+//! Requirements of the `[output]` keys for render volumes on the rest of a scene.
 
 use crate::error::Result;
 use crate::scene::schema::{Table, Values};
@@ -17,7 +17,7 @@ pub struct Needs {
 }
 
 impl Needs {
-    /// Those of a scene.
+    /// The stages for a scene.
     pub fn of(asked: VolumesOutput, values: &Values) -> Self {
         Self {
             base: asked.fog_base || asked.snow || asked.mesh(),
@@ -27,10 +27,10 @@ impl Needs {
     }
 }
 
-/// Checks that a scene has, and writes, what its volumes are made from.
+/// Checks that a scene has, and writes, the data that its volumes are made from.
 ///
 /// # Errors
-/// A part that the scene does not have; files that are not written.
+/// A stage that the scene does not have; files that are not written.
 pub fn check_volumes(table: &Table, values: &Values, output: &Output) -> Result<()> {
     let asked = output.volumes;
     let needs = Needs::of(asked, values);

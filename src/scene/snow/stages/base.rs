@@ -23,25 +23,25 @@ pub struct Base<'a> {
     inputs: &'a Inputs,
 }
 
-/// What a step hands to the writer.
+/// Input of the writer.
 pub struct Step {
     frame: i32,
     changes: Changes,
-    /// The base's file, where it is whole and the writer has no copy of the layer.
+    /// The base's file, if it is a whole one and the writer has no copy of the layer.
     whole: Option<Vec<u8>>,
 }
 
-/// What writes frames.
+/// Writes frames.
 pub struct Writer {
-    /// Gives the threads; its cancel flag does not matter: a frame begun is finished.
+    /// Provides the threads. Its cancel flag is ignored: a frame that was begun is finished.
     ctx: Context,
     half_width: f32,
-    /// The layer as it was after the last step, where whole grids are written.
+    /// The layer after the last step, if whole grids are written.
     copy: Option<Grids>,
 }
 
 impl<'a> Base<'a> {
-    /// That of a scene.
+    /// The stage for a scene.
     pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
         Self { scene, inputs }
     }
@@ -55,7 +55,7 @@ impl<'a> Base<'a> {
         frame == self.scene.shot.frames.first
     }
 
-    /// The whole layer, or what changed of it.
+    /// The whole layer, or its changes.
     fn base_bytes(&self, writer: &Writer, step: &Step, made_from: &str) -> Result<Vec<u8>> {
         if self.scene.output.base_mode == BaseMode::Full {
             return vdb_bytes(self.scene, step.frame, &writer.copy()?.list(), made_from);
@@ -112,7 +112,7 @@ impl Stage for Base<'_> {
         (output.base && output.base_mode == BaseMode::Delta).then_some("base_mode = \"delta\"")
     }
 
-    /// The base of a cache of changes is left out: its files are not whole volumes.
+    /// A base stored as changes is left out: its files are not whole volumes.
     fn volumes(&self) -> Vec<Volume> {
         const BASE: &[Field] = &[
             Field::of("surface", Holds::Distance),
@@ -159,7 +159,7 @@ impl Stepping for Base<'_> {
     fn step(&self, ctx: &Context, layer: &mut BaseLayer, to: &To<'_>) -> Result<Stepped<Step>> {
         let frame = to.frame;
         let time = |frame: i32| f64::from(frame) / self.scene.shot.fps;
-        // The first frame's poses are cut out; nothing has moved yet.
+        // The first frame cuts out the first poses; nothing has moved yet.
         let from = if self.is_first(frame) { frame } else { frame - 1 };
         let moving = self.scene.objects.iter().filter(|object| object.role.moves());
         let removing = self.inputs.bodies.iter().zip(moving).filter(|(_, object)| object.role.removes());
@@ -171,7 +171,7 @@ impl Stepping for Base<'_> {
         })?;
         log_step(frame, &report);
         let changes = layer.take_changes()?;
-        // No copy of the layer is needed for the whole file at the first frame of a cache of changes.
+        // The whole file at the first frame of a cache of changes needs no copy of the layer.
         let whole = match to.made_from {
             Some(made_from) if self.scene.output.base && self.is_first(frame) && !self.copies() => {
                 Some(vdb_bytes(self.scene, frame, &layer.grids().list(), made_from)?)
@@ -218,7 +218,7 @@ impl Writer {
 /// The layer after a frame: from its own file, or from the last whole one and the changes since.
 ///
 /// # Errors
-/// A frame that is not there; a file that is not what was written.
+/// A missing frame; a file that is not what was written.
 pub(in crate::scene::snow) fn grids(ctx: &Context, done: &Stored, frame: i32) -> Result<Grids> {
     let mut frames = done.frames_to(frame)?;
     let whole = frames.next().unwrap_or(frame);
@@ -229,7 +229,7 @@ pub(in crate::scene::snow) fn grids(ctx: &Context, done: &Stored, frame: i32) ->
     Ok(grids)
 }
 
-/// Takes a layer from the frame before to a frame that keeps its changes.
+/// Updates a layer from the frame before to a frame that stores its changes.
 pub(in crate::scene::snow) fn follow(
     ctx: &Context,
     done: &Stored,
@@ -254,7 +254,7 @@ fn vdb_bytes(scene: &Scene, frame: i32, grids: &[&FloatGrid], made_from: &str) -
     to_bytes(grids, &WriteOptions { metadata, half: scene.output.half, ..WriteOptions::default() })
 }
 
-/// What every .vdb file of a shot says of itself.
+/// Metadata of every .vdb file of a shot.
 pub(in crate::scene::snow) fn metadata(
     scene: &Scene,
     frame: i32,

@@ -241,8 +241,8 @@ fn follow(mut points: Points, mut changed: Points, gone: &[Run]) -> Result<Point
 /// Consecutive identities.
 type Run = RangeInclusive<i64>;
 
-/// What the file of a frame states about the previous grains: those that are gone, and [`print_of`] all of them, if present.
-/// None if the file is complete.
+/// The record of the previous grains in a frame's file: the identities that are gone, and [`print_of`] all of them, if present. `None` if
+/// the file is complete.
 fn told_of_before(
     frame: i32,
     metadata: &[(String, MetaValue)],

@@ -33,11 +33,11 @@ pub struct Grains<'a> {
     inputs: &'a Inputs,
     /// Moving objects as the grains see them.
     objects: Vec<Object<'a>>,
-    /// What does not move, once a frame needs it.
+    /// Data that does not move, made when a frame needs it.
     still: OnceLock<Still<'a>>,
 }
 
-/// What does not move.
+/// Data that does not move.
 struct Still<'a> {
     /// The ground's mesh, and static objects that are solids.
     ground: Vec<Ground>,
@@ -59,7 +59,7 @@ pub struct State {
     grains: grains::Grains,
     /// The base layer after a frame.
     layer: Option<(i32, Grids)>,
-    /// Whether it was said that grains fell past the edge of the ground.
+    /// Whether it was logged that grains fell past the edge of the ground.
     has_told: bool,
 }
 

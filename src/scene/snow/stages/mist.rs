@@ -27,7 +27,7 @@ use crate::sweep::Body;
 use crate::vdb::file::{WriteOptions, any_to_bytes};
 use crate::vdb::{AnyGrid, FloatGrid, GridRef, VectorGrid, file};
 
-/// Name of the stage, and kind of its files.
+/// Name of the stage, and of the kind of its files.
 const NAME: &str = "mist";
 /// Name of the grid of densities in its files.
 const DENSITY: &str = "density";
@@ -41,13 +41,13 @@ pub struct Mist<'a> {
 /// State carried from frame to frame.
 pub struct State {
     mist: mist::Mist,
-    /// Static objects, and the ground where it is a mesh.
+    /// Static objects, and the ground if it is a mesh.
     statics: Vec<Body>,
     /// The grains after a frame.
     grains: Whole,
-    /// Where they were after a frame, that before the one which is made next.
+    /// Grains' positions and velocities after a frame: the one before the frame being made.
     starts: Option<(i32, Vec<(i64, Start)>)>,
-    /// The base layer after a frame, the one before that which is made next.
+    /// The base layer after a frame: the one before the frame being made.
     layer: Option<(i32, base_layer::Grids)>,
 }
 
@@ -60,7 +60,7 @@ pub struct Writer {
     ctx: Context,
 }
 
-/// The file of a scene's wind, where it is a grid.
+/// The file of a scene's wind, if it is a grid.
 pub(in crate::scene::snow) fn wind_file(scene: &Scene) -> Option<&Path> {
     scene.values.get("mist.wind").and_then(|value| value.path())
 }
@@ -101,7 +101,7 @@ impl<'a> Mist<'a> {
         mist_params(&self.scene.values).ok_or_else(|| Error::Internal("the scene has no mist".into()))
     }
 
-    /// An error of the mist, with the scene.
+    /// An error of the mist, with the scene's name.
     fn told(&self, error: Error) -> Error {
         match error {
             Error::Argument(what) => Error::file(&self.scene.path, format!("mist: {what}")),
@@ -136,11 +136,11 @@ impl<'a> Mist<'a> {
         let frame = to.frame;
         let sources = self.sources(ctx, state, grains, frame)?;
         let raises = sources.iter().any(|source| source.raises(state.mist.params()));
-        // Air without mist is not computed: what it flows around does not matter.
+        // Air without mist is not computed, so that its obstacles do not matter.
         if !raises && state.mist.flow().tiles().active() == 0 {
             return Ok(StepReport::default());
         }
-        // What objects remove in this frame bounds the air until they are there: see `Surroundings`.
+        // Snow removed in this frame bounds the air until the objects reach it: see `Surroundings`.
         self.go_to(ctx, state, base, frame - 1)?;
         let State { mist, statics, layer, .. } = state;
         let moving = self.scene.objects.iter().filter(|object| object.role.moves());
@@ -169,7 +169,7 @@ impl<'a> Mist<'a> {
         mist.step(ctx, &around, times).map_err(|error| self.told(error))
     }
 
-    /// Takes the base layer to a frame.
+    /// Advances the base layer to a frame.
     fn go_to(&self, ctx: &Context, state: &mut State, base: &Stored, frame: i32) -> Result<()> {
         let layer = match state.layer.take() {
             Some((at, mut layer)) if at == frame - 1 && base.keeps_changes(frame) => {
@@ -183,9 +183,9 @@ impl<'a> Mist<'a> {
     }
 }
 
-/// The identities of grains, ascending, with where they are.
+/// The identities of grains, ascending, with their positions and velocities.
 fn starts_of(points: &Points) -> Result<Vec<(i64, Start)>> {
-    // A file of no points keeps no attributes.
+    // A file without points has no attributes.
     if points.count() == 0 {
         return Ok(Vec::new());
     }
@@ -201,7 +201,7 @@ fn attribute<'a>(points: &'a Points, name: &str) -> Result<&'a Values> {
     points.attribute(name).ok_or_else(|| Error::argument(format!("have no attribute {name}")))
 }
 
-/// Grains after a frame as sources of mist, but for those that are too slow; from where they were before it.
+/// Grains after a frame as sources of mist, with their positions before it; without those that are too slow.
 fn sources_of(points: &Points, starts: &[(i64, Start)], frame: i32, params: &Params) -> Result<Vec<Source>> {
     if points.count() == 0 {
         return Ok(Vec::new());
@@ -238,7 +238,7 @@ fn sources_of(points: &Points, starts: &[(i64, Start)], frame: i32, params: &Par
     Ok((0..points.count()).map(source).filter(|source| source.raises(params)).collect())
 }
 
-/// A mesh as a body that stands still; none where it has no triangles.
+/// A mesh as a body at rest; `None` if it has no triangles.
 fn still(mesh: &TriMesh) -> Option<Result<Body>> {
     let body = || Body::new(Box::new(Rigid::new(mesh.clone(), Keys::default())), 0.0);
     (!mesh.triangles.is_empty()).then(body)

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::scene::run::Stored;
 use crate::snow::base_layer::Grids;
 
-/// The whole layers of a cache, one frame after another.
+/// The whole layers of a cache, frame by frame.
 pub struct Rebuild {
     stored: Stored,
     at: Option<(i32, Grids)>,
@@ -23,15 +23,15 @@ impl Rebuild {
         Ok(Self { stored: Stored::read(folder, "base")?, at: None })
     }
 
-    /// The frames that are there.
+    /// The stored frames.
     pub fn stored(&self) -> &Stored {
         &self.stored
     }
 
-    /// The layer after a frame; frames in ascending order cost one file each, those between them that hold changes too.
+    /// The layer after a frame. Frames in ascending order cost one file each; skipped frames that store changes are read too.
     ///
     /// # Errors
-    /// A frame that is not there; a file that is not what was written.
+    /// A missing frame; a file that is not what was written.
     pub fn layer(&mut self, ctx: &Context, frame: i32) -> Result<&Grids> {
         let follows = |before: i32| {
             before <= frame && (before + 1..=frame).all(|between| self.stored.keeps_changes(between))

@@ -1,4 +1,4 @@
-//! What the base layer depends on.
+//! The settings of the base layer.
 
 use crate::error::Result;
 use crate::io::records::input_hashes::Seen;
@@ -8,7 +8,7 @@ use crate::scene::schema::keys;
 use crate::scene::schema::keys::settings_of;
 use crate::scene::{Layer, Role, Scene, System, run};
 
-/// The settings that the base depends on. Of the frames only the first counts: a shot may grow.
+/// The settings that the base depends on. Of the frames only the first counts: a shot may be extended.
 ///
 /// # Errors
 /// An input that cannot be read.
@@ -17,15 +17,15 @@ pub(in crate::scene::snow) fn of_base(scene: &Scene, seen: &Seen) -> Result<Sett
     for (key, path) in scene.snow.iter().flat_map(|snow| snow.files()) {
         settings.insert(key.into(), format!("{}{}", run::CONTENT, seen.hash(path)?));
     }
-    // A layer that is given is as it is, whatever it lies on.
+    // A given layer does not depend on what it lies on.
     if scene.snow.as_ref().is_some_and(|snow| matches!(snow.layer, Layer::Grid(_))) {
         settings.remove("snow.ground");
     }
     Ok(settings)
 }
 
-/// The settings that make the layer before the first frame: what was kept cannot become another layer. Static objects
-/// are counted by themselves: others may come and go.
+/// The settings that determine the layer before the first frame: stored frames cannot continue another layer. Static objects are numbered
+/// separately, as other objects may be added or removed.
 pub(in crate::scene::snow) fn of_layer(all: &Settings) -> Settings {
     let is_first = |key: &str| declared(key).is_some_and(|key| key.scope("base") == Some(Scope::First));
     let of_snow = all.iter().filter(|(key, _)| is_first(key));
@@ -40,7 +40,7 @@ pub(in crate::scene::snow) fn of_layer(all: &Settings) -> Settings {
             if key != "role" {
                 out.insert(format!("static object {}: {key}", position + 1), value.clone());
             }
-            // When a clip starts depends on it.
+            // The start of a clip depends on it.
             if key == "clip" || key == "loop" {
                 out.extend(all.get("shot.fps").map(|fps| ("shot.fps".to_string(), fps.clone())));
             }

@@ -1,4 +1,4 @@
-//! The stage `volumes`: what renderers want of base, grains and mist. A frame depends on no frame before it.
+//! The stage `volumes`: data of base, grains and mist for renderers. A frame depends on no frame before it.
 
 use serde_json::{Map, Value, json};
 
@@ -33,7 +33,7 @@ pub struct Volumes<'a> {
     needs: Needs,
 }
 
-/// What it keeps from frame to frame, only to read less.
+/// Kept from frame to frame only to read less.
 #[derive(Default)]
 pub struct State {
     /// The base after a frame.
@@ -41,7 +41,7 @@ pub struct State {
     grains: Whole,
 }
 
-/// What a frame is made from.
+/// Inputs of a frame.
 struct Source<'s> {
     frame: i32,
     base: Option<&'s FloatGrid>,
@@ -49,8 +49,8 @@ struct Source<'s> {
     mist: Option<FloatGrid>,
 }
 
-/// Files of a frame: kinds, extensions and contents. Grids wait for the writer packed: those of several frames would take too
-/// much memory.
+/// Files of a frame: kinds, extensions and contents. Grids are packed while they wait for the writer: those of several frames would take
+/// too much memory.
 type Files = Vec<(&'static str, &'static str, Vec<u8>)>;
 
 /// Manifest shared by the clips in `mesh/`.
@@ -65,14 +65,14 @@ impl<'a> Volumes<'a> {
         Self { scene, inputs, asked, needs: Needs::of(asked, &scene.values) }
     }
 
-    /// The frames of a stage that is read.
+    /// The frames of an upstream stage.
     fn stored<'s>(&self, upstream: &[&'s Stored], name: &str) -> Result<&'s Stored> {
         let index = self.upstream().iter().position(|upstream| *upstream == name);
         let stored = index.and_then(|index| upstream.get(index));
         stored.copied().ok_or_else(|| Error::Internal(format!("volumes do not read {name}")))
     }
 
-    /// Reads what a frame is made from.
+    /// Reads the inputs of a frame.
     fn read<'s>(&self, ctx: &Context, state: &'s mut State, to: &To<'_>) -> Result<Source<'s>> {
         let State { layer, grains } = state;
         let mut source = Source { frame: to.frame, base: None, grains: None, mist: None };
@@ -118,12 +118,12 @@ impl<'a> Volumes<'a> {
         Ok(grids)
     }
 
-    /// Unites the base with the grains that rest.
+    /// Unites the base with resting grains.
     fn snow(&self, ctx: &Context, surface: &FloatGrid, grains: Option<&Points>) -> Result<FloatGrid> {
         let Some(points) = grains else { return surface.deep_copy() };
         let resting = match points.attribute("active") {
             Some(Values::Bool(active)) => positions(points, |point| !active.get(point)),
-            // A file of no points has no attributes.
+            // A file without points has no attributes.
             _ => Vec::new(),
         };
         united::unite(ctx, surface, &resting, self.radius())
@@ -134,7 +134,7 @@ impl<'a> Volumes<'a> {
         params(self.scene, self.inputs.snow.cell).radius
     }
 
-    /// Makes a frame's files and what is reported of them.
+    /// Makes a frame's files and its report.
     fn make(
         &self,
         ctx: &Context,
@@ -150,7 +150,7 @@ impl<'a> Volumes<'a> {
             let grids = ctx.phase("fog", || self.fog(ctx, source))?;
             let voxels: u64 = grids.iter().map(FloatGrid::active_voxels).sum();
             results.insert("fog_voxels".into(), json!(voxels));
-            // Renderers take no more than 16 bits of a density.
+            // Renderers use at most 16 bits of a density.
             let options = WriteOptions { half: true, ..options.clone() };
             let grids: Vec<&FloatGrid> = grids.iter().collect();
             files.push(("fog", "vdb", ctx.phase("pack", || to_bytes(&grids, &options))?));
@@ -196,7 +196,7 @@ fn positions(points: &Points, is_wanted: impl Fn(usize) -> bool) -> Vec<DVec3> {
     (0..points.count()).filter(|point| is_wanted(*point)).map(|point| points.position(point)).collect()
 }
 
-/// Names of the fog's grids of base, grains and mist. One that is alone has the name that smoke shaders look for.
+/// Names of the fog's grids of base, grains and mist. A single one has the name that smoke shaders look for.
 fn fog_names(asked: VolumesOutput) -> [Option<&'static str>; 3] {
     let parts = [(asked.fog_base, "base"), (asked.fog_grains, "grains"), (asked.fog_mist, "mist")];
     let is_alone = parts.iter().filter(|(is_asked, _)| *is_asked).count() == 1;
@@ -338,7 +338,7 @@ impl Stepping for Volumes<'_> {
     }
 }
 
-/// The greatest count of grains after a frame up to `last`, by the reports that are there.
+/// The maximum count of grains after any frame up to `last`, from the existing reports.
 fn most_grains(grains: &Stored, last: i32) -> Result<u64> {
     let mut most = 0;
     for frame in grains.frames().filter(|frame| *frame <= last) {

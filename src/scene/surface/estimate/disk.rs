@@ -1,42 +1,42 @@
-//! How much space the files of a mesh that follows a liquid will need.
+//! Estimates the disk space of a mesh that follows a liquid.
 
 use crate::geometry::mesh::attributes::On;
 use crate::geometry::{DetailedMesh, MeshArray};
 use crate::scene::surface::Files;
 
-/// Bytes of a 32-bit float in a text, with what stands around it.
+/// Bytes of a 32-bit float in text, with its separators.
 const TEXT: u64 = 12;
-/// Bytes around an index in a text.
+/// Bytes around an index in text.
 const AROUND_INDEX: u64 = 2;
-/// Bytes of a vertex in the exact state: its position in 64 bits, the distance that it keeps, its flag. Positions hardly pack.
+/// Bytes of a vertex in the exact state: its position in 64 bits, the distance that it keeps, its flag. Positions hardly compress.
 const STATE_PER_VERTEX: u64 = 3 * 8 + 4 + 1;
-/// More of a mesh that is rebuilt: its displacement since a reference.
+/// Additional bytes if the mesh is rebuilt: its displacement since a reference.
 const DRIFT_PER_VERTEX: u64 = 3 * 4;
-/// Bytes of a frame's report and record; parts that the mesh does not cover, of which up to a hundred are listed, make it more.
+/// Bytes of a frame's report and record; parts that the mesh does not cover, of which up to a hundred are listed, add to that.
 const RECORDS: u64 = 6000;
 
-/// Bytes of a frame's files; 0: that kind is not written.
+/// Bytes of a frame's files; 0: not written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::scene::surface) struct FrameSize {
     ply: u64,
     obj: u64,
     usd: u64,
-    /// The exact state, which every frame keeps.
+    /// The exact state, stored for every frame.
     state: u64,
 }
 
 impl FrameSize {
-    /// Estimates it for a mesh, which is rebuilt or not.
+    /// Estimates the files of a mesh, which is rebuilt or not.
     pub fn of(output: Files, is_rebuilt: bool, detail: &DetailedMesh) -> Self {
         let [vertices, triangles] = counts(detail);
         let (positions, corners) = detail.uvs.as_ref().map_or((0, 0), |uvs| {
             (uvs.positions.len() as u64, uvs.corners.as_ref().map_or(0, |corners| corners.len() as u64))
         });
         let index = u64::from(vertices.max(positions).max(1).ilog10()) + 1 + AROUND_INDEX;
-        // In .obj files every corner names its texture coordinates, where there are some.
+        // In .obj files every corner has an index of its texture coordinates, if there are any.
         let named = if positions > 0 { 6 * triangles } else { 3 * triangles };
         let obj = TEXT * (3 * vertices + 2 * positions) + index * named;
-        // Positions, velocities and arrays; each face has its count of corners too.
+        // Positions, velocities and arrays; each face also has its count of corners.
         let own: usize = detail.arrays.iter().map(|array| array.values.len()).sum();
         let delta = if output.delta { vertices } else { 0 };
         let flagged = if output.flagged { vertices } else { 0 };
@@ -53,7 +53,7 @@ impl FrameSize {
         }
     }
 
-    /// Bytes of the largest file but the state: they are written one after the other.
+    /// Bytes of the largest file except the state: they are written one after the other.
     pub fn largest(&self) -> u64 {
         self.ply.max(self.obj).max(self.usd)
     }
@@ -75,7 +75,7 @@ fn ply(output: Files, detail: &DetailedMesh) -> u64 {
     let attributes =
         12 * u64::from(output.velocities) + 4 * u64::from(output.delta) + u64::from(output.flagged);
     let of_face = u64::from(output.rebuilt);
-    // Lists begin with a byte that counts: three indices, and the six coordinates of corners where there are seams.
+    // Lists begin with a byte for their length: three indices, and with seams the six coordinates of corners.
     let uvs = detail.uvs.as_ref().map_or(0, |uvs| match uvs.corners {
         Some(_) => (1 + 6 * 4) * triangles,
         None => 2 * 4 * vertices,

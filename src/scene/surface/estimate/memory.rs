@@ -1,40 +1,40 @@
-//! How much memory a mesh that follows a liquid will take, before any of it is taken.
+//! Memory of a mesh that follows a liquid, estimated before any is allocated.
 //!
-//! Bytes of each item, from the structures that hold them; lengths in spacings, r:
+//! Bytes of each item, from the structures that hold it; lengths in spacings, r:
 //!
-//! | item | of what | bytes |
+//! | item | contents | bytes |
 //! |---|---|---|
 //! | particle of a frame in memory | position 24, velocity 12, id 8 | 24 to 44 |
-//! | particle of a step | both ends of its way 48, rank 8, velocities at both ends 48 | 56 to 104 |
-//! | particle, while vertices are carried | positions before and after 48, in its cell 20 and while sorted 24, its way 12 | 104 |
+//! | particle of a step | both ends of its path 48, rank 8, velocities at both ends 48 | 56 to 104 |
+//! | particle, while vertices are carried | positions before and after 48, in its cell 20 and while sorted 24, its displacement 12 | 104 |
 //! | node of the grid of maps | coordinate 12, map 112 twice | 236 |
 //! | patch of phi | values twice 512, positions in lists and tables 100, crossings 220 | 832 |
 //! | vertex of the particles' surface | position 12 twice, patch 4, connection 8, 2 triangles: twice 12, corners 36 | 156 |
 //! | block of distances | values twice 4096, neighbours and slot 200 | 4296 |
-//! | vertex of the mesh | in three frames 102, projection 130, what is written 87 and 16, in 32 bits twice 24 | 359 |
+//! | vertex of the mesh | in three frames 102, projection 130, files 87 and 16, in 32 bits twice 24 | 359 |
 //! | triangle of the mesh | in six copies | 72 |
 //!
-//! And where the mesh is rebuilt:
+//! Additionally, if the mesh is rebuilt:
 //!
-//! | item | of what | bytes |
+//! | item | contents | bytes |
 //! |---|---|---|
-//! | patch of phi, vertex of the particles' surface | once more: those of the next frame | 832, 156 |
+//! | patch of phi, vertex of the particles' surface | again, for the next frame | 832, 156 |
 //! | particle of the next frame | position 24, in its cell 20 and while sorted 24 | 68 |
-//! | face of a cell, by area, that the mesh passes through | up to 1.7 edges of the grid, while they are sorted 100 each | 170 |
-//! | block of Gamma | 512 nodes: value 4, in lists with room to grow 64, equation 125 | 98816 |
+//! | face of a cell, by area, that the mesh crosses | up to 1.7 edges of the grid, 100 each while they are sorted | 170 |
+//! | block of Gamma | 512 nodes: value 4, in growing lists 64, equation 125 | 98816 |
 //! | triangle near such blocks | in five of them, in 32 bits 132 and a number 4 | 680 |
-//! | vertex of the mesh | in cells 24 and units 12, as cut 25, as it was and is 48, names 12, sizes and drifts in four copies 80, state 36 | 237 |
-//! | triangle of the mesh | on the grid 12, as cut 20, while its edges are looked at 82, state 36 | 150 |
-//! | vertex of the mesh in a coming frame, but for the next | position 24, distance 4, flags 2, size and drift 20, velocities 24, name 8 | 82 |
+//! | vertex of the mesh | in cells 24, units 12, as cut 25, before and after 48, names 12, sizes and drifts in four copies 80, state 36 | 237 |
+//! | triangle of the mesh | on the grid 12, as cut 20, while its edges are checked 82, state 36 | 150 |
+//! | vertex of the mesh in a coming frame, except the next | position 24, distance 4, flags 2, size and drift 20, velocities 24, name 8 | 82 |
 //! | triangle of such a mesh | corners twice 24, the mask 8 | 32 |
-//! | particle, where a mesh with ids carries something | its id and its first position | 32 |
+//! | particle, if a mesh with ids carries data | its id and its first position | 32 |
 //! | triangle of the first mesh, or of the last edited one, then | in a tree | 84 |
 //! | number that the mesh carries | in two frames 16, state 16; 8 in each coming frame | 32 |
-//! | vertex of a mesh that carries something | where it has its numbers from | 40 |
-//! | triangle of such a mesh | where it has its numbers from 80, in a tree 84 | 164 |
+//! | vertex of a mesh that carries data | source of its numbers | 40 |
+//! | triangle of such a mesh | source of its numbers 80, in a tree 84 | 164 |
 //!
-//! Gamma is gone when what the mesh carries is brought to what it became: the larger of the two counts. How much of a mesh does not
-//! fit is not known beforehand: a quarter is counted.
+//! Gamma is freed before the carried data are transferred to the changed mesh: the larger of the two counts. How much of a mesh does not
+//! match the liquid is not known beforehand: a quarter is assumed.
 
 use rayon::prelude::*;
 
@@ -48,9 +48,9 @@ use crate::surface::Particles;
 const FIXED: f64 = 64e6;
 /// Bytes of a particle in each frame in memory: position, velocity, id.
 const PARTICLE: [f64; 3] = [24.0, 12.0, 8.0];
-/// Bytes of a particle's way in a step, and of the velocities at both ends of it.
+/// Bytes of a particle's path in a step, and of the velocities at both ends of it.
 const WAY: [f64; 2] = [56.0, 48.0];
-/// Bytes of a particle and of a node while the mesh is carried along.
+/// Bytes of a particle and of a node while the mesh is carried.
 const CARRYING: [f64; 2] = [104.0, 236.0];
 /// Bytes of a patch, of a vertex of the particles' surface, and of a block of distances.
 const SURFACE: [f64; 3] = [832.0, 156.0, 4296.0];
@@ -59,43 +59,43 @@ const MESH: [f64; 2] = [359.0, 72.0];
 /// Bytes of a number that the mesh carries, in memory.
 const CARRIED: f64 = 8.0;
 
-/// Where the mesh is rebuilt: bytes of a vertex and of a triangle of the mesh in each coming frame but the next.
+/// If the mesh is rebuilt: bytes of a vertex and of a triangle of the mesh in each coming frame except the next.
 const COMING: [f64; 2] = [82.0, 32.0];
 /// Bytes of a particle's first position with its id, and of a triangle in a tree.
 const REST: f64 = 32.0;
 const TREE: f64 = 84.0;
 /// Bytes of a particle of the next frame, whose surface is made at the same time.
 const AHEAD: f64 = 68.0;
-/// Bytes of a face of a cell that the mesh passes through, of a block of Gamma, and of a triangle near such blocks.
+/// Bytes of a face of a cell that the mesh crosses, of a block of Gamma, and of a triangle near such blocks.
 const CUT: [f64; 3] = [170.0, 98816.0, 680.0];
-/// More bytes of a vertex and of a triangle of the mesh.
+/// Additional bytes of a vertex and of a triangle of the mesh.
 const REBUILT: [f64; 2] = [237.0, 150.0];
-/// More bytes of a number that the mesh carries, and those of a vertex and of a triangle of a mesh that carries any.
+/// Additional bytes of a number that the mesh carries, and of a vertex and of a triangle of a mesh that carries any.
 const CARRIED_ON: [f64; 3] = [32.0, 40.0, 164.0];
-/// Share of the mesh that does not fit in a frame: so much of a dam break does while it splashes. Where more does, it takes more.
+/// Share of the mesh that does not match the liquid in a frame: as in a dam break while it splashes. More mismatch takes more memory.
 const UNFIT: f64 = 0.25;
-/// Blocks of Gamma for each face of a cell in which the mesh does not fit: its own, 8 cells wide, and one on each side.
+/// Blocks of Gamma for each face of a cell where the mesh does not match: its own, 8 cells wide, and one on each side.
 const GAMMA: f64 = 3.0 / 64.0;
 
-/// Particles in a cube of two spacings, of which there are 8 in a liquid, from which on it is full.
+/// Particles from which a cube of two spacings counts as full; in a liquid it holds 8.
 const FULL: usize = 4;
 /// Nodes of the grid of maps for each cube of the shell.
 const NODES: f64 = 4.0;
-/// How far distances reach on each side (r): enough for detail of half a spacing.
+/// Range of distances on each side (r): enough for detail of half a spacing.
 const REACH: f64 = 2.0;
 
-/// The most that the particles of any file take.
+/// Maxima over the particles of all files.
 #[derive(Debug, Default)]
 pub(in crate::scene::surface) struct Most {
     /// Bytes of a frame's particles.
     frame: f64,
-    /// Bytes of their ways.
+    /// Bytes of their paths.
     ways: f64,
     /// Bytes of the work on them.
     work: f64,
-    /// Bytes of ids and positions that stay, for textures.
+    /// Bytes of ids and positions that are kept, for textures.
     rest: f64,
-    /// Bytes of their surface, made early.
+    /// Bytes of their surface, made ahead.
     ahead: f64,
     /// Area of their surface (faces of cells).
     area: f64,
@@ -104,7 +104,7 @@ pub(in crate::scene::surface) struct Most {
 }
 
 impl Most {
-    /// Counts the particles of a file, whose spacing is `spacing` (m), with cells of `cell` (r).
+    /// Adds the particles of a file, with a spacing of `spacing` (m) and cells of `cell` (r).
     pub fn add(&mut self, particles: &Particles, spacing: f64, cell: f64) {
         let count = particles.positions.len() as f64;
         let (has_ids, has_velocities) = (!particles.ids.is_empty(), !particles.velocities.is_empty());
@@ -122,10 +122,10 @@ impl Most {
         self.edge = cell * spacing;
     }
 
-    /// Estimates the memory (bytes) of a run over so many files.
+    /// Estimates the memory (bytes) of a run over `files` files.
     pub fn estimate(&self, surface: &Surface, files: usize, detail: &DetailedMesh, frame: &FrameSize) -> u64 {
         let is_between = surface.speed.fract() != 0.0 || surface.offset.fract() != 0.0;
-        // The first frame's stay there; between two files both ends of a step are interpolated.
+        // The particles of the first frame are kept; between two files both ends of a step are interpolated.
         let held = files.min(KEPT) + 1 + if is_between { 2 } else { 0 };
         let mesh = of_both(counts(detail), MESH) + numbers(detail) * CARRIED;
         let particles = held as f64 * self.frame + self.ways + self.work;
@@ -133,9 +133,9 @@ impl Most {
         (FIXED + particles + mesh + rebuilding) as u64 + frame.largest()
     }
 
-    /// More bytes where the mesh is rebuilt, and so many frames after the next are kept.
+    /// Additional bytes if the mesh is rebuilt, with `coming` frames kept after the next.
     ///
-    /// It grows with the particles' surface, by a vertex and two triangles for each face of a cell.
+    /// The mesh grows with the particles' surface, by a vertex and two triangles for each face of a cell.
     fn rebuilding(&self, detail: &DetailedMesh, coming: i32) -> f64 {
         let own = detail.mesh.area() / self.edge.powi(2);
         let grown = (self.area - own).max(0.0);
@@ -162,7 +162,7 @@ fn counts(detail: &DetailedMesh) -> [f64; 2] {
     [detail.mesh.positions.len(), detail.mesh.triangles.len()].map(|count| count as f64)
 }
 
-/// Count of the numbers that a mesh carries: pairs of texture coordinates, and two indices of these, count as one.
+/// Count of the numbers that a mesh carries: a pair of texture coordinates, or of indices into these, counts as one.
 fn numbers(detail: &DetailedMesh) -> f64 {
     let arrays: usize = detail.arrays.iter().map(|array| array.values.len()).sum();
     let uvs = detail.uvs.as_ref().map_or(0, |uvs| {
@@ -171,23 +171,23 @@ fn numbers(detail: &DetailedMesh) -> f64 {
     (arrays + uvs) as f64
 }
 
-/// Bytes of so many vertices and triangles.
+/// Bytes of these counts of vertices and triangles.
 fn of_both(counts: [f64; 2], bytes: [f64; 2]) -> f64 {
     counts[0] * bytes[0] + counts[1] * bytes[1]
 }
 
-/// Bytes of the work on so many particles whose shell has so many cubes, with cells of `cell` (r): the mesh is carried along, then
-/// the particles' surface and the distances from it are made.
+/// Bytes of the work on particles whose shell has `shell` cubes, with cells of `cell` (r): the mesh is carried along, then the particles'
+/// surface and the distances from it are computed.
 fn work(particles: f64, shell: f64, cell: f64) -> f64 {
     let carrying = CARRYING[0] * particles + CARRYING[1] * NODES * shell;
     let making: f64 = surface(shell, cell).iter().zip(SURFACE).map(|(count, bytes)| count * bytes).sum();
     carrying.max(making)
 }
 
-/// Counts of patches, of vertices and of blocks of distances of a surface whose shell has so many cubes, with cells of `cell` (r).
+/// Counts of patches, of vertices and of blocks of distances of a surface whose shell has `shell` cubes, with cells of `cell` (r).
 ///
-/// Over a level surface the shell is two cubes thick. Patches of 4 cells lie within 2 r of it on both sides, each cell of its area
-/// has one vertex, and blocks of 8 cells reach as far as distances and half their edge; drops have twice as many blocks.
+/// Over a level surface the shell is two cubes thick. Patches of 4 cells lie within 2 r of it on both sides, each cell of its area has one
+/// vertex, and blocks of 8 cells extend as far as distances plus half their edge; drops have twice as many blocks.
 fn surface(shell: f64, cell: f64) -> [f64; 3] {
     let patches = shell * (1.0 + cell) / (12.0 * cell.powi(3));
     let vertices = shell * 2.0 / cell.powi(2);
@@ -195,10 +195,10 @@ fn surface(shell: f64, cell: f64) -> [f64; 3] {
     [patches, vertices, blocks]
 }
 
-/// Count of the cubes of two spacings (m) around the surface of particles at positions (m): those with particles and those beside
-/// them, but for those that are full among full ones.
+/// Number of cubes of two spacings (m) around the surface of particles at positions (m): those with particles and their neighbours, except
+/// full cubes among full ones.
 fn shell(positions: &[DVec3], spacing: f64) -> usize {
-    // Farther cubes are refused later.
+    // Positions farther away are refused later.
     const FARTHEST: f64 = 1e9;
     let cube_of = |position: &DVec3| {
         [0, 1, 2].map(|axis| (position[axis] / (2.0 * spacing)).floor().clamp(-FARTHEST, FARTHEST) as i32)
@@ -211,7 +211,7 @@ fn shell(positions: &[DVec3], spacing: f64) -> usize {
     let is_inside = |cube: &[i32; 3]| {
         (-1..=1).all(|x| {
             (-1..=1).all(|y| {
-                // The three along z are neighbours in the order.
+                // The three along z are adjacent in the order.
                 let low = [cube[0] + x, cube[1] + y, cube[2] - 1];
                 let at = full.partition_point(|other| *other < low);
                 full.get(at + 2) == Some(&[low[0], low[1], low[2] + 2])
@@ -240,7 +240,7 @@ mod tests {
     use crate::mesh_repair::Source;
     use crate::surface::Node;
 
-    /// Particles in a cube of so many spacings.
+    /// Particles in a cube with a side of `side` spacings.
     fn block(side: usize) -> Vec<DVec3> {
         let at = |n: usize| [n / (side * side), n / side % side, n % side].map(|x| x as f64 + 0.5);
         (0..side.pow(3)).map(|n| DVec3::from(at(n))).collect()
@@ -264,7 +264,7 @@ mod tests {
         assert!(work(8000.0, 8000.0 * 27.0, 0.5) > 10.0 * work(8000.0, cube, 0.5));
     }
 
-    /// What rebuilding a cube's mesh takes, with particles at these positions, on cells of `cell` (spacings).
+    /// The bytes for rebuilding a cube's mesh, with particles at these positions, on cells of `cell` (spacings).
     fn rebuilding(positions: Vec<DVec3>, cell: f64, detail: &DetailedMesh) -> f64 {
         let mut most = Most::default();
         most.add(&Particles { positions, ..Particles::default() }, 1.0, cell);
@@ -277,7 +277,7 @@ mod tests {
         let calm = rebuilding(block(20), 0.5, &cube);
         // A quarter of 9600 faces of cells is in 112 blocks.
         assert!(calm > 112.0 * CUT[1] + 9600.0 * CUT[0], "{calm}");
-        // As many particles in a sheet.
+        // The same number of particles in a sheet.
         let sheet = (0..8000).map(|n| DVec3::new(f64::from(n / 90), 0.5, f64::from(n % 90))).collect();
         let spread = rebuilding(sheet, 0.5, &cube);
         assert!(spread > 2.0 * calm, "{spread} after {calm}");
@@ -297,7 +297,7 @@ mod tests {
         let finer = of(&detail) - plain;
         let own = 3000.0 * REBUILT[0] + 6000.0 * (REBUILT[1] + UNFIT * CUT[2]);
         assert!((finer - own).abs() < 1.0, "{finer} is not {own}");
-        // The first mesh's tree; little is brought to the mesh when Gamma is gone, but a million numbers are more than that.
+        // The first mesh's tree; when Gamma is freed, the transfer takes little, but more for a million numbers.
         let array = |count: usize| MeshArray {
             name: "mask".into(),
             on: On::Vertices,
@@ -313,7 +313,7 @@ mod tests {
 
     #[test]
     fn items_are_as_large_as_the_table_says() {
-        // A node of Gamma, and where its value is: with half as much again to grow and a result of 4 bytes that is 64.
+        // A node of Gamma and the index of its value: with half as much again for growth and a result of 4 bytes, 64.
         assert_eq!(size_of::<Node>() + size_of::<(usize, usize)>(), 40);
         // A triangle as cut: corners and source.
         assert_eq!(size_of::<[u32; 3]>() + size_of::<Source>(), 20);

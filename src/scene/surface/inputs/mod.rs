@@ -24,37 +24,37 @@ use crate::scene::Scene;
 use crate::surface::{Implicit, Isosurface, Particles, estimate_spacing, rough_spacing};
 use particle_times::Liquid;
 
-/// Arrays of the mesh that are written anew in each frame, and those that a moving mesh does not keep.
+/// Arrays that every frame writes anew, and those that a moving mesh cannot keep.
 pub(super) const REPLACED: [&str; 9] = ["vx", "vy", "vz", "delta", "flagged", "rebuilt", "nx", "ny", "nz"];
-/// How many times as large as the estimate, or as small, a spacing is that looks like a mistake.
+/// A spacing this many times as large or as small as the estimate is probably a mistake.
 const ODD: f64 = 2.0;
 
-/// What a scene's files hold.
+/// Contents of a scene's files.
 pub struct Inputs {
-    /// The mesh at the first frame that has particles (m), with what it carries.
+    /// The mesh at the first frame that has particles (m), with the data that it carries.
     pub mesh: Arc<DetailedMesh>,
-    /// Share of each vertex' detail that never fades; empty: none.
+    /// Detail retention of each vertex: the share that never fades; empty: none.
     pub(super) lasting: Vec<f32>,
     /// Initial distance between particles (m).
     pub spacing: f64,
     /// The first frame of the shot that has particles; those before it have no mesh.
     pub begins: i32,
-    /// The particles at that frame: how many there are, and how they are told apart.
+    /// The particles at that frame: their number, and whether they have ids or velocities.
     pub particles: Particles,
-    /// Frames at which an edited mesh takes the place of the tracked one, ascending.
+    /// Frames at which an edited mesh replaces the tracked one, ascending.
     pub(super) sculpts: Vec<i32>,
-    /// What the files held when they were read.
+    /// Contents of the files when they were read.
     pub(in crate::scene) seen: Arc<Seen>,
-    /// What about the files should be told, a sentence each; the log has it too.
+    /// Warnings about the files, one sentence each; they are logged too.
     pub warnings: Vec<String>,
 }
 
 impl Inputs {
-    /// Reads the mesh and the particles of the first frame that has any, and sees whether a file of a later frame is missing, which is
-    /// warned of: frames before it can be made. Edited meshes of later frames are looked at, and read again when their frames come.
+    /// Reads the mesh and the particles of the first frame that has any, and warns if a file of a later frame is missing: the frames before
+    /// it can still be made. Edited meshes of later frames are checked now, and read again at their frames.
     ///
     /// # Errors
-    /// What the files or keys have wrong, with file and key; cancel.
+    /// Errors in files or keys, with file and key; cancel.
     pub fn load(ctx: &Context, scene: &Scene) -> Result<Self> {
         let (surface, shot) = (scene.surface()?, scene.shot);
         if Pattern::parse(&surface.particles).is_none() && shot.frames.count() > 1 {
@@ -106,7 +106,7 @@ impl Inputs {
                 first.display()
             ));
         }
-        // The mesh is made, or written, with 32-bit numbers where the particles are.
+        // The mesh is made, or written, with 32-bit numbers near the particles.
         let far = base_mesh::farthest(particles.positions.iter());
         let name = first.display().to_string();
         warnings.extend(base_mesh::too_far(&name, far, 1.0, surface.cell * spacing, base_mesh::BY_KEY));
@@ -128,7 +128,7 @@ impl Inputs {
         let fades = surface.half_life.is_some() || surface.fade != 0.0;
         let lasting = match &surface.mesh {
             Some(path) if fades => lasting(&mesh).map_err(|what| Error::file(path, what))?,
-            // A mesh that is rebuilt keeps it in its states: a later frame may be the first that fades.
+            // A mesh that is rebuilt stores it in its states: a later frame may be the first that fades.
             Some(_) if surface.rebuild => lasting(&mesh).unwrap_or_default(),
             _ => Vec::new(),
         };
@@ -142,10 +142,10 @@ impl Inputs {
     }
 }
 
-/// A mesh in a file, in metres, and closed where it is to be rebuilt; with what about it should be told, in a sentence.
+/// A mesh from a file, in metres, and closed if it is to be rebuilt; with a warning in a sentence.
 ///
 /// # Errors
-/// A file that cannot be read, or that has changed since it was read; a mesh that encloses nothing, where it is to be rebuilt; cancel.
+/// A file that cannot be read, or that has changed since it was read; a mesh to be rebuilt that encloses nothing; cancel.
 pub(super) fn read_mesh(
     ctx: &Context,
     surface: &Surface,
@@ -154,7 +154,7 @@ pub(super) fn read_mesh(
     spacing: f64,
 ) -> Result<(DetailedMesh, Option<String>)> {
     let bytes = seen.read(path)?;
-    // Vertices that no face names follow nothing.
+    // Unused vertices follow nothing.
     let mut mesh = parse_polygons_from(path, &bytes, surface.space.origin)?.into_detailed().without_unused();
     let space = surface.space;
     mesh.mesh.positions.iter_mut().for_each(|p| *p = space.vector(p.cast()).cast());
@@ -169,7 +169,7 @@ pub(super) fn read_mesh(
     Ok((mesh, warning.map(|warning| format!("{}: {warning}", path.display())).or_else(doubts)))
 }
 
-/// What is painted to last in the array `detail` of the vertices: shares 0..=1, of bytes 0 to 255.
+/// Detail retention, painted in the array `detail` of the vertices: shares 0..=1, as bytes 0 to 255.
 pub(super) fn lasting(mesh: &DetailedMesh) -> std::result::Result<Vec<f32>, String> {
     let is_it = |array: &&MeshArray| array.name == "detail" && array.on == On::Vertices;
     let Some(array) = mesh.arrays.iter().find(is_it) else { return Ok(Vec::new()) };
@@ -181,15 +181,16 @@ pub(super) fn lasting(mesh: &DetailedMesh) -> std::result::Result<Vec<f32>, Stri
     }
 }
 
-/// Every file of particles that the shot reads, each once.
+/// Every particle file that the shot reads, each once.
 pub(super) fn all_files(scene: &Scene, surface: &Surface) -> Vec<PathBuf> {
     let frames = scene.shot.frames;
     let [from, to] = [frames.first, frames.last].map(|frame| surface.time(frames, frame));
     surface.files(from, to)
 }
 
-/// That a closed mesh holds much less, or more, than so many particles of a spacing (m), in a sentence. The particles' own surface lies half
-/// a spacing above the outermost ones: of thin sheets and small drops it holds more than they are.
+/// A warning, in a sentence, if the volume of a closed mesh is much less, or more, than that of its particles with a spacing (m). The
+/// particles' own surface lies half a spacing above the outermost ones: for thin sheets and small drops it encloses more than the
+/// particles' volume.
 fn odd_size(mesh: &TriMesh, particles: usize, spacing: f64) -> Option<String> {
     let (own, liquid) = (mesh.volume(), particles as f64 * spacing.powi(3));
     let is_odd = own < liquid / ODD || own > ODD * liquid + mesh.area() * spacing;
@@ -200,10 +201,10 @@ fn odd_size(mesh: &TriMesh, particles: usize, spacing: f64) -> Option<String> {
     })
 }
 
-/// The first frame of the shot that has particles, and these.
+/// The first frame of the shot that has particles, and these particles.
 ///
 /// # Errors
-/// A file that cannot be read up to there; none of the shot has any; cancel.
+/// A file up to there that cannot be read; no frame of the shot has any; cancel.
 fn first_particles(ctx: &Context, scene: &Scene, surface: &Surface, seen: &Seen) -> Result<(i32, Particles)> {
     let frames = scene.shot.frames;
     let mut liquid = Liquid::new(surface, scene.shot, seen);
@@ -221,7 +222,7 @@ fn first_particles(ctx: &Context, scene: &Scene, surface: &Surface, seen: &Seen)
     Err(Error::file(&surface.particles, what))
 }
 
-/// Which file of the shot is missing, and which frames can therefore not be made, in a sentence.
+/// A sentence that names a missing file of the shot, and the frames that can therefore not be made.
 fn missing(scene: &Scene, surface: &Surface) -> Option<String> {
     let frames = scene.shot.frames;
     let lacks = |frame: i32| {
@@ -246,8 +247,8 @@ fn told(path: &Path, error: Error) -> Error {
     }
 }
 
-/// The mesh as it can be rebuilt: a closed 2-manifold by index that does not cross itself, repaired in cells of an edge (m) where it is
-/// not; and what was done, in a sentence.
+/// The mesh made ready for rebuilding: a closed 2-manifold by index without self-intersections, repaired in cells of an edge (m) if
+/// necessary; and a sentence about the repair.
 fn closed(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(DetailedMesh, Option<String>)> {
     let faults = ctx.pool().install(|| Faults::of(&mesh.mesh));
     let crossings = faults.crossings + faults.corner_crossings + faults.folds + faults.overlaps;
@@ -286,15 +287,15 @@ fn closed(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(DetailedMesh,
     Ok((detail, Some(warning)))
 }
 
-/// Whether all that a repair did was to join vertices that are one corner: the mesh was triangle soup, and closed.
+/// Whether a repair only joined vertices that are one corner: the mesh was triangle soup, and closed.
 fn is_only_joined(mesh: &TriMesh, Repaired { report, .. }: &Repaired) -> bool {
     let joined = Prepared { joined_vertices: report.prepared.joined_vertices, ..Prepared::default() };
     report.prepared == joined && report.rebuilt_cells == 0 && report.kept_triangles == mesh.triangles.len()
 }
 
-/// What about a mesh matters for what follows, in a sentence.
+/// A sentence about properties of a mesh that affect tracking.
 fn faults(path: &Path, mesh: &TriMesh) -> Option<String> {
-    // Corners of .stl files are no shared vertices: each triangle would go its own way.
+    // The corners of .stl files are not shared vertices: each triangle would move on its own.
     if extension(path) == "stl" {
         return Some(format!(
             "{}: .stl files do not say which triangles share their corners: a .ply or .obj file follows better",

@@ -19,16 +19,16 @@ use crate::vdb::points;
 const VELOCITIES: [&str; 4] = ["v", "vel", "velocity", "velocities"];
 const IDS: [&str; 4] = ["id", "ids", "particle_id", "particleid"];
 
-/// The points of any file of particles, in its own space.
+/// The points of a particle file, in its own space.
 ///
 /// # Errors
-/// A file that cannot be read, or that holds only what changed since another frame.
+/// A file that cannot be read, or that holds only the changes since another frame.
 pub fn read_cloud(path: &Path, seen: &Seen) -> Result<Cloud> {
     if extension(path) != "vdb" {
         return particles::parse(path, &seen.read(path)?);
     }
     source::open(path)?;
-    // OpenVDB reads the file itself: it must be the same before and after.
+    // OpenVDB reads the file itself: its content must be the same before and after.
     seen.hash(path)?;
     if let Some(since) = changes_since(path)? {
         return Err(Error::file(path, partial(since)));
@@ -41,7 +41,7 @@ pub fn read_cloud(path: &Path, seen: &Seen) -> Result<Cloud> {
 /// The particles of a file (m, m/s).
 ///
 /// # Errors
-/// As [`read_cloud`]; values that are not finite, two particles with one id.
+/// As [`read_cloud`]; values that are not finite, two particles with the same id.
 pub(in crate::scene::surface) fn read(path: &Path, surface: &Surface, seen: &Seen) -> Result<Particles> {
     let cloud = read_cloud(path, seen)?;
     let named = |names: &'static [&str]| {
@@ -70,16 +70,16 @@ pub(in crate::scene::surface) fn read(path: &Path, surface: &Surface, seen: &See
     Ok(particles)
 }
 
-/// The particles of a shot, read as they are needed.
+/// The particles of a shot, read on demand.
 pub(in crate::scene::surface) struct Liquid<'a> {
     surface: &'a Surface,
     shot: Shot,
     seen: &'a Seen,
-    /// Those of the last files, by their numbers.
+    /// The particles of the last files, by file number.
     kept: Vec<(i32, Arc<Particles>)>,
 }
 
-/// Files that are kept: those around two frames.
+/// Files kept in memory: those around two frames.
 pub(in crate::scene::surface) const KEPT: usize = 4;
 
 impl<'a> Liquid<'a> {
@@ -87,8 +87,8 @@ impl<'a> Liquid<'a> {
         Self { surface, shot, seen, kept: Vec::new() }
     }
 
-    /// The times (frames of the sequence) by which the mesh goes from the frame before to a frame: every file on the way, so that a
-    /// fast sequence loses nothing.
+    /// The times (frames of the sequence) through which the mesh steps from the previous frame to this one: it stops at every file in
+    /// between, so that a fast sequence loses nothing.
     pub fn way(&self, frame: i32) -> Vec<f64> {
         let time = |frame: i32| self.surface.time(self.shot.frames, frame);
         let (from, to) = (time(frame - 1), time(frame));
@@ -104,7 +104,7 @@ impl<'a> Liquid<'a> {
     /// The particles at a time (frames of the sequence).
     ///
     /// # Errors
-    /// A file that cannot be read; one with neither ids nor velocities, where the time is between two.
+    /// A file that cannot be read; a time between two files that have neither ids nor velocities.
     pub fn at(&mut self, time: f64) -> Result<Arc<Particles>> {
         let (below, share) = (time.floor(), time - time.floor());
         let from = self.file(below as i32)?;
@@ -117,7 +117,7 @@ impl<'a> Liquid<'a> {
             .map_err(|error| self.told(below, error))
     }
 
-    /// An error about what the particles at a time lack, with their file.
+    /// An error about missing data of the particles at a time, with their file.
     pub fn told(&self, time: f64, error: Error) -> Error {
         match error {
             Error::Argument(what) => Error::file(self.path(time.floor() as i32), what),

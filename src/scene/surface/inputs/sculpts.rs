@@ -1,4 +1,4 @@
-//! Meshes that were edited by hand: at its frame each takes the place of the one that has followed the liquid up to there.
+//! Meshes edited by hand: at its frame each replaces the mesh that has followed the liquid so far.
 
 use std::path::PathBuf;
 
@@ -11,23 +11,23 @@ use crate::io::files::sequence::Pattern;
 use crate::scene::Frames;
 use crate::scene::surface::{Inputs, Surface};
 
-/// Arrays of shares: a byte is a 255th of what a float is.
+/// Arrays of shares: floats 0..=1 correspond to bytes 0 to 255.
 const SHARES: [&str; 5] = ["red", "green", "blue", "alpha", "detail"];
 
-/// An edited mesh, as it takes the place of the tracked one.
+/// An edited mesh that replaces the tracked one.
 pub struct Sculpt {
     /// Its file.
     pub path: PathBuf,
-    /// The mesh (m), with the arrays that the mesh of the first frame carries, in the same order.
+    /// The mesh (m), with the same arrays as the mesh of the first frame, in the same order.
     pub mesh: DetailedMesh,
-    /// Share of each vertex' detail that never fades; empty: none.
+    /// Detail retention of each vertex: the share that never fades; empty: none.
     pub lasting: Vec<f32>,
 }
 
 /// The frames of a shot after its first that have an edited mesh, ascending.
 ///
 /// # Errors
-/// A name without a position for the frame's number; a mesh for the first frame; none for any other.
+/// A name without a placeholder for the frame number; a mesh for the first frame; no mesh for any other.
 pub fn frames(surface: &Surface, shot: Frames) -> Result<Vec<i32>> {
     let Some(path) = &surface.resculpt else { return Ok(Vec::new()) };
     let Some(pattern) = Pattern::parse(path) else {
@@ -52,13 +52,13 @@ pub fn frames(surface: &Surface, shot: Frames) -> Result<Vec<i32>> {
     Ok(frames)
 }
 
-/// The file of a frame's edited mesh, where it is one of the frames that [`frames`] found.
+/// The file of a frame's edited mesh, if it is one of the frames that [`frames`] found.
 pub fn path_at(surface: &Surface, sculpts: &[i32], frame: i32) -> Option<PathBuf> {
     sculpts.binary_search(&frame).ok()?;
     Some(Pattern::parse(surface.resculpt.as_ref()?)?.path(frame))
 }
 
-/// Looks at every edited mesh; what about them should be told, a sentence each.
+/// Checks every edited mesh; returns warnings, one sentence each.
 ///
 /// # Errors
 /// As [`read_sculpt`].
@@ -73,16 +73,16 @@ pub fn check(ctx: &Context, surface: &Surface, inputs: &Inputs) -> Result<Vec<St
     Ok(out)
 }
 
-/// The edited mesh of a frame; none where it has no such mesh.
+/// The edited mesh of a frame; `None` if it has none.
 ///
 /// # Errors
-/// A file that cannot be read, or that has changed since it was looked at; a mesh that encloses nothing, where it is to be rebuilt; shares
-/// of detail out of range, where any fades; cancel.
+/// A file that cannot be read, or that has changed since it was checked; a mesh to be rebuilt that encloses nothing; shares of detail out
+/// of range, if any fades; cancel.
 pub fn read_sculpt(ctx: &Context, surface: &Surface, inputs: &Inputs, frame: i32) -> Result<Option<Sculpt>> {
     Ok(read(ctx, surface, inputs, frame)?.map(|(sculpt, _)| sculpt))
 }
 
-/// As [`read_sculpt`], with what should be told.
+/// As [`read_sculpt`], with warnings.
 fn read(
     ctx: &Context,
     surface: &Surface,
@@ -95,7 +95,7 @@ fn read(
     let fades = surface.half_life.is_some() || surface.fade != 0.0;
     let lasting = match lasting(&mesh) {
         Err(what) if fades => return Err(Error::file(path, what)),
-        // States keep it: a later frame may be the first that fades.
+        // States store it: a later frame may be the first that fades.
         other => other.unwrap_or_default(),
     };
     let (mesh, faults) = conformed(mesh, &inputs.mesh);
@@ -103,7 +103,7 @@ fn read(
     Ok(Some((Sculpt { path, mesh, lasting }, warnings)))
 }
 
-/// A mesh with what the one of the first frame carries, so that all frames have the same; and what does not fit, a sentence each.
+/// A mesh with the same data as that of the first frame, so that all frames have the same; and the differences, a sentence each.
 fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<String>) {
     let DetailedMesh { mesh, uvs, mut arrays } = edited;
     arrays.retain(|array| !REPLACED.contains(&&*array.name));
@@ -121,7 +121,7 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
         };
         taken.push(MeshArray { name: own.name.clone(), on: own.on, number: own.number, values });
     }
-    // What is painted to last counts without being written.
+    // Detail retention counts even if it is not written.
     let is_used = |array: &MeshArray| {
         let is_known = first.arrays.iter().any(|own| own.name == array.name);
         is_known || array.name == "detail" && array.on == On::Vertices
@@ -167,7 +167,7 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
     (DetailedMesh { mesh, uvs, arrays: taken }, faults)
 }
 
-/// The numbers of an array as another type holds them.
+/// The numbers of an array, converted to another type.
 fn converted(array: &MeshArray, to: Number) -> Vec<f64> {
     let is_share = SHARES.contains(&&*array.name);
     let scaled = |value: f64| match (array.number, to) {
@@ -178,7 +178,7 @@ fn converted(array: &MeshArray, to: Number) -> Vec<f64> {
     array.values.iter().map(|value| fitted(scaled(*value), to)).collect()
 }
 
-/// The number of a type that is nearest to another; what is no number is 0 where the type has no other word for it.
+/// The nearest number of a type; NaN becomes 0 if the type has none.
 fn fitted(value: f64, to: Number) -> f64 {
     let (low, high) = match to {
         Number::F64 => return value,
@@ -257,7 +257,7 @@ mod tests {
         let [lacks, left] = &faults[..] else { panic!("{faults:?}") };
         assert!(lacks.contains(": mask, part; they are 0"), "{lacks}");
         assert!(left.ends_with("left out: heat, texture coordinates"), "{left}");
-        // Of its own kind nothing is changed, and nothing is to be told.
+        // Nothing is changed for the same kind of mesh, and there is no warning.
         let (same, faults) = conformed(first.clone(), &first);
         assert!(same == first && faults.is_empty(), "{faults:?}");
     }

@@ -1,14 +1,14 @@
-//! What the report of a frame says of a mesh that follows a liquid.
+//! The report of a frame of a mesh that follows a liquid.
 
 use serde_json::json;
 
 use crate::scene::run::Report;
 use crate::surface::{Apart, Change, StepReport, Tracker};
 
-/// Parts apart from the mesh that a report lists.
+/// Maximum uncovered parts listed in a report.
 const LISTED: usize = 100;
 
-/// The report of a frame, of so many particles; whether an edited mesh was put in the mesh's position.
+/// The report of a frame with this many particles; `is_resculpted`: whether an edited mesh replaced the tracked one.
 pub(in crate::scene::surface) fn told(
     report: &StepReport,
     particles: usize,

@@ -28,9 +28,9 @@ use crate::scene::schema::keys::{first_of, settings_of};
 use crate::scene::{Scene, System};
 use tracked_shot::{At, Walk, reads};
 
-/// Name of the stage, and kind of its files.
+/// Name of the stage, and of the kind of its files.
 const NAME: &str = "surface";
-/// What the clips of `surface/` share.
+/// Manifest shared by the clips in `surface/`.
 const MANIFEST: &str = "surface/surface.manifest.usda";
 
 /// The stage for a scene.
@@ -46,7 +46,7 @@ pub struct Step(Option<Written>);
 struct Written {
     positions: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
-    /// What the mesh carries; none: what it began with.
+    /// The data that the mesh carries; `None`: those of the first mesh.
     detail: Option<Arc<DetailedMesh>>,
     velocities: Vec<Vec3>,
     delta: Vec<f32>,
@@ -55,7 +55,7 @@ struct Written {
 }
 
 impl Written {
-    /// Of a frame without particles.
+    /// For a frame without particles.
     fn nothing(carried: &DetailedMesh, state: Vec<u8>) -> Self {
         Self {
             positions: Vec::new(),
@@ -75,7 +75,8 @@ impl<'a> Track<'a> {
         Self { scene, surface, inputs }
     }
 
-    /// The arrays that each frame has anew, but for the mask of what was made: a mesh to which nothing was done yet has none of its own.
+    /// The arrays that each frame writes anew. The mask of created faces is among them only for a mesh that was never changed and carries
+    /// none.
     fn arrays(&self, delta: &[f32], flags: &[bool], unmade: Option<usize>) -> Vec<MeshArray> {
         let array = |name: &str, on, number, values| MeshArray { name: name.into(), on, number, values };
         let output = self.surface.output;
@@ -92,7 +93,7 @@ impl<'a> Track<'a> {
         delta.into_iter().chain(flagged).chain(rebuilt).collect()
     }
 
-    /// The arrays that the mesh carries, as they are written.
+    /// The arrays that the mesh carries and that are written.
     fn carried<'m>(&self, detail: &'m DetailedMesh) -> impl Iterator<Item = &'m MeshArray> {
         let is_written = self.surface.output.rebuilt;
         detail.arrays.iter().filter(move |array| is_written || array.name != Traced::MASK)
@@ -172,7 +173,7 @@ impl<'a> Stepping for Track<'a> {
 
     fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<Walk<'a>> {
         let Some(frame) = after else {
-            // A mesh that is not where the particles are is refused before anything is written.
+            // A mesh that is not near the particles is refused before anything is written.
             return Walk::begin(ctx, self.scene, self.surface, self.inputs);
         };
         let path = done.state_file(frame)?;

@@ -1,4 +1,4 @@
-//! What a mesh that was rebuilt carries, in the exact state of a frame.
+//! The data carried by a rebuilt mesh, in the exact state of a frame.
 
 use crate::error::{Error, Result};
 use crate::geometry::mesh::attributes::{Number, On};
@@ -10,24 +10,24 @@ use crate::surface::{Params, Tracker};
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzsrm02";
-/// What messages call it.
+/// Noun for messages.
 const NOUN: &str = "surface";
 
 const NUMBERS: [Number; 8] =
     [Number::I8, Number::U8, Number::I16, Number::U16, Number::I32, Number::U32, Number::F32, Number::F64];
 const POSITIONS: [On; 3] = [On::Vertices, On::Corners, On::Faces];
 
-/// A mesh that was kept.
+/// A saved mesh.
 pub struct Kept {
     pub tracker: Tracker,
-    /// What it carries; none: what the first mesh does.
+    /// The data that it carries; `None`: those of the first mesh.
     pub detail: Option<DetailedMesh>,
-    /// The frame at which an edited mesh was the last to take its place.
+    /// The last frame at which an edited mesh replaced it.
     pub sculpted: Option<i32>,
 }
 
-/// The exact state of a mesh, with what it carries now, and the frame of the last edited one; as long as it was not rebuilt that is
-/// what it began with.
+/// The exact state of a mesh, with the data that it carries now and the frame of the last edited mesh; as long as it was not rebuilt, these
+/// are the initial data and are not stored.
 pub fn save(tracker: &Tracker, detail: &DetailedMesh, sculpted: Option<i32>) -> Vec<u8> {
     let own = tracker.save();
     if !tracker.is_rebuilt() {
@@ -60,11 +60,10 @@ pub fn save(tracker: &Tracker, detail: &DetailedMesh, sculpted: Option<i32>) -> 
     packed::pack(&to.0, MAGIC)
 }
 
-/// Resumes from what [`save`] wrote; `first` is the mesh that it began with. What it carries is none where that is what `first`
-/// carries.
+/// Resumes from what [`save`] wrote; `first` is the initial mesh. The carried data are `None` if they are those of `first`.
 ///
 /// # Errors
-/// Bytes that are no such state, or one of another mesh.
+/// Bytes that are not such a state, or a state of another mesh.
 pub fn resume(params: Params, first: &DetailedMesh, bytes: &[u8]) -> Result<Kept> {
     if !bytes.starts_with(MAGIC) {
         let tracker = Tracker::resume(params, &first.mesh, bytes)?;
@@ -87,7 +86,7 @@ pub fn resume(params: Params, first: &DetailedMesh, bytes: &[u8]) -> Result<Kept
         if count != on.count(vertices, faces) {
             return Err(wrong());
         }
-        // What a file carries may be no number.
+        // A file's data may be NaN.
         let values = (0..count).map(|_| Ok(f64::from_le_bytes(from.take()?))).collect::<Result<_>>()?;
         arrays.push(MeshArray { name, on, number, values });
     }
@@ -124,7 +123,7 @@ mod tests {
     use crate::geometry::{DVec3, TriMesh};
     use crate::surface::test_particles::{own_surface, two_balls};
 
-    /// A mesh that was rebuilt where two balls met, the one that it began with, and what it carries.
+    /// A mesh that was rebuilt where two balls met, its initial mesh, and the data that it carries.
     fn rebuilt() -> (Tracker, DetailedMesh, DetailedMesh) {
         let ctx = Context::new(Pool::new(1).unwrap());
         let balls = |away: f64| two_balls(3.2, DVec3::new(away, 0.1, 0.0));
@@ -160,14 +159,14 @@ mod tests {
         let carried = carried.unwrap();
         assert!(save(&back, &carried, sculpted) == bytes && carried.uvs == detail.uvs);
         assert_eq!(sculpted, Some(-7));
-        // Damage never gets past the checksum; behind it nothing may panic either.
+        // Damage never passes the checksum; behind it nothing may panic either.
         let plain = packed::unpack(&bytes, MAGIC, NOUN).unwrap();
         let mut state = 5u64;
         let mut below = |count: usize| {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 33) as usize % count
         };
-        // The tracker's own bytes have a checksum of their own: what stands behind them is changed.
+        // The tracker's own bytes have their own checksum: the bytes after them are changed.
         let own = 8 + u64::from_le_bytes(plain[..8].try_into().unwrap()) as usize;
         let rounds = std::env::var("FRAZIL_FUZZ").ok().and_then(|text| text.parse().ok()).unwrap_or(2000);
         let saved = |kept: &Kept| save(&kept.tracker, kept.detail.as_ref().unwrap(), kept.sculpted);
@@ -186,7 +185,7 @@ mod tests {
             match resume(params, &first, &packed::pack(&changed, MAGIC)) {
                 Err(_) => refused += 1,
                 Ok(kept) => {
-                    // It is a state as good as any.
+                    // A valid state.
                     let again = saved(&kept);
                     let back = resume(params, &first, &again).unwrap();
                     assert!(saved(&back) == again, "byte {at}");
@@ -194,7 +193,8 @@ mod tests {
                 }
             }
         }
-        // Half of the bytes are numbers of arrays, which may be any; most others name texture coordinates, of which there are few.
+        // Half of the bytes are numbers of arrays, which may be anything; most others are indices of texture coordinates, of which there
+        // are few.
         assert!(refused > rounds / 5 && read > rounds / 5, "{refused} refused, {read} read");
     }
 }

@@ -1,5 +1,5 @@
-//! The mesh from frame to frame: it steps with the liquid, carries its arrays through changes, and is exchanged for an edited one
-//! where there is one. Some frames are known ahead, for velocities and for changes that are seen before they happen.
+//! The mesh from frame to frame: it steps with the liquid, keeps its arrays through changes, and is replaced by an edited mesh if there is
+//! one. Some frames are computed ahead, for velocities and for changes that show before they happen.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -24,7 +24,7 @@ use crate::surface::{
     uncrossed,
 };
 
-/// A scene's liquid, and the mesh that goes along.
+/// A scene's liquid, and the mesh that follows it.
 pub struct Walk<'a> {
     scene: &'a Scene,
     surface: &'a Surface,
@@ -32,30 +32,30 @@ pub struct Walk<'a> {
     liquid: Liquid<'a>,
     /// The frame of the first of `known`.
     frame: i32,
-    /// The mesh at a frame, and at those that follow it as far as they are needed; at least one.
+    /// The mesh at a frame, and at the following frames as far as they are needed; at least one.
     known: VecDeque<At>,
     /// The first frame that could not be made ahead: beyond the shot's end, or one that fails.
     end: Option<i32>,
-    /// Whether what is wrong with the particles was said.
+    /// Whether the particles' faults were logged.
     has_warned: bool,
 }
 
-/// A mesh as an artist made it: that of the first frame, or an edited one.
+/// A mesh made by an artist: that of the first frame, or an edited one.
 #[derive(Clone)]
 pub(in crate::scene::surface) struct Source {
-    /// The frame of an edited one.
+    /// The frame of an edited mesh.
     pub sculpted: Option<i32>,
     mesh: Arc<DetailedMesh>,
-    /// The particles at its frame, where they have ids and the mesh carries anything and is rebuilt, and its triangles.
+    /// The particles at its frame and its triangles, if the particles have ids and the mesh carries data and is rebuilt.
     rest: Option<Arc<(Rest, NearestTree)>>,
 }
 
-/// The mesh at a frame, with what led there.
+/// The mesh at a frame, with the step that led there.
 pub struct At {
     pub tracker: Tracker,
-    /// What it carries; none: what the first mesh does.
+    /// The data that it carries; `None`: those of the first mesh.
     pub detail: Option<Arc<DetailedMesh>>,
-    /// What the frame's report says.
+    /// The frame's report.
     pub report: Report,
     way: Way,
     leads: Leads,
@@ -64,29 +64,29 @@ pub struct At {
     pub(in crate::scene::surface) is_dry: bool,
 }
 
-/// How the vertices of the frame before went to a frame.
+/// The motion of vertices from the previous frame to this one.
 #[derive(Default)]
 pub(in crate::scene::surface) struct Way {
-    /// Velocities over it (m/s) of the vertices of the frame before; empty at the first frame.
+    /// Velocities over the step (m/s) of the previous frame's vertices; empty at the first frame.
     pub of_before: Vec<Vec3>,
-    /// Velocities over it of the vertices at its end.
+    /// Velocities over the step of the vertices at its end.
     pub of_after: Vec<Vec3>,
 }
 
 impl<'a> Walk<'a> {
-    /// The mesh at the first frame; none where that has no particles.
+    /// The mesh at the first frame; none if that has no particles.
     ///
     /// # Errors
-    /// A mesh that is not where the first particles are, and what a tracker refuses; cancel.
+    /// A mesh that is not near the first particles, and anything that a tracker refuses; cancel.
     pub fn begin(ctx: &Context, scene: &'a Scene, surface: &'a Surface, inputs: &'a Inputs) -> Result<Self> {
         let first = scene.shot.frames.first;
-        // Also where particles come later: a mesh that does not fit them is refused before anything is written.
+        // Even if particles appear later: a mesh that does not match them is refused before anything is written.
         let begun = first_mesh(ctx, surface, inputs)?;
         let at = if inputs.begins == first { begun } else { without_mesh(surface, inputs)? };
         Ok(Self::at((scene, surface, inputs), first, at))
     }
 
-    /// Goes on from a mesh that was kept at a frame.
+    /// Resumes from a mesh saved at a frame.
     ///
     /// # Errors
     /// Particles or an edited mesh that can no longer be read.
@@ -140,10 +140,10 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Goes on to a frame, and as far ahead as that needs.
+    /// Advances to a frame, and computes as far ahead as that needs.
     ///
     /// # Errors
-    /// Files that cannot be read; what a step refuses; cancel.
+    /// Files that cannot be read; errors of a step; cancel.
     pub fn go(&mut self, ctx: &Context, frame: i32) -> Result<()> {
         while self.frame < frame {
             if self.known.len() == 1 {
@@ -162,13 +162,13 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// The mesh at the frame that it went to.
+    /// The mesh at the current frame.
     pub fn now(&self) -> &At {
         &self.known[0]
     }
 
-    /// Positions (m) of its vertices as they are shown: those that a change will take away already go towards what it makes; with the
-    /// velocities that lead to the next frame's (m/s), or where that is not known from the one before.
+    /// Positions (m) of its vertices for output: vertices that a coming change will remove already move towards the result. With velocities
+    /// to the next frame (m/s), or if that is not known, from the previous one.
     ///
     /// # Errors
     /// Cancel.
@@ -192,7 +192,7 @@ impl<'a> Walk<'a> {
         };
         for Eased { vertex, now: asked, next: asked_next } in self.eased(0) {
             let now = of(&moved, vertex);
-            // What goes in the step arrives as nearly as it has come.
+            // A vertex that this step removes gets the same fraction of its next displacement as of the current one.
             let to = match next.leads.takes(vertex) {
                 true if asked != DVec3::zeros() => asked_next * (now.norm() / asked.norm()),
                 true => asked_next,
@@ -203,18 +203,18 @@ impl<'a> Walk<'a> {
         Ok((positions, velocities))
     }
 
-    /// The vertices of a frame that is known which are moved for changes to come.
+    /// The vertices of a known frame that are eased towards coming changes.
     fn eased(&self, index: usize) -> Vec<Eased> {
         eased(self.known.iter().skip(index + 1).map(|at| &at.leads), self.surface.ahead as usize)
     }
 
-    /// By how much they are, as far as the mesh does not pass through itself.
+    /// The displacements of these vertices, as far as the mesh does not intersect itself.
     fn displaced(&self, ctx: &Context, index: usize) -> Result<Vec<Displaced>> {
         let tracker = &self.known[index].tracker;
         uncrossed(ctx, tracker.vertices(), tracker.triangles(), displaced(&self.eased(index)))
     }
 
-    /// The frame after those that are known, where it is there: beyond the shot's end a cache need not have it.
+    /// The frame after the known ones, if it can be made: beyond the shot's end a cache need not have it.
     fn look(&mut self, ctx: &Context, frame: i32) -> Result<Option<At>> {
         let last = self.scene.shot.frames.last;
         if self.end.is_some_and(|end| frame >= end) {
@@ -222,7 +222,7 @@ impl<'a> Walk<'a> {
         }
         if frame <= last {
             return match self.next(ctx, frame) {
-                // It ends the shot when its turn comes: the frames before it are there and are written first.
+                // The error ends the shot only when the frame is due: the frames before it exist and are written first.
                 Err(error) if !matches!(error, Error::Cancelled) => {
                     self.end = Some(frame);
                     Ok(None)
@@ -248,7 +248,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// The mesh at a frame, from the last that is known, which is the one before.
+    /// The mesh at a frame, from the last known one, which is the previous frame.
     fn next(&mut self, ctx: &Context, frame: i32) -> Result<At> {
         if frame < self.inputs.begins {
             return without_mesh(self.surface, self.inputs);
@@ -268,13 +268,13 @@ impl<'a> Walk<'a> {
         let before = &mut self.known[last];
         let (mut tracker, mut detail, source) =
             (before.tracker.clone(), before.detail.clone(), before.source.clone());
-        // The surface that was made ahead is the next one's.
+        // The surface that was made ahead belongs to the next one.
         before.tracker.forget_ahead();
         let mut trail = Trail::of(tracker.vertices());
         let way = self.liquid.way(frame);
         let (mut report, mut leads) = (StepReport::default(), Leads::default());
         let mut from = self.liquid.at(way[0])?;
-        // What the step after each goes to; beyond the shot it need not be there.
+        // The end of each following step; beyond the shot it need not exist.
         let beyond = self.liquid.way(frame + 1)[1];
         let is_there = self.surface.rebuild && frame < self.scene.shot.frames.last;
         let behind = way[2..].iter().copied().map(Some).chain([is_there.then_some(beyond)]);
@@ -319,7 +319,7 @@ impl<'a> Walk<'a> {
         Ok(at)
     }
 
-    /// Puts the edited mesh of a frame in the place of the one that came there, if there is one; what that did.
+    /// Replaces the mesh by the edited mesh of the frame, if there is one; returns the report.
     fn resculpt(
         &self,
         ctx: &Context,
@@ -340,7 +340,7 @@ impl<'a> Walk<'a> {
         let triangles = at.tracker.triangles().to_vec();
         let report =
             at.tracker.resculpt(ctx, &sculpt.mesh.mesh, sculpt.lasting, particles).map_err(refused)?;
-        // Vertices of the edited mesh go as the mesh before went beside them.
+        // Vertices of the edited mesh move like those of the previous mesh near them.
         let velocity = |position: &DVec3| {
             let corner = old.nearest(*position).map(|near| triangles[near.triangle][0] as usize);
             corner.and_then(|corner| at.way.of_after.get(corner).copied()).unwrap_or_default()
@@ -391,7 +391,7 @@ fn of_first(surface: &Surface, error: Error) -> Error {
     }
 }
 
-/// Before anything is known.
+/// The report before any step.
 fn nothing_told() -> Report {
     Report { results: serde_json::Map::new(), phases: Vec::new() }
 }
@@ -412,7 +412,7 @@ impl Source {
     }
 }
 
-/// What a mesh carries after a change; its positions are those of the change.
+/// The data that a mesh carries after a change; its positions are those of the change.
 fn carried(
     ctx: &Context,
     own: &DetailedMesh,
@@ -432,14 +432,14 @@ fn carried(
     let (origins, sources) = (&change.origins, &change.sources);
     ctx.phase("carry", || {
         let mut out = carry_attributes(&old, tracker.mesh(), origins, sources, Some(&traced));
-        // The tracker has them.
+        // The tracker has the positions.
         out.mesh.positions = Vec::new();
         Ok(out)
     })
 }
 
 impl Surface {
-    /// How the mesh follows particles of a spacing (m).
+    /// Parameters of the mesh for particles of a spacing (m).
     pub(in crate::scene::surface) fn params(&self, spacing: f64) -> Params {
         Params {
             spacing,
@@ -454,13 +454,13 @@ impl Surface {
         }
     }
 
-    /// How many frames are made ahead: one for velocities; for those that the vertices go towards a change they have to be known in the
-    /// frame after too.
+    /// Number of frames computed ahead: one for velocities; with easing one more than `ahead`, so that eased vertices are known in the next
+    /// frame too.
     pub(in crate::scene::surface) fn looks(&self) -> i32 {
         if self.eases() { self.ahead + 1 } else { 1 }
     }
 
-    /// Whether frames to come show in a frame's files.
+    /// Whether coming frames affect a frame's files.
     fn reads_ahead(&self) -> bool {
         self.output.velocities || self.output.usd || self.eases()
     }
@@ -469,7 +469,7 @@ impl Surface {
         self.rebuild && self.ahead > 0
     }
 
-    /// The files from a frame of the shot to another.
+    /// The files between two frames of the shot.
     fn between(&self, shot: Frames, from: i32, to: i32) -> Vec<PathBuf> {
         self.files(self.time(shot, from), self.time(shot, to))
     }
@@ -490,7 +490,7 @@ pub(in crate::scene::surface) fn reads(
     if surface.reads_ahead() {
         let last = frame + surface.looks();
         ahead = surface.between(frames, frame, last);
-        // What is read anyway is not of the coming frames alone.
+        // Files that are read anyway do not count as ahead.
         ahead.retain(|path| !particles.contains(path));
         ahead.extend((frame + 1..=last).filter_map(sculpt));
     }

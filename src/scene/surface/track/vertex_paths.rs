@@ -1,31 +1,31 @@
-//! How vertices go from a frame to the next, through changes of the mesh.
+//! The motion of vertices from one frame to the next, through changes of the mesh.
 
 use super::tracked_shot::Way;
 use crate::geometry::check::topology::around;
 use crate::geometry::{DVec3, Vec3};
 use crate::surface::Change;
 
-/// How often vertices that were made take the mean velocity of those around them.
+/// Number of passes in which new vertices take the mean velocity of their neighbours.
 const PASSES: usize = 4;
 
-/// The vertices of a frame on their way to the next.
+/// The vertices of a frame on their path to the next.
 pub struct Trail {
-    /// Where they were (m).
+    /// Their initial positions (m).
     from: Vec<DVec3>,
-    /// How far each has gone (m), and in what share of the frame.
+    /// The displacement of each so far (m), and the share of the frame that it took.
     gone: Vec<(DVec3, f64)>,
-    /// The vertex of the frame that each vertex is now; none: it was made since.
+    /// For each current vertex, the vertex of the frame that it was; `None`: it is new.
     names: Vec<Option<u32>>,
 }
 
 impl Trail {
-    /// Vertices that set out from these positions (m).
+    /// Vertices that start from these positions (m).
     pub fn of(from: &[DVec3]) -> Self {
         let names = (0..from.len() as u32).map(Some).collect();
         Self { from: from.to_vec(), gone: vec![(DVec3::zeros(), 0.0); from.len()], names }
     }
 
-    /// They have come to these positions (m) when a share of the frame has passed.
+    /// Records positions (m) when a share of the frame has passed.
     pub fn follow(&mut self, positions: &[DVec3], share: f64) {
         for (position, name) in positions.iter().zip(&self.names) {
             if let Some(name) = name {
@@ -35,13 +35,13 @@ impl Trail {
         }
     }
 
-    /// Some are gone, and others were made.
+    /// Applies a change: some vertices are gone, others are new.
     pub fn change(&mut self, change: &Change) {
         let name = |origin: &Option<u32>| origin.and_then(|at| self.names[at as usize]);
         self.names = change.origins.iter().map(name).collect();
     }
 
-    /// Velocities over the frame, of which `fps` pass in a second: those that are gone go on as they went.
+    /// Velocities over the frame, at `fps` frames per second: vertices that are gone keep their last velocity.
     pub fn way(&self, after: &[DVec3], triangles: &[[u32; 3]], fps: f64) -> Way {
         let speed = |(gone, share): &(DVec3, f64)| -> Vec3 {
             if *share > 0.0 { (gone * (fps / share)).cast() } else { Vec3::zeros() }

@@ -1,34 +1,34 @@
-//! What is beside a column, across a line: liquid that its own is in contact with, and walls.
+//! Surroundings of a column across a line: contact with other liquid, and walls.
 //!
-//! Where the ground beyond a side is higher, it is a wall, up to the liquid's surface; as liquid moves slowly above the ground, the lower part of its
-//! depth counts little: by the profile's part of the mean of phi^2. Where both surfaces stand apart as the ground does, up to a cell's edge, there is no
-//! wall but a slope, with a film on it. A dry edge that is not higher holds nothing back.
+//! Higher ground beyond a side is a wall, up to the liquid's surface. As liquid near the ground moves slowly, the lower part of its depth
+//! counts little: by its part of the profile's mean of phi^2. Where both surfaces differ in height as the ground does, up to a cell's edge,
+//! there is no wall but a slope with a film on it. A dry edge that is not higher causes no friction.
 
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_mut, strip_of};
 use crate::shallow::solver::flux::{Step, greater, lesser};
 
-/// Walls beside films of less than `THIN` of a cell's edge do not count, and such of over `THICK` do as a whole: one beside a film of `THIN` takes
-/// (2/5)^1/2 `THIN` of the flow in the pipe next to it, or 4 %.
+/// Walls are ignored beside films thinner than `THIN` times a cell's edge, and count fully beside liquid deeper than `THICK` times it: a
+/// wall beside a film of `THIN` reduces the flow in the adjacent pipe by (2/5)^1/2 `THIN`, or 4 %.
 const THIN: f32 = 1.0 / 16.0;
 const THICK: f32 = 3.0 / 32.0;
 
-/// (k / (6/5))^1/2: over H it is 1 / delta, delta being how far a wall reaches, as exp(-y / delta).
+/// (k / (6/5))^1/2; divided by H it is 1 / delta, where delta is the decay length of a wall's effect, exp(-y / delta).
 const REACH: f32 = 1.581_138_8;
 const REACH_FULL: f32 = 3.162_277_7;
 
-/// What columns are in.
+/// The columns and their liquid.
 pub struct Around<'a> {
     pub columns: &'a Columns,
     /// H (units), padded by a strip: SIMD loads may read past the last index.
     pub depth: &'a [i32],
-    /// Whether a strip has ceilings, or positions without a column.
+    /// Whether each strip has ceilings, or positions without a column.
     pub roofed: &'a [bool],
     /// Positions of each strip from which links lead to the east, south, west and north.
     pub linked: &'a [[u16; 4]],
 }
 
-/// A column of some depth, over 0, or another one beyond a side.
+/// A column with a depth above 0, or another one beyond a side.
 #[derive(Clone, Copy)]
 pub struct Room {
     pub base: i32,
@@ -36,30 +36,32 @@ pub struct Room {
     pub depth: i32,
 }
 
-/// Whether columns of a depth (units) have friction beside them.
+/// Whether columns of a depth (units) have lateral friction.
 pub fn counts(step: &Step, depth: i32) -> bool {
     depth as f32 > THIN * step.cell
 }
 
-/// How much of a wall beside liquid of a depth (units) counts.
+/// Weight of a wall beside liquid of a depth (units).
 #[inline(always)]
 fn counted(step: &Step, height: f32) -> f32 {
     let part = (height - THIN * step.cell) * (1.0 / ((THICK - THIN) * step.cell));
     lesser(greater(part, 0.0), 1.0)
 }
 
-/// The part of the mean of phi^2 that the lowest part x of the depth has, phi = 3/2 (2 x - x^2) below a free surface, and 6 (x - x^2) below a ceiling.
+/// The share of the mean of phi^2 in the lowest part x of the depth; phi = 3/2 (2 x - x^2) below a free surface, and 6 (x - x^2) below a
+/// ceiling.
 #[inline(always)]
 fn share<const FULL: bool>(x: f32) -> f32 {
     let cube = x * x * x;
     if FULL { cube * (10.0 - x * (15.0 - 6.0 * x)) } else { cube * (2.5 - x * (1.875 - 0.375 * x)) }
 }
 
-/// What walls beside liquid of a depth hold back (units): of the part of each side, in lengths of its depth, times friction over that of a difference of
-/// velocities between pipes.
+/// Effective height (units) of the walls beside liquid of depth `high`: the parts of the depth that are wall on each side, times the
+/// friction at a wall relative to that of the same velocity difference between pipes.
 ///
-/// u = 1 - exp(-y / delta) beside one wall, and pipes have its mean over a cell: dx u'(0) / u is s^2 / (s - 1 + exp(-s)) with s = dx / delta, 2 where cells are
-/// small. Between two walls in one cell it is s^2 t / (1 - t), t = tanh(s / 2) / (s / 2), 12 where cells are small. Both are here to 2 %.
+/// Beside one wall u = 1 - exp(-y / delta), and a pipe has its mean over a cell: dx u'(0) / u is s^2 / (s - 1 + exp(-s)) with s = dx /
+/// delta, 2 where cells are small. Between two walls in one cell it is s^2 t / (1 - t), t = tanh(s / 2) / (s / 2), 12 where cells are
+/// small. Both are approximated to 2 %.
 #[inline(always)]
 pub fn walls<const FULL: bool>(step: &Step, high: f32, inverse: f32, parts: [f32; 2]) -> f32 {
     let s = if FULL { REACH_FULL } else { REACH } * step.cell * inverse;
@@ -68,8 +70,8 @@ pub fn walls<const FULL: bool>(step: &Step, high: f32, inverse: f32, parts: [f32
     ((parts[0] + parts[1]) * one + parts[0] * parts[1] * more) * high * counted(step, high)
 }
 
-/// The height of a contact (units), times friction over that of straight lines between pipes, for the same reason: (s / 2)^2 / sinh^2(s / 2), s being
-/// that of the contact's height.
+/// Effective height (units) of a contact: its friction relative to that of a linear profile between pipes, likewise: (s / 2)^2 / sinh^2(s /
+/// 2), with the s of the contact's height.
 #[inline(always)]
 fn fitted<const FULL: bool>(step: &Step, contact: f32) -> f32 {
     let reach = if FULL { REACH_FULL * REACH_FULL } else { REACH * REACH };
@@ -83,8 +85,8 @@ fn fitted<const FULL: bool>(step: &Step, contact: f32) -> f32 {
     if x > THIN { contact * (cube / sinh) } else { 0.0 }
 }
 
-/// Over one side: the height (units) in which liquids are in contact ([`fitted`]), and the part of a wall. `inverse` is 1 / H; a ceiling counts where `is_roofed`
-/// and nothing leads there.
+/// One side of a column: the height (units) in which liquids are in contact ([`fitted`]), and the part that is wall. `inverse` is 1 / H; a
+/// ceiling counts if `ROOFED` and no link leads there.
 #[inline(always)]
 pub fn side<const FULL: bool, const ROOFED: bool>(
     step: &Step,
@@ -96,7 +98,7 @@ pub fn side<const FULL: bool, const ROOFED: bool>(
     let rise = (beyond.base - own.base) as f32;
     let over = (beyond.base + beyond.depth - (own.base + own.depth)) as f32;
     let (high, other) = (own.depth as f32, beyond.depth as f32);
-    // As far as surfaces stand apart as bases do, it is a slope.
+    // It is a slope as far as the surfaces differ in height like the bases.
     let most = lesser(greater(rise, -step.cell), step.cell);
     let lean = lesser(greater(over, lesser(most, 0.0)), greater(most, 0.0));
     let foot = rise - lean;
@@ -106,7 +108,7 @@ pub fn side<const FULL: bool, const ROOFED: bool>(
     let wall = if ROOFED {
         let top = lesser(greater((beyond.ceiling - own.base) as f32 * inverse, 0.0), 1.0);
         let top = if is_linked { 1.0 } else { top };
-        // Without a ceiling to the last bit what it is where none is looked at.
+        // Without a ceiling this equals the other branch, to the last bit.
         lesser(below + (1.0 - share::<FULL>(top)), 1.0)
     } else {
         below
@@ -114,7 +116,7 @@ pub fn side<const FULL: bool, const ROOFED: bool>(
     [fitted::<FULL>(step, contact), wall]
 }
 
-/// Of columns that are not there.
+/// Stands in for absent columns.
 const ABSENT: [i32; STRIP] = [0; STRIP];
 
 /// A strip beyond a side.
@@ -124,8 +126,8 @@ struct Beyond<'a> {
     depth: &'a [i32; STRIP],
 }
 
-/// Finds what is beside the columns of strips, which start behind `first`: of pipes to the east the sum over both sides of contact and walls
-/// (units), the contact before them and behind; then of pipes to the south.
+/// Finds the surroundings of the columns of strips; `out` begins at strip `first`. For pipes to the east: the sum of contact and walls over
+/// both sides (units), the contact before them and the contact behind; then the same for pipes to the south.
 pub fn find(step: &Step, around: &Around, strips: &[u32], first: usize, out: [&mut [f32]; 6]) {
     let mut out = out;
     let out = &mut out;
@@ -189,7 +191,7 @@ impl<'a> Around<'a> {
         }
     }
 
-    /// The columns before those of a strip (`before` 1), or behind them (0).
+    /// The columns one position before those of a strip (`before` 1), or behind them (0).
     #[inline(always)]
     fn shifted(&self, strip: usize, is_there: bool, before: usize) -> Shifted {
         let at = (strip * STRIP + 1).wrapping_sub(2 * before);
@@ -218,7 +220,7 @@ struct Shifted {
 }
 
 impl Shifted {
-    /// There is no column at a position.
+    /// Clears the column at a position.
     #[inline(always)]
     fn shut(&mut self, position: usize) {
         (self.base[position], self.ceiling[position], self.depth[position]) = (0, 0, 0);
@@ -230,7 +232,7 @@ impl Shifted {
     }
 }
 
-/// What is beside the columns of a strip in all, and contact before and behind.
+/// Outputs for a strip: the sum of contact and walls, contact before, and contact behind.
 type Found<'a> = (&'a mut [f32; STRIP], &'a mut [f32; STRIP], &'a mut [f32; STRIP]);
 
 /// Both sides of a strip across one axis.
@@ -320,7 +322,7 @@ mod tests {
                     ]
                 };
                 let [contact, one, both] = [contact, one, both].map(|height| f64::from(height / depth));
-                // Where little is in contact, that it is little.
+                // A small contact must come out small.
                 let exact = (0.5 * s / sinh).powi(2);
                 assert!((contact - exact).abs() < 0.02 * exact + 0.01, "{depth}: {contact}, not {exact}");
                 let exact = s * s / (s - 1.0 + exp(-s));

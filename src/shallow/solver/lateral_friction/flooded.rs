@@ -1,4 +1,5 @@
-//! What is beside the pipes of full columns, one at a time. Their heads come from a system of their own, in which what flows beside them is the last step's.
+//! Lateral friction of the pipes of full columns, one at a time. Their heads come from a separate system, which uses the last step's flow
+//! beside them.
 
 use super::Walls;
 use super::beside::{self, Room};
@@ -6,14 +7,14 @@ use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::solver::flux::{Step, lesser};
 use crate::shallow::solver::pressurised::network::{At, State};
 
-/// How a pipe is held back.
+/// Friction of a pipe.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beside {
-    /// Friction at the ground, and at a ceiling, over that below a free surface.
+    /// Friction at the ground and at a ceiling, relative to that below a free surface.
     pub ground: f64,
-    /// Friction beside it, in parts of its flux.
+    /// Lateral friction, as part of the pipe's flux.
     pub held: f64,
-    /// What liquid beside it adds to its flux (units a step).
+    /// Flux added by the liquid beside the pipe (units a step).
     pub taken: f64,
 }
 
@@ -22,11 +23,11 @@ impl Beside {
     const NONE: Self = Self { ground: 1.0, held: 0.0, taken: 0.0 };
 }
 
-/// Below a ceiling friction is so many times as great: 12 nu / H^2 against 3 nu / H^2.
+/// Friction factor below a ceiling: 12 nu / H^2 instead of 3 nu / H^2.
 const CEILING: f64 = 4.0;
 
 impl Walls {
-    /// What is beside a pipe of full columns between i and j, which may be the outside; `full` says which of them are.
+    /// Lateral friction of a pipe of full columns between i and j, which may be the outside; `full` says which of them are full.
     pub(in crate::shallow::solver) fn beside(
         &self,
         step: &Step,
@@ -83,14 +84,14 @@ impl Walls {
     }
 }
 
-/// Where there is no column.
+/// Stands in for an absent column.
 const ABSENT: Room = Room { base: 0, ceiling: 0, depth: 0 };
 
 fn room(columns: &Columns, state: &State, i: usize) -> Room {
     Room { base: columns.bases()[i], ceiling: columns.ceilings()[i], depth: state.depth[i] }
 }
 
-/// The columns of a pipe, up to where the opening between both ends.
+/// The columns of a pipe, cut at the top of the opening between both.
 fn rooms(columns: &Columns, state: &State, ends: [usize; 2]) -> [Room; 2] {
     let rooms = ends.map(|i| room(columns, state, i));
     let top = rooms[0].ceiling.min(rooms[1].ceiling);
@@ -101,7 +102,8 @@ fn mean(rooms: [Room; 2]) -> f32 {
     0.5 * (rooms[0].depth as f32 + rooms[1].depth as f32)
 }
 
-/// Both sides of a column, from what is there and whether links lead over them: contact over the first and the second, and walls (units).
+/// Both sides of a column, given the columns there and whether links lead over them: contact over the first and the second, and walls
+/// (units).
 fn over<const FULL: bool>(step: &Step, own: Room, beyond: [(Room, bool); 2]) -> [f32; 3] {
     if own.depth <= 0 {
         return [0.0; 3];
@@ -112,7 +114,7 @@ fn over<const FULL: bool>(step: &Step, own: Room, beyond: [(Room, bool); 2]) -> 
     [one[0], two[0], beside::walls::<FULL>(step, high, inverse, [one[1], two[1]])]
 }
 
-/// The column beside another one over a side, as links count them; it may be one that is not there.
+/// The column beside another one over a side, in the order of links; it may be absent.
 fn across(columns: &Columns, i: usize, bit: usize) -> Option<usize> {
     let (strip, position) = (i / STRIP, i % STRIP);
     let beyond = |strip: u32| (strip != NONE).then(|| strip as usize * STRIP + position);

@@ -1,9 +1,10 @@
-//! Pipes beside each other, a line of them at once.
+//! Lateral friction along lines of adjacent pipes, each line solved at once.
 //!
-//! Each flux depends on those of the pipes before and behind it: w = r + a w(-1) + b w(+1). Where a and b are small, the last step's are as good. Else
-//! both are put in with what they depend on, which leaves w = r' + a' w(-2) + b' w(+2), and again, at twice the distance each time (cyclic reduction). As the ground
-//! holds liquid back, too, a' and b' soon are small: over a distance of twice the depth little is left. What is left takes the last step's fluxes. So a
-//! steady flow is exact in any case. Before and behind are treated alike, and a line the same from both of its ends.
+//! Each flux depends on those of the pipes before and behind it: w = r + a w(-1) + b w(+1). Where a and b are small, the last step's values
+//! suffice. Otherwise both neighbours are eliminated, which leaves w = r' + a' w(-2) + b' w(+2), and again, at twice the distance each time
+//! (cyclic reduction). Since the ground also causes friction, a' and b' soon are small: over a distance of twice the depth little is left.
+//! The remaining terms use the last step's fluxes. So a steady flow is exact in any case. Before and behind are treated alike: a line gives
+//! the same result from either end.
 
 use std::ops::Range;
 
@@ -14,7 +15,7 @@ use crate::shallow::solver::fast_films::{NORMAL, unpacked};
 use crate::shallow::solver::flux::{Step, greater, lesser};
 use crate::shallow::solver::pressurised::network::Network;
 
-/// Most reductions: a pipe knows of all within 16 cells.
+/// Maximum reductions: a pipe is coupled to all within 16 cells.
 const MOST: usize = 4;
 /// Below this sum of a and b, neighbours take their values of the last step.
 const LAGS: f32 = 0.5;
@@ -23,16 +24,16 @@ const ZEROS: [f32; STRIP] = [0.0; STRIP];
 /// Lines of pipes to the east, which lie along z, and of pipes to the south, along x.
 #[derive(Debug, Clone, Default)]
 pub struct Lines {
-    /// r, a, b of all pipes of both, and those of the next reduction.
+    /// r, a, b of all pipes in both directions, and those of the next reduction.
     now: [[Numbers; 3]; 2],
     next: [[Numbers; 3]; 2],
     /// Fluxes (units in this step).
     solved: [Numbers; 2],
-    /// The strips so many rows before and behind, or [`NONE`]; and those of the next reduction.
+    /// The strips at the present distance (rows) before and behind, or [`NONE`]; and those of the next reduction.
     far: [[Vec<u32>; 2]; 2],
 }
 
-/// What a pass over strips reads.
+/// The inputs of a pass over strips.
 struct Pass<'a> {
     step: &'a Step,
     liquid: &'a Liquid<'a>,
@@ -41,7 +42,7 @@ struct Pass<'a> {
     now: &'a [[Numbers; 3]; 2],
     /// Strips before and behind.
     far: [&'a [u32]; 2],
-    /// Cells to them.
+    /// Distance to them (cells).
     distance: usize,
 }
 
@@ -148,7 +149,7 @@ impl Lines {
     }
 }
 
-/// How many reductions a step needs, with liquid of a depth (units) somewhere.
+/// Count of reductions that a step needs, given the maximum depth (units).
 fn reductions(step: &Step, deepest: i32) -> usize {
     let deepest = greater(deepest as f32, 1.0);
     // a in a line of equal pipes without walls.
@@ -161,7 +162,7 @@ fn reductions(step: &Step, deepest: i32) -> usize {
     count
 }
 
-/// The network's pipes have their fluxes.
+/// Sets the known fluxes of the network's pipes.
 fn set_flooded(now: &mut [[Numbers; 3]; 2], network: &Network) {
     for (axis, at, flux) in network.fluxes() {
         let [rest, before, behind] = now[axis].each_mut().map(|numbers| &mut numbers.all_mut()[at]);
@@ -213,7 +214,7 @@ fn begin_newtonian(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f
     begin_strips::<false>(pass, strips, start, out);
 }
 
-/// r, a and b of a strip's pipes, and the last fluxes of those before and behind them.
+/// r, a and b of a strip's pipes.
 type System = [[f32; STRIP]; 3];
 
 #[inline(always)]
@@ -284,7 +285,7 @@ fn end_strips(pass: &Pass, strips: &[u32], start: usize, out: &mut [&mut [f32]; 
     }
 }
 
-/// Fluxes, of the last ones before and behind them.
+/// Fluxes, from the last fluxes of the pipes before and behind.
 #[inline(always)]
 fn end_strip(
     rest: &[f32; STRIP],
@@ -307,7 +308,7 @@ struct Pipe<'a> {
     open: &'a [f32; STRIP],
     light: &'a [u32; STRIP],
     flux: &'a [f32; STRIP],
-    /// What is beside the columns in all; contact before them and behind.
+    /// Total contact and walls of the columns; contact before them and behind.
     all: [&'a [f32; STRIP]; 2],
     contact: [[&'a [f32; STRIP]; 2]; 2],
     /// Depths at both ends of the pipes before and behind.
@@ -316,9 +317,9 @@ struct Pipe<'a> {
 }
 
 impl Pass<'_> {
-    /// What the pipes of a strip depend on, and the last fluxes of those before and behind.
+    /// Coefficients of a strip's pipes, and the last fluxes of those before and behind.
     ///
-    /// Without arrays that are mapped: closures that do not become part of their caller lack its instructions.
+    /// Written without `map` over arrays: closures that are not inlined are compiled without the caller's instruction set.
     #[inline(always)]
     fn begin<const THINS: bool, const AXIS: usize>(&self, strip: usize) -> (System, [[f32; STRIP]; 2]) {
         let Liquid { columns, pipes, fast, depth, flux, .. } = *self.liquid;
@@ -332,7 +333,7 @@ impl Pass<'_> {
         let mut system = [ZEROS; 3];
         let [rest, a, b] = &mut system;
         if AXIS == 0 {
-            // The columns to the east, and those of the rows before and behind. Behind the last one no pipe is open.
+            // The columns to the east, and those of the rows before and behind. Pipes behind the last column are closed.
             let is_known = columns.east(strip).is_none_or(|east| self.known[east]);
             let (mut far_all, mut far_first, mut far_second) = (ZEROS, ZEROS, ZEROS);
             let far = if is_known {
@@ -406,7 +407,7 @@ impl Pass<'_> {
         [rest.before(strip, 0), a.before(strip, 0), b.before(strip, 0)]
     }
 
-    /// Those of the pipes at the distance of this pass before a strip's, or behind them; what has none there takes nothing of it.
+    /// Those of the pipes before (or behind) a strip's, at the distance of this pass; absent pipes have coefficients 0.
     #[inline(always)]
     fn far<const AXIS: usize>(&self, strip: usize, side: usize) -> [&[f32; STRIP]; 3] {
         let [rest, a, b] = &self.now[AXIS];
@@ -452,7 +453,7 @@ fn shifted<T: Copy + Default>(numbers: &[T], strip: usize, positions: isize) -> 
     }
 }
 
-/// What the pipes of a strip depend on. Without anything beside it a pipe has the flux of `flux_of`, to the last bit.
+/// Coefficients of a strip's pipes. Without lateral friction a pipe has the flux of `flux_of`, to the last bit.
 #[inline(always)]
 fn begin_strip<const THINS: bool, const AXIS: usize>(
     step: &Step,
@@ -470,13 +471,13 @@ fn begin_strip<const THINS: bool, const AXIS: usize>(
         let light = unpacked(light[x])[AXIS];
         let mean = 0.5 * (depth[0] + depth[1]);
         let driven = step.kept * flux[x] + step.drive * light * fall as f32 * lesser(mean, step.section);
-        // What nothing drives is moved by its neighbours: from both ends the same.
+        // Without drive, only neighbours move the liquid: the smaller depth is the same from either end.
         let giver = if driven > 0.0 { depth[0] } else { depth[1] };
         let giver = if driven == 0.0 { lesser(depth[0], depth[1]) } else { giver };
         let square = giver * giver;
         let thinned = if THINS { step.thinned(flux[x], square) } else { 1.0 };
         let drag = light * if THINS { step.drag * thinned } else { step.drag };
-        // On a slope a film is thinner than its depth, which for friction at the ground `open` knows.
+        // On a slope a film is thinner than its vertical depth; for friction at the ground this is in `open`.
         let slope = rise as f32 * per_cell;
         let steep = 1.0 + lesser(slope * slope, 3.0);
         let lateral = if THINS { step.lateral * light * thinned } else { step.lateral * light } * steep;
@@ -490,7 +491,7 @@ fn begin_strip<const THINS: bool, const AXIS: usize>(
     }
 }
 
-/// The part of a pipe's section that is in contact, of the contact and the depths at both of its ends.
+/// The part of a pipe's section that is in contact, from the contact and the depths at both ends.
 #[inline(always)]
 fn taken(contact: [f32; 2], depth: [i32; 2]) -> f32 {
     lesser((contact[0] + contact[1]) / greater(depth[0] as f32 + depth[1] as f32, 1.0), 1.0)

@@ -1,16 +1,18 @@
-//! Friction beside a pipe: at walls, and between liquids that flow side by side at different speeds.
+//! Lateral friction: of pipes at walls, and between liquids that flow side by side at different speeds.
 //!
-//! With a velocity of u phi(z / H), phi being the profile of a wide film, momentum along a pipe weighted by phi over the depth (Galerkin) is
+//! With a velocity of u phi(z / H), where phi is the profile of a wide film, momentum along a pipe weighted by phi over the depth
+//! (Galerkin) is
 //!
 //! du/dt = g S - k nu u / H^2 + 6/5 nu d2u/dy2
 //!
-//! with k = 3 below a free surface, and 12 below a ceiling: 6/5 is the mean of phi^2, and u is 0 at a wall. In a closed square duct this carries
-//! 0.7 % less than the exact flow (White, *Viscous Fluid Flow*, 3-3.3), in a channel as deep as wide 2.8 % less, in flat ones both less off.
+//! with k = 3 below a free surface, and 12 below a ceiling: 6/5 is the mean of phi^2, and u is 0 at a wall. The discharge of a closed
+//! square duct is 0.7 % below the exact value (White, *Viscous Fluid Flow*, 3-3.3), that of a channel as deep as wide 2.8 % below; flat
+//! ones are closer.
 //!
-//! Differences in y are between a pipe and those beside it; a wall lies half a cell beyond it. What is beside a pipe (`beside.rs`) follows from the
-//! columns at both of its ends. Of both the mean counts, so that it is the same seen from either. All pipes beside each other make a line along x or z, which is
-//! solved at once (`lines.rs`): neither viscosity nor depth bounds the step. Films that are thinner than a sixteenth of a cell have nothing of this. Where all columns
-//! of two rows are, nothing is computed.
+//! Differences in y are between a pipe and those beside it; a wall lies half a cell beyond it. The surroundings of a pipe (`beside.rs`) are
+//! the mean of those of the columns at its ends, so that they are the same from either end. All pipes beside each other form a line along x
+//! or z, which is solved at once (`lines.rs`): neither viscosity nor depth limits the step. Films thinner than a sixteenth of a cell have
+//! no lateral friction. Where two rows have only such columns, nothing is computed.
 
 mod beside;
 mod flooded;
@@ -27,36 +29,36 @@ use crate::shallow::columns::{Columns, STRIP, strip_of};
 use crate::shallow::pipes::{Links, Pipes};
 use lines::Lines;
 
-/// What is beside columns is found again after so many steps of a frame.
+/// Steps of a frame after which the surroundings of columns are found again.
 const STEPS: u32 = 8;
-/// Columns from which on strips are divided among threads.
+/// Minimum columns for strips to be divided among threads.
 const LEAST: usize = 64 * STRIP;
 
-/// Friction beside pipes.
+/// Lateral friction of pipes.
 #[derive(Debug, Clone, Default)]
 pub struct Walls {
-    /// Whether there is any.
+    /// Whether it is enabled.
     is_on: bool,
-    /// Column indices that there are lists for.
+    /// Count of column indices that the lists hold.
     len: usize,
     /// Steps since the frame began.
     age: u32,
-    /// Rows with pipes that may have it in these steps.
+    /// Whether each row may have pipes with friction during these steps.
     rows: Vec<bool>,
-    /// Their active strips, and whether each is known since what is beside columns was found.
+    /// Their active strips, and whether each was included when the surroundings of columns were found.
     strips: Vec<u32>,
     known: Vec<bool>,
-    /// Whether a strip has ceilings, or positions without a column.
+    /// Whether each strip has ceilings, or positions without a column.
     roofed: Vec<bool>,
     /// Positions of each strip from which links lead to the east, south, west and north.
     linked: Vec<[u16; 4]>,
     has_links: bool,
-    /// Across x, then across z: what is beside each column in all ([`beside::Around`]), before it, and behind it.
+    /// Across x, then across z: total contact and walls of each column ([`beside::Around`]), contact before it, and contact behind it.
     beside: [[Numbers; 3]; 2],
     lines: Lines,
 }
 
-/// What friction is found in.
+/// The liquid whose friction is computed.
 #[derive(Clone, Copy)]
 pub struct Liquid<'a> {
     pub columns: &'a Columns,
@@ -68,13 +70,14 @@ pub struct Liquid<'a> {
     pub depth: &'a [i32],
     /// Fluxes to the east and to the south (units in the last step).
     pub flux: [&'a [f32]; 2],
-    /// At least the greatest depth of each row (units).
+    /// Upper bound of the depth of each row (units).
     pub row_depths: &'a [i32],
-    /// Whether other threads help.
+    /// Whether the work is divided among threads.
     pub is_divided: bool,
 }
 
-/// Numbers by column index, with some before the first and behind the last. Each list begins at another position of a page (`columns/per_column.rs`).
+/// Numbers by column index, with padding before the first and behind the last. Each list has a different offset within a page
+/// (`columns/per_column.rs`).
 #[derive(Debug, Clone, Default)]
 struct Numbers {
     before: usize,
@@ -88,7 +91,7 @@ impl Numbers {
         self.list.resize(self.before + len + 2 * STRIP, 0.0);
     }
 
-    /// From the first column on.
+    /// The numbers from the first column on.
     fn all(&self) -> &[f32] {
         &self.list[self.before..]
     }
@@ -97,7 +100,7 @@ impl Numbers {
         &mut self.list[self.before..]
     }
 
-    /// From some places before a strip on.
+    /// A strip of numbers, starting some positions before that of a strip.
     #[inline(always)]
     fn before(&self, strip: usize, positions: usize) -> &[f32; STRIP] {
         let at = self.before + strip * STRIP - positions;
@@ -106,13 +109,13 @@ impl Numbers {
 }
 
 impl Walls {
-    /// Memory for the friction of these columns.
+    /// Allocates memory for the friction of these columns.
     pub fn turn_on(&mut self, columns: &Columns) {
         self.is_on = true;
         self.fit(columns);
     }
 
-    /// The columns have changed.
+    /// Adapts to changed columns.
     pub fn fit(&mut self, columns: &Columns) {
         if !self.is_on {
             return;
@@ -150,18 +153,18 @@ impl Walls {
         self.age = 0;
     }
 
-    /// Whether the fluxes of a row's pipes are solved with what is beside them.
+    /// Whether the fluxes of a row's pipes are solved with lateral friction.
     #[inline(always)]
     pub fn row(&self, row: usize) -> bool {
         self.is_on && self.rows[row]
     }
 
-    /// Fluxes to the east and to the south (units in this step) of those rows.
+    /// Fluxes of those rows to the east and to the south (units in this step).
     pub fn solved(&self) -> [&[f32]; 2] {
         self.lines.solved()
     }
 
-    /// Begins a step: where in some steps friction beside pipes may be.
+    /// Begins a step; every few steps finds where pipes may have lateral friction.
     pub fn begin_step(&mut self, step: &Step, links: &Links, columns: &Columns, row_depths: &[i32]) {
         if !self.is_on {
             return;
@@ -180,7 +183,7 @@ impl Walls {
         }
     }
 
-    /// Finds the fluxes of all pipes with friction beside them; the network's are found already.
+    /// Computes the fluxes of all pipes with lateral friction; those of the network are already known.
     pub fn find(&mut self, step: &Step, liquid: &Liquid) {
         if !self.is_on || step.lateral == 0.0 {
             return;
@@ -205,7 +208,7 @@ impl Walls {
         for &strip in &self.strips {
             let strip = strip as usize;
             if !std::mem::replace(&mut self.known[strip], true) && !is_new {
-                // It was dry when that was found.
+                // It was dry when the surroundings were found.
                 for numbers in self.beside.iter_mut().flatten() {
                     numbers.all_mut()[strip * STRIP..][..STRIP].fill(0.0);
                 }
@@ -243,13 +246,13 @@ impl Walls {
     }
 }
 
-/// Those of some strips, in order, that are within a range.
+/// Those strips of a sorted list that are within a range.
 fn within<'a>(strips: &'a [u32], range: &Range<usize>) -> &'a [u32] {
     let at = |end: usize| strips.partition_point(|&strip| (strip as usize) < end);
     &strips[at(range.start)..at(range.end)]
 }
 
-/// Calls `work` with ranges of strips and their parts of lists, on several threads where that is asked for.
+/// Calls `work` with ranges of strips and their parts of lists, on several threads if `is_divided`.
 fn spread<const N: usize>(
     is_divided: bool,
     strips: Range<usize>,

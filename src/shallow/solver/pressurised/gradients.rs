@@ -1,41 +1,43 @@
-//! The heads of full columns by conjugate gradients, each node by its diagonal, with sums that do not depend on their order.
+//! The heads of full columns by conjugate gradients with a diagonal preconditioner; sums do not depend on their order.
 //!
-//! Each iteration reads and writes all nodes several times: their numbers lie in lists of their own, and those beside a node are found without its pipes.
+//! Each iteration reads and writes all nodes several times: so their numbers are kept in separate arrays, and neighbours are found without
+//! the pipes.
 
 use super::heads::{GIVE, LINK_SCALE, Node, scaled};
 use super::network::{At, Edge};
 use crate::shallow::columns::NONE;
 use crate::shallow::solver::stop::Stop;
 
-/// Most iterations for the heads of a step.
+/// Maximum iterations for the heads of a step.
 const ITERATIONS: usize = 500;
-/// Units by which a column's head may be off, if those around it were right.
+/// Tolerance (units) of a column's head, if those around it were exact.
 const RESIDUAL: f64 = 0.005;
-/// Numbers of a sum that are added at once.
+/// Numbers that are summed in parallel.
 const LANES: usize = 8;
 
-/// The system of a step's heads, and what iterates.
+/// The linear system of a step, and the vectors of the iteration.
 #[derive(Debug, Clone, Default)]
 pub(in crate::shallow::solver) struct Gradients {
-    /// Nodes to the east, west, south and north of each, and the conductance of the pipes to them; the node behind the last where there is none.
+    /// Nodes to the east, west, south and north of each, and the conductance of the pipes to them; where there is none, the index behind
+    /// the last node.
     beside: Vec<[u32; 4]>,
     through: Vec<[f64; 4]>,
     links: Vec<Link>,
-    /// Sum over links of each node, in 1/65536 unit; empty where there are no links.
+    /// Sum over the links of each node, in 1/65536 unit; empty without links.
     linked: Vec<i64>,
     /// 1 where a node is in the system, else 0.
     held: Vec<f64>,
     diagonal: Vec<f64>,
     over: Vec<f64>,
     residual: Vec<f64>,
-    /// Of each node, and 0 behind the last.
+    /// One for each node, and a 0 behind the last.
     direction: Vec<f64>,
     product: Vec<f64>,
-    /// Addends of a sum.
+    /// Terms of a sum.
     addends: Vec<f64>,
 }
 
-/// A pipe that is none between adjacent columns of a layer.
+/// A link: a pipe that is not between adjacent columns of a layer.
 #[derive(Debug, Clone, Copy)]
 struct Link {
     ends: [u32; 2],
@@ -43,7 +45,7 @@ struct Link {
 }
 
 impl Gradients {
-    /// With room for so many nodes.
+    /// With capacity for so many nodes.
     pub fn with_room(room: usize) -> Self {
         let numbers = || Vec::with_capacity(room + 1);
         Self {
@@ -61,7 +63,7 @@ impl Gradients {
         }
     }
 
-    /// Takes over which nodes are joined, by which pipes.
+    /// Sets the nodes' connections from the pipes.
     pub fn set(&mut self, nodes: &[Node], edges: &[Edge]) {
         let count = nodes.len();
         let node = |end: u32| end.min(count as u32);
@@ -72,7 +74,7 @@ impl Gradients {
             let mut through = [0.0; 4];
             for (side, edge) in node_edges.into_iter().enumerate().filter(|(_, edge)| *edge != NONE) {
                 let edge = &edges[edge as usize];
-                // To the east and to the south it is the first end.
+                // The node is the first end of its pipes to the east and to the south.
                 beside[side] = node(edge.ends[1 - side % 2]);
                 through[side] = edge.conductance;
             }
@@ -87,7 +89,8 @@ impl Gradients {
         self.linked.resize(if self.links.is_empty() { 0 } else { count + 1 }, 0);
     }
 
-    /// Finds the heads over the surface of the nodes in the system, from those that they have. When it is stopped they are of no use.
+    /// Solves for the heads above the surface of the nodes in the system, starting from their present ones. If stopped, the result is
+    /// meaningless.
     pub fn solve(&mut self, nodes: &mut [Node], stop: &Stop) {
         self.begin(nodes);
         let mut rest = self.by_diagonal();
@@ -110,7 +113,7 @@ impl Gradients {
         }
     }
 
-    /// Begins with the heads that the nodes have.
+    /// Starts from the present heads of the nodes.
     fn begin(&mut self, nodes: &mut [Node]) {
         let count = nodes.len();
         let number = |held: bool| if held { 1.0 } else { 0.0 };
@@ -139,15 +142,15 @@ impl Gradients {
         }
     }
 
-    /// Whether all heads are near enough.
+    /// Whether all residuals are within the tolerance.
     fn is_done(&self) -> bool {
-        // Links are not summed any closer.
+        // Link sums are no more precise than this.
         const LEAST: f64 = 4.0 / LINK_SCALE;
         let is_near = |(residual, diagonal): (&f64, &f64)| residual.abs() <= (RESIDUAL * diagonal).max(LEAST);
         self.residual.iter().zip(&self.diagonal).all(is_near)
     }
 
-    /// Applies the system to directions.
+    /// Multiplies the system's matrix by the search direction.
     fn apply(&mut self) {
         if !self.links.is_empty() {
             self.linked.fill(0);
@@ -184,7 +187,7 @@ impl Gradients {
         }
     }
 
-    /// Moves along the directions.
+    /// Advances along the search direction.
     fn go(&mut self, step: f64) {
         let Self { over, residual, direction, product, held, .. } = self;
         let nodes = over.iter_mut().zip(residual).zip(&direction[..]).zip(product).zip(held);
@@ -195,7 +198,7 @@ impl Gradients {
         }
     }
 
-    /// Turns the directions.
+    /// Updates the search direction.
     fn turn(&mut self, part: f64) {
         let Self { residual, direction, diagonal, held, .. } = self;
         for (((direction, residual), diagonal), held) in
@@ -224,7 +227,7 @@ impl Gradients {
     }
 }
 
-/// A sum that does not depend on its order: addends are cut to 2^-40 of the power of two below the greatest.
+/// A sum that does not depend on its order: terms are truncated to 2^-40 of the power of two below the largest.
 fn fixed_sum(numbers: &[f64]) -> f64 {
     let (chunks, rest) = numbers.as_chunks::<LANES>();
     let mut most = [0.0; LANES];

@@ -1,18 +1,18 @@
-//! The heads of full columns: the system that they follow from, which [`super::gradients`] solves.
+//! The linear system for the heads of full columns, which [`super::gradients`] solves.
 
 use super::network::{At, Edge, Network};
 use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::solver::stop::Stop;
 
-/// What is missing of a full column, and comes in a step.
+/// Part of a full column's missing liquid that is to flow in during a step.
 const REFILL: f64 = 0.5;
-/// Heads closer than this (units) are equal, as surfaces are that do not differ by a unit: liquid at rest stays at rest.
+/// Heads closer than this (units) are equal, like surfaces that differ by less than a unit: liquid at rest stays at rest.
 pub(in crate::shallow::solver) const EQUAL: f64 = 0.5;
-/// What a head over the surface takes up, as part of the conductance: so little that a closed cavity has a solution.
+/// Regularisation of the diagonal, as part of the conductance: just enough that a closed cavity has a solution.
 pub(in crate::shallow::solver) const GIVE: f64 = 1e-12;
-/// Rounds in which columns below their surface leave the system.
+/// Maximum rounds in which columns with a head below their surface leave the system.
 const RELEASES: usize = 3;
-/// Parts of a unit in which flows through links are summed.
+/// Fractions of a unit in which flows through links are summed.
 pub(in crate::shallow::solver) const LINK_SCALE: f64 = 65536.0;
 
 /// A full column in the system of heads.
@@ -20,11 +20,11 @@ pub(in crate::shallow::solver) const LINK_SCALE: f64 = 65536.0;
 pub(in crate::shallow::solver) struct Node {
     /// Its pipes to the east, west, south and north, or [`NONE`].
     pub edges: [u32; 4],
-    /// Whether it is in the system: else it has left it.
+    /// Whether it is still in the system.
     pub is_held: bool,
-    /// Head over its surface (units).
+    /// Head above its surface (units).
     pub over: f64,
-    /// What is to come in, less what would without heads; and the diagonal of the system.
+    /// Right side: the inflow required, less the inflow without heads; and the diagonal of the system.
     pub right: f64,
     pub diagonal: f64,
     /// Sum over links, in 1/65536 unit.
@@ -32,14 +32,14 @@ pub(in crate::shallow::solver) struct Node {
 }
 
 impl Node {
-    /// A node with the head over its surface of the last step.
+    /// A node with the head above its surface of the last step.
     pub fn new(over: f64) -> Self {
         Self { edges: [NONE; 4], is_held: true, over, right: 0.0, diagonal: 0.0, linked: 0 }
     }
 }
 
 impl Network {
-    /// Finds the heads of full columns with which as much flows out of each as flows in.
+    /// Finds the heads of full columns with which inflow and outflow of each are equal.
     pub(in crate::shallow::solver) fn find_heads(&mut self, columns: &Columns, stop: &Stop) {
         self.gradients.set(&self.nodes, &self.edges);
         for _ in 0..=RELEASES {
@@ -70,7 +70,7 @@ impl Network {
         }
     }
 
-    /// The right side of the system: what is to come in, less what would without heads over the surface; and its diagonal.
+    /// Sets the right side of the system (the inflow required, less the inflow without heads above the surface) and its diagonal.
     fn set_up(&mut self, columns: &Columns) {
         for at in 0..self.edges.len() {
             let edge = self.edges[at];
@@ -83,7 +83,7 @@ impl Network {
             let missing = REFILL * self.parties[node].room as f64;
             self.nodes[node].right = -missing - out;
         }
-        // The same sums of conductances: all count as out.
+        // The same sums, of conductances: both ends count as outflow.
         let links = self.edges.iter().filter(|edge| matches!(edge.at, At::Link(_)));
         self.nodes.iter_mut().for_each(|node| node.linked = 0);
         for edge in links {
@@ -102,7 +102,7 @@ impl Network {
         }
     }
 
-    /// Adds what flows through links to their nodes.
+    /// Adds the flow through links to their nodes.
     fn sum_links(&mut self, flow: impl Fn(&Edge) -> f64) {
         self.nodes.iter_mut().for_each(|node| node.linked = 0);
         for edge in self.edges.iter().filter(|edge| matches!(edge.at, At::Link(_))) {
@@ -115,7 +115,7 @@ impl Network {
         }
     }
 
-    /// What flows out of a node, with its links as they were summed.
+    /// The outflow of a node, including its summed links.
     fn out(&self, node: usize, flow: impl Fn(&Edge) -> f64) -> f64 {
         let node = &self.nodes[node];
         let through = |edge: u32| if edge == NONE { 0.0 } else { flow(&self.edges[edge as usize]) };
@@ -124,12 +124,12 @@ impl Network {
     }
 }
 
-/// A number of a link for a sum of such, whatever is asked for: their sums stay within 64 bits.
+/// Fixed-point value of a link's number, clamped so that any sum of such values fits 64 bits.
 pub(in crate::shallow::solver) fn scaled(number: f64) -> i64 {
     (number * LINK_SCALE).clamp(-1e16, 1e16) as i64
 }
 
-/// The height of a pipe's section (units): the depth of the column that gave last, within the opening between both.
+/// The height of a pipe's section (units): the depth of the last donor, within the opening between both columns.
 pub(in crate::shallow::solver) fn section(
     columns: &Columns,
     depth: &[i32],
@@ -144,7 +144,7 @@ pub(in crate::shallow::solver) fn section(
     let gives = match flux.partial_cmp(&0.0) {
         Some(std::cmp::Ordering::Greater) => depth[i],
         Some(std::cmp::Ordering::Less) => depth[j],
-        // From both ends the same.
+        // The result is the same from either end.
         _ => match eta(i).cmp(&eta(j)) {
             std::cmp::Ordering::Greater => depth[i],
             std::cmp::Ordering::Less => depth[j],

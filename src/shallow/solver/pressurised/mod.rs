@@ -1,4 +1,4 @@
-//! Columns that are full up to their ceiling: they push with a head instead of a surface.
+//! Columns that are full to their ceiling: they push with a head instead of a surface.
 
 mod gradients;
 mod heads;

@@ -1,9 +1,9 @@
-//! Flooded passages: columns that are full up to their ceiling push with a head instead of a surface (the extended pipes of Dagenais et al.,
+//! Flooded passages: columns that are full to their ceiling push with a head instead of a surface (the extended pipes of Dagenais et al.,
 //! Computers & Graphics 76, 2018, which the thesis leaves out).
 //!
-//! What flows into a full column flows out: the heads of a step follow from a linear system, by conjugate gradients whose sums do not
-//! depend on their order. The pipes of full columns form the *network*. What it moves is found before the fluxes of all others, and put in place behind
-//! them: all come from the same surface, or waves would grow. A head below the surface would be suction: such a column gives as if it were free.
+//! Inflow and outflow of a full column are equal: the heads of a step follow from a linear system, solved by conjugate gradients whose sums
+//! do not depend on their order. The pipes of full columns form the *network*. Its transfers are found before all other fluxes, and stored
+//! after them: all use the same surface, or waves would grow. A head below the surface would be suction: such a column acts as a free one.
 
 use std::ops::Range;
 
@@ -22,13 +22,13 @@ use crate::shallow::solver::stop::Stop;
 use crate::shallow::solver::transfers::limiter;
 use crate::shallow::solver::transfers::limiter::Party;
 
-/// A column is full when it misses at most its room over this.
+/// A column is full when its missing liquid is at most its height (base to ceiling) divided by this.
 pub const SLACK: i32 = 128;
 
-/// Columns of a network that there is room for from the beginning.
+/// Columns of a network for which capacity is reserved from the beginning.
 const ROOM: usize = 1024;
 
-/// A pipe of the network: its position in its array.
+/// A pipe of the network: its index in the array that holds it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::shallow::solver) enum At {
     /// To the east of a column.
@@ -45,12 +45,12 @@ pub(in crate::shallow::solver) struct Edge {
     pub at: At,
     /// Parties at both ends, or [`NONE`]: outside.
     pub ends: [u32; 2],
-    /// Flux without a difference of heads, and for a unit of it (units a step).
+    /// Flux at equal heads, and flux per unit of head difference (units a step).
     pub kept: f64,
     pub conductance: f64,
-    /// Surface outside (units), where one end is there.
+    /// Surface outside (units), where one end is outside.
     pub outside: f64,
-    /// Flux (units a step), and what truncation leaves of it.
+    /// Flux (units a step), and the remainder of its transfer.
     pub flux: f64,
     pub left: f64,
     /// Transfer (units).
@@ -67,39 +67,39 @@ pub struct Network {
     pub(in crate::shallow::solver) gradients: Gradients,
     /// Party of each column, or [`NONE`].
     party_of: Vec<u32>,
-    /// Head over the surface of each column in the last step (units).
+    /// Head above the surface of each column in the last step (units).
     pub(in crate::shallow::solver) over: PerColumn<f32>,
-    /// Whether a column of each row may have one.
+    /// Whether each row may have a column with a head.
     has_heads: Vec<bool>,
     /// The network's pipes, sorted.
     shut_east: Vec<u32>,
     shut_south: Vec<u32>,
     shut_links: Vec<u32>,
-    /// What the network changes: columns, sorted, and units.
+    /// Changes by the network: columns, sorted, and units.
     moves: Vec<(u32, i32)>,
 }
 
-/// The state that a network is found in.
+/// The state that a network is built from.
 pub struct State<'a> {
     /// H (units).
     pub depth: &'a [i32],
     /// Flux to the east and to the south (units a step).
     pub flux: [&'a [f32]; 2],
-    /// What truncation left of both (units).
+    /// Remainders of transfers, to the east and to the south (units).
     pub left: [&'a [f32]; 2],
     /// Flow through links.
     pub links: &'a LinkFlow,
-    /// Links that liquid falls freely from.
+    /// Overflow edges: links that liquid falls freely from.
     pub lips: &'a Lips,
-    /// Friction beside pipes.
+    /// Lateral friction of pipes.
     pub walls: &'a Walls,
 }
 
 impl Edge {
-    /// Makes it one that liquid falls freely over, out of a column.
+    /// Makes the pipe an overflow edge, out of a column.
     fn fall(&mut self, columns: &Columns, giver: u32, fall: Fall) {
         self.outside = f64::from(columns.bases()[giver as usize] - edge(columns));
-        // What flowed the other way before does not come back.
+        // Earlier flow in the opposite direction does not return.
         let outward = |flow: f64| if fall == Fall::Ahead { flow.max(0.0) } else { flow.min(0.0) };
         (self.kept, self.left) = (outward(self.kept), outward(self.left));
         if fall == Fall::Back {
@@ -109,9 +109,9 @@ impl Edge {
 }
 
 impl Network {
-    /// No network, for so many column indices and rows.
+    /// An empty network, for so many column indices and rows.
     pub fn new(columns: usize, rows: usize) -> Self {
-        // A tool that dips in floods some hundred columns: frames allocate nothing for them.
+        // A tool that dips in floods some hundred columns: frames must not allocate for them.
         let room = columns.min(ROOM);
         Self {
             parties: Vec::with_capacity(room),
@@ -128,7 +128,7 @@ impl Network {
         }
     }
 
-    /// Gives a part of the columns another count of indices; what they hold is then left over from before.
+    /// Changes the count of indices of a part of the columns; their contents are then unspecified.
     pub(in crate::shallow::solver) fn resize_part(&mut self, part: Range<usize>, len: usize) {
         self.clear();
         self.has_heads.fill(true);
@@ -136,13 +136,13 @@ impl Network {
         self.party_of.resize(self.over.len(), NONE);
     }
 
-    /// Heads over the surface (units) by column index: part of the state, as the next step's iterations begin with them.
+    /// Heads above the surface (units) by column index: part of the state, as the next step's iteration starts from them.
     pub fn over_mut(&mut self) -> &mut [f32] {
         self.has_heads.fill(true);
         &mut self.over
     }
 
-    /// As [`Network::over_mut`], to read.
+    /// As [`Network::over_mut`], read-only.
     pub fn over(&self) -> &[f32] {
         &self.over
     }
@@ -152,7 +152,7 @@ impl Network {
         size_of_val(&self.party_of[..]) + self.over.bytes() + self.has_heads.len()
     }
 
-    /// Columns that are dry have no heads.
+    /// Clears the heads of dry columns.
     pub fn dry(&mut self, columns: Range<usize>) {
         self.over[columns].fill(0.0);
     }
@@ -167,12 +167,12 @@ impl Network {
         self.nodes.len()
     }
 
-    /// The strips of its columns, and of those beside them.
+    /// The strips of its columns, and of the columns beside them.
     pub fn strips(&self) -> impl Iterator<Item = usize> {
         self.parties.iter().map(|party| party.column as usize / STRIP)
     }
 
-    /// Finds the full columns of the rows that are filling, of which some may have full ones, their heads and what flows through their pipes.
+    /// Finds the full columns of the rows that are filling and may have some, their heads, and the flow through their pipes.
     pub fn find(
         &mut self,
         step: &Step,
@@ -213,7 +213,7 @@ impl Network {
         self.moves.clear();
     }
 
-    /// Finds the full columns of a row; all others have no head.
+    /// Finds the full columns of a row; clears the heads of all others.
     fn find_full(&mut self, columns: &Columns, row: usize, depth: &[i32]) {
         let before = self.nodes.len();
         for strip in columns.row(row) {
@@ -267,7 +267,7 @@ impl Network {
                 let edge = self.join(step, columns, state, At::South(i as u32), [i, j], pipes.south[i]);
                 self.meet(edge, node, 2, j, 3);
             }
-            // Those between two full columns came with the other one.
+            // A pipe between two full columns was already added by the other one.
             let is_node = |network: &Self, j: usize| (network.party_of[j] as usize) < network.nodes.len();
             if let Some(j) = west.filter(|&j| pipes.east[j] > 0.0 && !is_node(self, j)) {
                 let edge = self.join(step, columns, state, At::East(j as u32), [j, i], pipes.east[j]);
@@ -369,7 +369,7 @@ impl Network {
         (self.edges.len() - 1) as u32
     }
 
-    /// Tells both columns of a pipe which it is.
+    /// Enters a pipe in the nodes at both of its ends.
     fn meet(&mut self, edge: u32, node: usize, side: usize, other: usize, other_side: usize) {
         self.nodes[node].edges[side] = edge;
         let other = self.party_of[other] as usize;
@@ -378,7 +378,7 @@ impl Network {
         }
     }
 
-    /// What flows with these heads.
+    /// Computes the fluxes for these heads.
     fn flow(&mut self, columns: &Columns) {
         for at in 0..self.edges.len() {
             let edge = self.edges[at];
@@ -394,7 +394,7 @@ impl Network {
         }
     }
 
-    /// What the units of the network's pipes leave of its fluxes, and change in its columns.
+    /// Finds the remainders of the network's pipes and the changes of its columns.
     fn decide(&mut self, columns: &Columns) {
         for edge in &mut self.edges {
             let asked = nearest(edge.flux + edge.left);
@@ -417,7 +417,7 @@ impl Network {
         self.moves.sort_unstable();
     }
 
-    /// Moves the network's units in a range of columns, and shuts its pipes there and in a range of links for the rest of the step.
+    /// Moves the network's units in a range of columns, and closes its pipes there and in a range of links for the rest of the step.
     pub fn move_units(
         &self,
         columns: &Range<u32>,
@@ -451,7 +451,7 @@ impl Network {
         })
     }
 
-    /// Puts the fluxes of the network in place, after the rest of the step.
+    /// Stores the fluxes of the network, after the rest of the step.
     pub fn put_back(
         &self,
         flux: &mut [PerColumn<f32>; 2],
@@ -481,7 +481,7 @@ impl Network {
     }
 }
 
-/// Which columns of a strip are full, of their bases, ceilings and depths.
+/// Which columns of a strip are full, given bases, ceilings and depths.
 #[inline]
 pub(in crate::shallow::solver) fn full_of([base, ceiling, depth]: [&[i32; STRIP]; 3]) -> [i32; STRIP] {
     let mut full = [0; STRIP];
@@ -492,7 +492,7 @@ pub(in crate::shallow::solver) fn full_of([base, ceiling, depth]: [&[i32; STRIP]
     full
 }
 
-/// The whole units of a transfer, the nearest (`flux::rounded`); those of a restored state may be beyond all bounds, and their sums have to fit 64 bits.
+/// A transfer rounded to whole units, and clamped: a restored state may exceed all bounds, and sums must fit 64 bits.
 fn nearest(transfer: f64) -> i64 {
     transfer.clamp(-1e15, 1e15).round() as i64
 }

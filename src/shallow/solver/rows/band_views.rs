@@ -1,4 +1,4 @@
-//! The arrays of a liquid, as the threads that work on bands of its rows see them: their own rows, which they change, and copies of those
+//! The arrays of a liquid, as seen by the threads that work on bands of its rows: each changes its own rows, and has copies of the rows
 //! before and behind, as they were at the start of the step.
 
 use std::ops::Range;
@@ -8,10 +8,10 @@ use crate::shallow::pipes::Links;
 use crate::shallow::scalars::MOST;
 use crate::shallow::solver::links::LinkFlow;
 
-/// Rows that a band sees beyond its own: three of which transfers are found, and one of depths.
+/// Rows that a band sees beyond its own: three of whose transfers are found, and one of which only depths are read.
 pub const BEYOND: usize = 4;
 
-/// A run of rows of all arrays; indices of columns and links count from where they start.
+/// A run of rows of all arrays; columns and links are counted from the start of the run.
 pub struct Part<'a> {
     /// First column index.
     pub start: usize,
@@ -21,9 +21,9 @@ pub struct Part<'a> {
     pub depth: &'a mut [i32],
     /// Flux to the east and to the south (units a step).
     pub flux: [&'a mut [f32]; 2],
-    /// What truncation left of both (units).
+    /// Remainders of transfers, to the east and to the south (units).
     pub left: [&'a mut [f32]; 2],
-    /// Flux of links, what truncation left, and their transfers.
+    /// Fluxes, remainders and transfers of links.
     pub links: LinkPart<'a>,
     /// Amounts of scalars; empty without them.
     pub amounts: [&'a mut [f64]; MOST],
@@ -33,18 +33,18 @@ pub struct Part<'a> {
 pub struct LinkPart<'a> {
     /// Flux (units a step).
     pub flux: &'a mut [f32],
-    /// What truncation left (units).
+    /// Remainder of the transfer (units).
     pub left: &'a mut [f32],
     /// Transfer in this step (units).
     pub transfer: &'a mut [f32],
-    /// What went over it freely; empty without scalars.
+    /// Amounts that fell freely over each link; empty without scalars.
     pub fallen: [&'a mut [f64]; MOST],
 }
 
 /// Copies of the rows beside a band.
 #[derive(Debug, Clone, Default)]
 pub struct Copy {
-    /// Which rows.
+    /// The rows that are copied.
     pub rows: Range<usize>,
     depth: Vec<i32>,
     flux: [Vec<f32>; 2],
@@ -63,11 +63,11 @@ pub struct Parts<'a> {
 }
 
 impl Copy {
-    /// Takes some rows of a liquid.
+    /// Copies some rows of a liquid.
     pub fn take(&mut self, columns: &Columns, links: &Links, rows: Range<usize>, liquid: &Part) {
         let (columns, links) = (indices(columns, &rows), link_range(links, &rows));
         self.rows = rows;
-        // One strip more for whoever reads the column to the east of the last one.
+        // Padded by one strip, so that the column to the east of the last one can be read.
         self.depth.clear();
         self.depth.extend_from_slice(&liquid.depth[columns.start..columns.end + STRIP]);
         for axis in 0..2 {
@@ -108,7 +108,7 @@ fn copy<T: Clone>(to: &mut Vec<T>, from: &[T]) {
     to.extend_from_slice(from);
 }
 
-/// Arrays of scalars in two parts; those that are empty have none.
+/// Arrays of scalars, split in two; empty where there are none.
 type Halves<'a> = ([&'a mut [f64]; MOST], [&'a mut [f64]; MOST]);
 
 fn split(all: [&mut [f64]; MOST], at: usize) -> Halves<'_> {
@@ -120,7 +120,7 @@ fn split(all: [&mut [f64]; MOST], at: usize) -> Halves<'_> {
 }
 
 impl<'a> Part<'a> {
-    /// All of a liquid.
+    /// The whole liquid.
     pub fn new(
         depth: &'a mut [i32],
         flux: [&'a mut [f32]; 2],
@@ -144,7 +144,7 @@ impl<'a> Part<'a> {
         }
     }
 
-    /// Divides it before a row.
+    /// Splits the part before a row.
     pub fn split(self, columns: &Columns, links: &Links, row: usize) -> [Self; 2] {
         let index = indices(columns, &(row..row)).start;
         let link = link_range(links, &(row..row)).start;
@@ -193,13 +193,13 @@ impl<'a> Parts<'a> {
         &mut self.parts[part]
     }
 
-    /// The part that a row is in, to read.
+    /// The part that a row is in, read-only.
     #[inline(always)]
     pub fn see(&self, row: usize) -> &Part<'a> {
         &self.parts[self.position(row)]
     }
 
-    /// The parts of a row and of the next one, where these are two.
+    /// The parts of a row and of the next one, if these differ.
     #[inline(always)]
     pub fn both(&mut self, row: usize) -> (&mut Part<'a>, Option<&mut Part<'a>>) {
         let (own, next) = (self.position(row), self.position(row + 1));

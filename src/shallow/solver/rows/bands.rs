@@ -1,4 +1,4 @@
-//! A step on several threads: each works on a band of rows.
+//! Multithreaded steps: each thread works on a band of rows.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,9 +11,9 @@ use crate::shallow::solver::flux::Step;
 use crate::shallow::solver::pressurised::network::SLACK;
 use crate::shallow::solver::transfers::scale;
 
-/// Columns from which on a step is divided among threads: below, starting them takes longer than they save.
+/// Minimum columns for a step to be divided among threads: below, starting them takes longer than they save.
 pub const LEAST_COLUMNS: usize = 100_000;
-/// Least rows of a band, so that what neighbours compute twice is little.
+/// Minimum rows of a band, to limit the work that neighbouring bands both do.
 const LEAST_ROWS: usize = 32;
 
 /// A band of rows and its buffers.
@@ -26,7 +26,7 @@ struct Band {
     stepped: Stepped,
 }
 
-/// For each row, whether it has columns that might fill up to their ceiling in a step, and whether it might have such that are full.
+/// For each row, whether columns might fill up to their ceiling in a step, and whether some might be full.
 #[derive(Clone, Copy)]
 pub struct Filling<'a> {
     pub may_fill: &'a [bool],
@@ -37,24 +37,24 @@ pub struct Filling<'a> {
 #[derive(Debug, Clone)]
 pub struct Bands {
     list: Vec<Band>,
-    /// Least room between base and ceiling in each row (units).
+    /// Minimum height between base and ceiling in each row (units).
     clearance: Vec<i32>,
-    /// At least the greatest depth in each row (units).
+    /// Upper bound of the depth in each row (units).
     deepest: Vec<i32>,
     /// Whether columns of each row might fill up to their ceiling in this step.
     may_fill: Vec<bool>,
-    /// The least room that a column of each row then has (units).
+    /// The minimum room of the columns of those rows (units).
     room: Vec<f32>,
-    /// Whether they might be full.
+    /// Whether each row might have full columns.
     may_be_full: Vec<bool>,
-    /// Bound of the inflow of a column, in multiples of the greatest depth beside it and its own.
+    /// Bound of a column's inflow, in multiples of the maximum of its own depth and those beside it.
     takes: i64,
     /// Count of scalars that the liquid carries.
     scalars: usize,
 }
 
 impl Bands {
-    /// One band over columns that have at most so many pipes each.
+    /// One band, over columns that have at most `pipes` pipes each.
     pub fn new(columns: &Columns, pipes: usize) -> Self {
         let count = columns.grid.size[1];
         let mut bands = Self {
@@ -82,7 +82,7 @@ impl Bands {
             + 2 * self.may_fill.len()
     }
 
-    /// Divides the rows among so many threads, by their columns; unless they are already.
+    /// Divides the rows among so many threads by their columns, unless they are already.
     pub fn divide(&mut self, columns: &Columns, threads: usize) {
         let rows = columns.grid.size[1];
         let wanted = if columns.len() < LEAST_COLUMNS { 1 } else { threads.min(rows / LEAST_ROWS).max(1) };
@@ -95,7 +95,7 @@ impl Bands {
             let end = if number + 1 == wanted {
                 rows
             } else {
-                // So many strips are before it, and at least the least rows.
+                // Ends where its share of the strips does, but leaves each band the minimum count of rows.
                 let before = strips * (number + 1) / wanted;
                 let left = (wanted - 1 - number) * LEAST_ROWS;
                 let even = (0..rows).find(|&row| columns.row(row).end >= before).unwrap_or(rows);
@@ -114,7 +114,7 @@ impl Bands {
         self.list = (0..wanted).map(band).collect();
     }
 
-    /// Makes buffers for liquid that carries so many scalars.
+    /// Makes buffers for liquid with so many scalars.
     pub fn carry(&mut self, columns: &Columns, scalars: usize) {
         let threads = self.list.len();
         self.scalars = scalars;
@@ -142,17 +142,17 @@ impl Bands {
         }
     }
 
-    /// Says that a column of a row has this depth (units).
+    /// Records that a column of a row has this depth (units).
     pub fn deepen(&mut self, row: usize, depth: i32) {
         self.deepest[row] = self.deepest[row].max(depth);
     }
 
-    /// At least the greatest depth (units).
+    /// Upper bound of the depth (units).
     pub fn deepest(&self) -> i32 {
         self.deepest.iter().copied().max().unwrap_or(0)
     }
 
-    /// At least the greatest depth of each row (units).
+    /// Upper bound of the depth in each row (units).
     pub(in crate::shallow) fn row_depths(&self) -> &[i32] {
         &self.deepest
     }
@@ -162,12 +162,12 @@ impl Bands {
         &mut self.deepest
     }
 
-    /// Rows that [`Bands::find_filling`] has found.
+    /// The rows found by [`Bands::find_filling`].
     pub fn filling(&self) -> Filling<'_> {
         Filling { may_fill: &self.may_fill, may_be_full: &self.may_be_full }
     }
 
-    /// Finds the rows with columns that might fill up; whether there is one.
+    /// Finds the rows with columns that might fill up; returns whether there is one.
     pub fn find_filling(&mut self) -> bool {
         let mut any = false;
         for row in 0..self.deepest.len() {
@@ -181,7 +181,7 @@ impl Bands {
         any
     }
 
-    /// One step; `ground` gets its rows that may fill from here.
+    /// One step; sets the rows of `ground` that may fill.
     pub fn step(&mut self, step: &Step, ground: &Ground, liquid: Part) {
         let Self { list, deepest, may_fill, room, .. } = self;
         let ground = Ground { may_fill, room, ..*ground };
@@ -200,13 +200,13 @@ impl Bands {
         self.list.len() > 1
     }
 
-    /// What the bands did, one after another.
+    /// The results of the bands, in order.
     pub fn results(&mut self) -> impl Iterator<Item = &mut Stepped> {
         self.list.iter_mut().map(|band| &mut band.stepped)
     }
 }
 
-/// Runs bands side by side.
+/// Runs bands in parallel.
 fn run(bands: &mut [Band], step: &Step, ground: &Ground, liquid: Part, deepest: &mut [i32]) {
     match bands {
         [] => {}
@@ -229,20 +229,20 @@ fn run(bands: &mut [Band], step: &Step, ground: &Ground, liquid: Part, deepest: 
     }
 }
 
-/// Runs the steps of a frame while the other threads of the pool stay awake for their bands: to wake one takes longer than a band of a step.
-/// Without a free thread the frame's own does all.
+/// Runs the steps of a frame while the other threads of the pool stay awake for their bands: waking a thread takes longer than one band of
+/// a step. If no thread is free, the frame's own thread does all the work.
 pub fn attended<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
     let done = AtomicBool::new(false);
     let ended = &done;
     let work = move || {
-        // Also when the work panics.
+        // Also set if the work panics.
         let _end = End(ended);
         work()
     };
     rayon::join(work, || attend(threads.saturating_sub(1), ended)).0
 }
 
-/// Takes jobs of the pool until the frame is done, on so many threads.
+/// Runs jobs of the pool, on so many threads, until the frame is done.
 fn attend(threads: usize, ended: &AtomicBool) {
     let wait = || {
         while !ended.load(Ordering::Acquire) {
@@ -267,14 +267,14 @@ impl Drop for End<'_> {
     }
 }
 
-/// Least room between base and ceiling of a row's columns (units).
+/// Minimum height between base and ceiling of a row's columns (units).
 fn clearance(columns: &Columns, row: usize) -> i32 {
     let mut least = i32::MAX;
     for strip in columns.row(row) {
         let present = columns.present(strip);
         let (base, ceiling) = (strip_of(columns.bases(), strip), strip_of(columns.ceilings(), strip));
         for x in 0..STRIP {
-            // What has no room at all is a wall.
+            // A column without any room is a wall.
             let is_room = present >> x & 1 == 1 && ceiling[x] > base[x];
             let room = if is_room { ceiling[x] - base[x] } else { i32::MAX };
             least = least.min(room);

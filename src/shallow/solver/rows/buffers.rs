@@ -1,4 +1,4 @@
-//! What is kept of a band's rows between their fluxes and their new depths.
+//! Buffers of a band: the values of its rows between their fluxes and their new depths.
 
 use std::ops::Range;
 
@@ -6,49 +6,49 @@ use super::positions::PAD;
 use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::solver::transfers::scalars::Lanes;
 
-/// Rows whose buffers are kept: a power of two, over the five that are in use at a time.
+/// Rows that have buffers at a time: a power of two, at least the five in use.
 pub const RING: usize = 8;
 /// Sweeps that find K_max.
 pub const SWEEPS: usize = 2;
 
-/// What is known of a row between its fluxes and its new depths; indices as the row's columns, behind [`PAD`].
+/// Values of a row between its fluxes and its new depths; indexed as the row's columns, offset by [`PAD`].
 #[derive(Debug, Clone)]
 pub struct Buffer {
     /// Transfers to the east and to the south (units).
     pub east: Vec<f32>,
     pub south: Vec<f32>,
-    /// K_min of each column, if one is not 1.
+    /// K_min of each column, if any is not 1.
     pub least: Vec<f32>,
     pub is_less: bool,
     /// Whether a column may fill up in this step.
     pub may_fill: bool,
-    /// K_max of each column, after each sweep, if one is not 1.
+    /// K_max of each column, after each sweep, if any is not 1.
     pub most: [Vec<f32>; SWEEPS],
     pub is_full: bool,
 }
 
 impl Buffer {
-    /// All factors are 1.
+    /// Sets all factors to 1.
     pub fn clear(&mut self) {
         (self.is_less, self.may_fill, self.is_full) = (false, false, false);
     }
 }
 
-/// Buffers of a band's rows in work.
+/// Buffers of the rows that a band is working on.
 #[derive(Debug, Clone)]
 pub struct Rows {
     pub ring: [Buffer; RING],
-    /// For neighbours that are not there, and factors that are all 1.
+    /// Stands in for absent neighbours, and for factors that are all 1.
     pub zeros: Vec<f32>,
     pub ones: Vec<f32>,
     /// Sums over links, by column; 0 between steps.
     pub linked: Vec<i64>,
-    /// What the rows carry.
+    /// The scalars that the rows carry.
     pub carried: Lanes,
 }
 
 impl Rows {
-    /// Buffers for rows of these columns, whose liquid carries so many scalars.
+    /// Buffers for rows of these columns, for liquid with so many scalars.
     pub fn new(columns: &Columns, scalars: usize) -> Self {
         let room = room(columns, 0..columns.grid.size[1]);
         let buffer = Buffer {
@@ -96,7 +96,7 @@ impl Rows {
     }
 }
 
-/// Numbers of a buffer for the widest of some rows.
+/// Length of a buffer for the widest of some rows.
 fn room(columns: &Columns, rows: Range<usize>) -> usize {
     rows.map(|row| columns.row(row).len()).max().unwrap_or(0) * STRIP + 2 * PAD
 }

@@ -1,10 +1,10 @@
-//! A step, row by row: fluxes, their scaling and the new depths follow each other at a distance of a few rows, so that what one
-//! has read or written is still in the cache for the next (thesis Alg. 4.1, lines 1 to 4).
+//! A step, row by row: fluxes, their scaling and the new depths follow each other at a distance of a few rows, so that data that one has
+//! read or written is still in the cache for the next (thesis Alg. 4.1, lines 1 to 4).
 //!
 //! When the front is at row r, the fluxes and K_min of r are computed; with these the pipes of r - 1 can be scaled. Where there are
-//! ceilings, K_max of r - 1 follows, and that of r - 2 once more, with the room that outflow makes. The transfers of the row behind these
-//! are then final, and its depths change; nothing in front reads that row again. A band starts some rows before its own rows and ends
-//! some rows after them, on copies, so that it finds the same numbers there as its neighbours.
+//! ceilings, K_max of r - 1 follows, and K_max of r - 2 is refined with the room that outflow makes. The transfers of the row behind these
+//! are then final, and its depths change; no later stage reads that row again. A band starts some rows before its own rows and ends some
+//! rows after them, on copies, so that it computes the same values there as its neighbours.
 
 pub(in crate::shallow::solver) mod band_views;
 pub(in crate::shallow) mod bands;
@@ -30,29 +30,29 @@ use band_views::Parts;
 use buffers::{Buffer, RING, Rows, SWEEPS};
 use positions::{PAD, Place};
 
-/// What a step is made on.
+/// The inputs of a step.
 pub struct Ground<'a> {
     /// Columns.
     pub columns: &'a Columns,
     /// Pipes between them.
     pub pipes: &'a Pipes,
-    /// Strips that are worked on.
+    /// Active strips.
     pub active: &'a Active,
-    /// What flows through full columns.
+    /// Flow through full columns.
     pub network: &'a Network,
-    /// Films whose inertia counts less.
+    /// Films with reduced inertia.
     pub fast: &'a Fast,
-    /// Friction beside pipes.
+    /// Lateral friction of pipes.
     pub walls: &'a Walls,
-    /// Links that liquid falls freely from.
+    /// Overflow edges: links that liquid falls freely from.
     pub lips: &'a Lips,
-    /// Whether what is slow may come to rest.
+    /// Whether slow liquid may come to rest.
     pub may_rest: bool,
     /// Rows with columns that may fill up,
     pub may_fill: &'a [bool],
-    /// and the least room that each row's columns have (units).
+    /// and the minimum room of each row's columns (units).
     pub room: &'a [f32],
-    /// What the laws of scalars do.
+    /// Changes of scalars by their laws.
     pub acts: &'a [Act],
 }
 
@@ -68,22 +68,22 @@ impl Ground<'_> {
     }
 }
 
-/// What a band of a step did.
+/// Results of a band in a step.
 #[derive(Debug, Clone, Default)]
 pub struct Stepped {
-    /// Rows with columns that would have given more than they have, with such that would have taken more than there is room for, and with fast
-    /// films that were held back.
+    /// Counts of rows with columns that would have given more than they had, with columns that would have received more than they had room
+    /// for, and with fast films that were limited.
     pub scaled: [u32; 3],
-    /// What went out of the domain.
+    /// Units that crossed the border.
     pub outside: Outside,
-    /// Strips that got wet.
+    /// Strips that became wet.
     pub woken: Vec<u32>,
-    /// What happened to scalars.
+    /// Changes of scalars.
     pub carried: [Changes; MOST],
 }
 
 impl Rows {
-    /// One step of a band of rows; `deepest` receives the greatest depth of each (units).
+    /// One step of a band of rows; `deepest` receives the maximum depth of each (units).
     pub fn step(
         &mut self,
         step: &Step,
@@ -92,7 +92,7 @@ impl Rows {
         deepest: &mut [i32],
         stepped: &mut Stepped,
     ) {
-        /// A copy of the step for each kind of flow and each set of instructions.
+        /// Instantiates the step for each variant of flow and each instruction set.
         macro_rules! run {
             ($($viscous:literal $whole:literal $thins:literal)*) => {
                 match (step.drag > 0.0, step.is_whole, step.drag > 0.0 && step.thinning.is_some()) {
@@ -146,7 +146,7 @@ impl Rows {
                 let over = self.find_least(ground, parts, front);
                 stepped.scaled[0] += u32::from(over && own.contains(&front));
             }
-            // The row that is so far behind the front, if the band has begun with it.
+            // The row at a distance behind the front, if the band includes it.
             let at = |distance: usize| front.checked_sub(distance).filter(|row| (start..count).contains(row));
             if let Some(row) = at(1) {
                 self.shrink(ground, parts, row);
@@ -171,7 +171,7 @@ impl Rows {
         }
     }
 
-    /// Fluxes of a row's pipes; whether fast films were held back.
+    /// Computes the fluxes of a row's pipes; returns whether fast films were limited.
     #[inline(always)]
     fn drive<K: Kind>(&mut self, step: &Step, ground: &Ground, parts: &mut Parts, row: usize) -> bool {
         let Ground { columns, pipes, active, fast, .. } = ground;
@@ -190,7 +190,7 @@ impl Rows {
             }
             end = at + span.len as usize;
             let depth = &own.depth[span.first as usize - own.start..];
-            // Behind the last strip of a band no depth follows: it is driven by itself, on a copy with the next row's first.
+            // No depth follows the last strip of a band: it is done separately, on a copy with the first depth of the next row.
             let (mut last, len) = ([0; STRIP + 1], span.len as usize);
             let cut = if depth.len() > len { len } else { len - STRIP };
             if cut < len {
@@ -249,7 +249,7 @@ impl Rows {
         is_held
     }
 
-    /// What the network moves, behind the fluxes of all pipes of a row.
+    /// Closes the pipes that belong to the network, after the fluxes of a row.
     fn shut(&mut self, ground: &Ground, parts: &mut Parts, row: usize) {
         let (position, buffer) = (Place::new(ground.columns, row), &mut self.ring[row % RING]);
         let part = parts.of(row);
@@ -265,7 +265,7 @@ impl Rows {
         );
     }
 
-    /// K_min of a row's columns; whether one is not 1.
+    /// Finds K_min of a row's columns; returns whether any is not 1.
     #[inline(always)]
     fn find_least(&mut self, ground: &Ground, parts: &Parts, row: usize) -> bool {
         let Ground { columns, pipes, active, .. } = ground;
@@ -291,7 +291,7 @@ impl Rows {
             for &column in pipes.links.columns_of(row) {
                 own.least[position.of(column)] += std::mem::take(&mut sums[position.of(column)]) as f32;
             }
-            // Few columns have links, but any may be over now.
+            // Few columns have links, but any of these may now exceed its depth.
             over = true;
         }
         if may_fill {
@@ -341,7 +341,7 @@ impl Rows {
         part.links.scale(&ground.pipes.links, ground.lips, (row, first_link), true, factor);
     }
 
-    /// Moves what a row's links transfer, from and to the band's own columns.
+    /// Applies the transfers of a row's links to the band's own columns.
     fn move_links(&self, ground: &Ground, parts: &mut Parts, row: usize, outside: &mut Outside) {
         let links = &ground.pipes.links;
         if links.row(row).is_empty() {
@@ -365,7 +365,7 @@ impl Rows {
         });
     }
 
-    /// Moves a row's transfers; returns its greatest new depth.
+    /// Applies a row's transfers; returns its maximum new depth.
     #[inline(always)]
     fn transfer(&mut self, ground: &Ground, parts: &mut Parts, row: usize, woken: &mut Vec<u32>) -> i32 {
         let [own, north] =
@@ -385,7 +385,7 @@ impl Rows {
         deepest.into_iter().fold(ground.active.asleep_depth(row), i32::max)
     }
 
-    /// Moves what a row's transfers take along; its depths are final.
+    /// Moves the scalars of a row's transfers; its depths are final.
     fn carry(&mut self, ground: &Ground, parts: &mut Parts, row: usize, changes: &mut [Changes; MOST]) {
         let Self { carried, ring, .. } = self;
         let Buffer { east, south, .. } = &ring[row % RING];
@@ -394,7 +394,7 @@ impl Rows {
     }
 }
 
-/// Calls `add` with each column of a row that gives through a link, or takes, and how much.
+/// Calls `add` with each column of a row that gives or receives through a link, and how much.
 pub(super) fn each_link(
     ground: &Ground,
     parts: &Parts,

@@ -1,33 +1,33 @@
-//! Where columns are in the buffers of their rows.
+//! Positions of columns in the buffers of their rows.
 
 use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::solver::active::Span;
 use crate::shallow::solver::transfers::scale::{Around, Beside};
 
-/// Numbers before the first of a row's buffer: what lies west of it.
+/// Padding before a row's buffer, for what lies west of it.
 pub const PAD: usize = STRIP;
 
-/// Where the columns of a row, and of those beside it, are in their buffers.
+/// Positions of the columns of a row, and of the rows beside it, in their buffers.
 pub struct Place {
-    /// First index of the rows before, itself, and behind.
+    /// First index of the row before, of the row itself, and of the row behind.
     starts: [usize; 3],
 }
 
 impl Place {
-    /// Of a row.
+    /// Positions for a row.
     #[inline(always)]
     pub fn new(columns: &Columns, row: usize) -> Self {
         let start = |row: usize| columns.row(row.min(columns.grid.size[1] - 1)).start * STRIP;
         Self { starts: [start(row.saturating_sub(1)), start(row), start(row + 1)] }
     }
 
-    /// Of a column of the row.
+    /// Position of a column of the row.
     #[inline(always)]
     pub fn of(&self, index: u32) -> usize {
         PAD + index as usize - self.starts[1]
     }
 
-    /// A number of a column of this row or the next one.
+    /// The value of a column of this row or the next one.
     #[inline(always)]
     pub fn pick<T: Copy>(&self, own: &[T], beyond: &[T], index: u32) -> T {
         let index = index as usize;
@@ -57,13 +57,13 @@ impl Place {
         }
     }
 
-    /// Numbers of the columns to the north of a span.
+    /// Values of the columns to the north of a span.
     #[inline(always)]
     pub fn north<'a, T>(&self, numbers: &'a [T], none: &'a [T], span: &Span) -> &'a [T] {
         if span.north == NONE { none } else { &numbers[PAD + span.north as usize - self.starts[0]..] }
     }
 
-    /// A number of the columns of a span, and of those around them.
+    /// A value of the columns of a span, and of those around them.
     #[inline(always)]
     pub fn beside<'a, T>(&self, own: &'a [T], beyond: &'a [T], none: &'a [T], span: &Span) -> Beside<'a, T> {
         let south =

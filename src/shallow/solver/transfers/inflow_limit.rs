@@ -1,5 +1,5 @@
-//! K_max: what comes into columns is scaled to the room that they have (thesis 4.1.1). Few rows have columns that could fill up in a step: those are
-//! known from the sums of what is to come, before they are scaled.
+//! K_max: scales the inflow of columns to their room (thesis 4.1.1). Few rows have columns that could fill up in a step: they are found
+//! from the unscaled sums of inflow.
 
 use super::scale;
 use crate::shallow::solver::flux::{greater, lesser};
@@ -9,7 +9,7 @@ use crate::shallow::solver::rows::positions::Place;
 use crate::shallow::solver::rows::{Ground, each_link};
 
 impl Rows {
-    /// K_max of a row's columns, as if nothing left them; whether one is not 1.
+    /// K_max of a row's columns, as if nothing flowed out; returns whether any is not 1.
     #[inline(always)]
     pub(in crate::shallow::solver) fn find_most(
         &mut self,
@@ -47,7 +47,7 @@ impl Rows {
         is_full
     }
 
-    /// K_max of a row's columns once more, with the room that what leaves them makes.
+    /// Refines K_max of a row's columns with the room that their outflow makes.
     #[inline(always)]
     pub(in crate::shallow::solver) fn find_more(&mut self, ground: &Ground, parts: &Parts, row: usize) {
         let Ground { columns, pipes, active, .. } = ground;
@@ -76,7 +76,7 @@ impl Rows {
                         - lesser(around.west[x], 0.0) * first_most[at + x - 1];
                     let across = greater(around.south[x], 0.0) * near.south[x]
                         - lesser(around.north[x], 0.0) * north_most[x];
-                    // Truncation takes up to a unit from each.
+                    // Truncation removes up to a unit from each.
                     let leaves = greater((along + across) * scale::MARGIN - 4.0, 0.0);
                     let room =
                         scale::room(columns.bases()[i], columns.ceilings()[i], part.depth[i - part.start]);
@@ -86,7 +86,7 @@ impl Rows {
                 }
             }
         }
-        // What comes through links is not in the sum: their columns keep the first sweep's.
+        // The sum lacks the flow through links: their columns keep the first sweep's value.
         for &column in pipes.links.columns_of(row) {
             most[position.of(column)] = first_most[position.of(column)];
         }
@@ -123,7 +123,7 @@ impl Rows {
     }
 }
 
-/// The most that is to come into a column of a row through links (units); `sums` are 0, before and behind.
+/// The maximum inflow through links of a column of a row (units); `sums` are 0 before and after.
 pub(in crate::shallow::solver) fn most_through_links(
     ground: &Ground,
     parts: &Parts,

@@ -1,22 +1,22 @@
 //! Iterative limiter of integer transfers: no column gives more than it has or takes more than it has room for.
 //!
-//! All are cut at once in each round, by integers, so that nothing depends on an order: first to what their givers have, then, until nothing
-//! is over, to what their takers have room for with what they give. Each cut makes others safer as givers, and may leave them too little room
-//! as takers: that is for the next round.
+//! Each round cuts all transfers simultaneously, in integers, so that nothing depends on an order: first to what the donors have, then,
+//! until no column is over, to the receivers' room, including what they give. Each cut makes its columns safer as donors, but may leave
+//! them too little room as receivers; the next round corrects that.
 
 use crate::shallow::columns::NONE;
 use crate::shallow::solver::pressurised::network::Edge;
 use crate::shallow::solver::stop::Stop;
 
-/// Rounds in which inflow is cut in proportion; then it is cut to nothing.
+/// Rounds in which inflow is cut in proportion; after these it is cut to 0.
 const CUTS: usize = 64;
 
-/// A column at an end of such a transfer.
+/// A column at an end of a limited transfer.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in crate::shallow::solver) struct Party {
     /// Its index.
     pub column: u32,
-    /// Units that it has, and that it has room for.
+    /// Units that it has, and units that it has room for.
     pub has: i64,
     pub room: i64,
     /// Units that it gives and takes in this round.
@@ -24,7 +24,7 @@ pub(in crate::shallow::solver) struct Party {
     pub takes: i64,
 }
 
-/// Cuts the units of transfers, unless it is stopped.
+/// Limits the units of transfers, unless it is stopped.
 pub(in crate::shallow::solver) fn settle(parties: &mut [Party], edges: &mut [Edge], stop: &Stop) {
     count(parties, edges);
     for edge in edges.iter_mut() {
@@ -51,7 +51,7 @@ pub(in crate::shallow::solver) fn settle(parties: &mut [Party], edges: &mut [Edg
     }
 }
 
-/// units x part / whole, toward zero.
+/// units x part / whole, rounded toward zero.
 fn share(units: i64, part: i64, whole: i64) -> i64 {
     (i128::from(units) * i128::from(part) / i128::from(whole)) as i64
 }

@@ -1,7 +1,8 @@
-//! What transfers take along of the scalars: of each the share of the amount that the transfer is of the depth, at the concentration with which the
-//! step begins (behind what flooded passages move, which comes first).
+//! Transport of scalars: a transfer moves the same share of a column's amounts as of its depth, at the concentration at the start of the
+//! step (after the transfers of flooded passages, which come first).
 //!
-//! It follows the rows of a step (`rows.rs`): the levels of the row in front, and, when the transfers of a row are final, what these take along.
+//! It follows the rows of a step (`rows/`): first the levels of the row in front, then, when the transfers of a row are final, their
+//! amounts.
 
 use super::whole_units::take_along;
 use crate::numeric::cpu::dispatch;
@@ -15,14 +16,14 @@ use crate::shallow::solver::rows::band_views::{Parts, indices};
 use crate::shallow::solver::rows::buffers::RING;
 use crate::shallow::solver::rows::positions::Place;
 
-/// What is kept of a scalar in the rows of a band in work; indices as in `Buffer`.
+/// Values of a scalar in the rows that a band is working on; indexed as in `Buffer`.
 #[derive(Debug, Clone)]
 struct Lane {
     /// Concentrations (levels).
     level: [Vec<f64>; RING],
-    /// Amounts that go to the south, of a row and the one before.
+    /// Amounts that move to the south, of a row and the one before.
     south: [Vec<f64>; 2],
-    /// Amounts that go to the east.
+    /// Amounts that move to the east.
     east: Vec<f64>,
 }
 
@@ -30,12 +31,12 @@ struct Lane {
 #[derive(Debug, Clone, Default)]
 pub struct Lanes {
     lanes: Vec<Lane>,
-    /// For neighbours that are not there.
+    /// Stands in for absent neighbours.
     none: Vec<f64>,
 }
 
 impl Lanes {
-    /// So many scalars, in rows of so many numbers.
+    /// For so many scalars, in rows of so many numbers.
     pub fn new(count: usize, room: usize) -> Self {
         let numbers = || vec![0.0; room];
         let lane = |_| Lane {
@@ -52,7 +53,7 @@ impl Lanes {
         self.lanes.is_empty()
     }
 
-    /// Makes room for rows of so many numbers.
+    /// Grows the buffers for rows of so many numbers.
     pub fn widen(&mut self, room: usize) {
         for Lane { level, south, east } in &mut self.lanes {
             level.iter_mut().chain(south).for_each(|numbers| numbers.resize(room, 0.0));
@@ -83,7 +84,7 @@ impl Lanes {
         }
     }
 
-    /// Moves what the links of a row take along, from and to the band's own columns.
+    /// Moves the scalars of a row's links, from and to the band's own columns.
     #[inline(never)]
     pub fn move_links(&self, ground: &Ground, parts: &mut Parts, row: usize, changes: &mut [Changes; MOST]) {
         let links = &ground.pipes.links;
@@ -93,13 +94,13 @@ impl Lanes {
         for (scalar, lane) in self.lanes.iter().enumerate() {
             let [levels, beyond] = [row, row + 1].map(|row| &lane.level[row % RING]);
             for link in links.row(row) {
-                // As whole units move.
+                // The same whole units that the liquid moves.
                 let units = part.links.transfer[link - part.first_link] as i32;
                 if units == 0 {
                     continue;
                 }
                 let (from, to, fall) = (links.from[link], links.to[link], ground.lips.at(link));
-                // From outside comes what is like the liquid inside.
+                // Liquid from outside has the concentrations of the liquid inside.
                 let giver = if units > 0 || to == NONE { from } else { to };
                 let moved = share(position.pick(levels, beyond, giver), f64::from(units));
                 let mut change = |column: u32, amount: f64| {
@@ -130,7 +131,8 @@ impl Lanes {
         }
     }
 
-    /// Finds what a row's transfers to the east and to the south take along, and moves it, if the row is the band's own; then the laws act.
+    /// Finds the amounts that a row's transfers to the east and to the south move, and applies them, if the row is the band's own; then the
+    /// laws act.
     #[inline(never)]
     pub fn move_row(
         &mut self,
@@ -183,7 +185,7 @@ impl Lanes {
     }
 }
 
-/// Concentrations of columns. A plain loop: of strips in a loop, as they are elsewhere, the compiler would gather one number of each.
+/// Concentrations of columns. A plain loop: with strips in a loop, as elsewhere, the compiler would gather single numbers.
 fn find_levels(amount: &[f64], depth: &[i32], levels: &mut [f64]) {
     dispatch!(body(amount: &[f64], depth: &[i32], levels: &mut [f64]));
 
@@ -195,8 +197,8 @@ fn find_levels(amount: &[f64], depth: &[i32], levels: &mut [f64]) {
     }
 }
 
-/// Moves amounts that go to the east, come from the west, go to the south and come from the north; returns what stays behind in columns that ran
-/// dry, which is taken from them: it is at most half of the smallest amount for each pipe.
+/// Applies amounts that move to the east, from the west, to the south and from the north. Removes what remains in columns that ran dry, at
+/// most half of the smallest amount for each pipe, and returns its sum.
 fn move_amounts(around: &[&[f64]; 4], depth: &[i32], amount: &mut [f64]) -> i64 {
     return dispatch!(body(around: &[&[f64]; 4], depth: &[i32], amount: &mut [f64]) -> i64);
 
@@ -228,7 +230,7 @@ fn move_amounts(around: &[&[f64]; 4], depth: &[i32], amount: &mut [f64]) -> i64 
     }
 }
 
-/// Changes amounts by a law; returns their sum's growth.
+/// Changes amounts by a law; returns the growth of their sum.
 fn obey(act: Act, depth: &[i32], amount: &mut [f64]) -> i64 {
     return dispatch!(body(act: Act, depth: &[i32], amount: &mut [f64]) -> i64);
 
@@ -257,7 +259,8 @@ fn obey(act: Act, depth: &[i32], amount: &mut [f64]) -> i64 {
 }
 
 impl Network {
-    /// Moves what the network's units take along, at the concentrations before; `depth` is that before, too. `fallen` gets what goes over lips.
+    /// Moves the scalars of the network's units, at the concentrations before the transfer; `depth` is also the one before. `fallen`
+    /// receives what goes over overflow edges.
     pub fn carry(
         &self,
         depth: &[i32],

@@ -1,16 +1,16 @@
 //! Scaling of transfers, so that no column gives more than it has or takes more than it has room for (thesis 4.1.1, K_min and K_max).
 //!
-//! A pipe's transfer is multiplied by one K_min, of the column that gives, and one K_max, of the one that takes: what leaves one column
-//! arrives in the other. K_max depends on what leaves the column in the same step, which depends on the K_max of others: it is found in
-//! sweeps, from below, so that it is safe after each.
+//! A pipe's transfer is multiplied by K_min of the donor and K_max of the receiver: what leaves one column arrives in the other. K_max
+//! depends on the outflow of its column in the same step, which depends on the K_max of others: it is found in sweeps, from below, so that
+//! it is safe after each.
 
 use crate::shallow::columns::{STRIP, strip_from, strip_mut, strip_of};
 use crate::shallow::solver::flux::{greater, lesser};
 
-/// Depths and room are counted as this much less, and sums of four or more rounded transfers stay within them.
+/// Factor on depths and room: sums of four or more rounded transfers then stay within them.
 pub const MARGIN: f32 = 1.0 - 1.0 / (1u32 << 20) as f32;
 
-/// The transfers (units) of a span's pipes on all sides; `west` begins one before `east`, so that each column's is at its position.
+/// The transfers (units) of a span's pipes on all sides; `west` begins one element before `east`, so that all four are indexed by column.
 pub struct Around<'a> {
     /// To the east.
     pub east: &'a [f32],
@@ -23,29 +23,29 @@ pub struct Around<'a> {
 }
 
 impl<'a> Around<'a> {
-    /// Those of a strip of the span: to the east, from the west, to the south, and from the north.
+    /// The transfers of a strip of the span: to the east, from the west, to the south, and from the north.
     #[inline(always)]
     pub fn strip(&self, strip: usize) -> [&'a [f32; STRIP]; 4] {
         [self.east, self.west, self.south, self.north].map(|numbers| strip_of(numbers, strip))
     }
 }
 
-/// One number of the columns of a span, and of those around them.
+/// A quantity of the columns of a span, and of those around them.
 pub struct Beside<'a, T = f32> {
-    /// The span's own, and one more: the columns to the east.
+    /// The span's own columns, and one more: the column to the east.
     pub own: &'a [T],
-    /// Those to the south.
+    /// The columns to the south.
     pub south: &'a [T],
 }
 
-/// The depth that a column can give (units): a dry one keeps what is less than a unit.
+/// The depth that a column can give (units); for a dry one almost a unit, which moves nothing.
 #[inline(always)]
 fn spare(depth: i32) -> f32 {
     (depth.max(1)) as f32 * MARGIN
 }
 
-/// Sums what is to leave each column; whether it is more than the column has anywhere. Where columns may fill up, `into` is raised to the most that is to
-/// come into one of each position.
+/// Sums the outflow of each column; returns whether it exceeds the depth of any. Where columns may fill up, `into` is raised to the maximum
+/// inflow at each position of a strip.
 #[inline(always)]
 pub fn outflow<const FILLS: bool>(
     depth: &[i32],
@@ -81,7 +81,7 @@ fn outflow_of<const FILLS: bool>(
     }
 }
 
-/// Turns what is to leave each column into K_min; returns the least.
+/// Turns the outflow of each column into K_min; returns the minimum.
 #[inline(always)]
 pub fn least(depth: &[i32], out: &mut [f32]) -> f32 {
     let mut least = [1.0; STRIP];
@@ -100,7 +100,7 @@ fn least_of(depth: &[i32; STRIP], out: &mut [f32; STRIP], least: &mut [f32; STRI
     }
 }
 
-/// Multiplies transfers and fluxes by K_min of the columns that give.
+/// Multiplies transfers and fluxes by K_min of the donors.
 #[inline(always)]
 pub fn shrink(
     least: &Beside,
@@ -112,7 +112,7 @@ pub fn shrink(
     scale(least, east, south, flux_east, flux_south, |own, other| [own, other]);
 }
 
-/// Multiplies transfers and fluxes by K_max of the columns that take.
+/// Multiplies transfers and fluxes by K_max of the receivers.
 #[inline(always)]
 pub fn fit(
     most: &Beside,
@@ -124,7 +124,7 @@ pub fn fit(
     scale(most, east, south, flux_east, flux_south, |own, other| [other, own]);
 }
 
-/// Multiplies by the factors that `order` puts first where liquid flows away from a column, and by the others where it flows towards it.
+/// Multiplies by the factor that `order` puts first where liquid flows away from a column, and by the other where it flows towards it.
 #[inline(always)]
 fn scale(
     factor: &Beside,
@@ -146,7 +146,7 @@ fn scale(
 #[inline(always)]
 fn scale_strip([away, towards]: [&[f32; STRIP]; 2], transfer: &mut [f32; STRIP], flux: &mut [f32; STRIP]) {
     for x in 0..STRIP {
-        // What moves nothing has neither giver nor taker.
+        // A pipe that moves nothing has neither donor nor receiver.
         let (away, towards) = (away[x], towards[x]);
         let k = if transfer[x] > 0.0 { away } else { 1.0 };
         let k = if transfer[x] < 0.0 { towards } else { k };
@@ -155,7 +155,7 @@ fn scale_strip([away, towards]: [&[f32; STRIP]; 2], transfer: &mut [f32; STRIP],
     }
 }
 
-/// Sums what is to come into each column.
+/// Sums the inflow of each column.
 #[inline(always)]
 pub fn inflow(around: &Around, into: &mut [f32]) {
     for strip in 0..into.len() / STRIP {
@@ -170,7 +170,7 @@ fn inflow_of(around: &[&[f32; STRIP]; 4], into: &mut [f32; STRIP]) {
     }
 }
 
-/// What is to come into a column. Where transfers are scaled, it is less or the same, also as rounded.
+/// The inflow of a column. Scaling transfers down never increases it, even with rounding.
 #[inline(always)]
 fn coming([east, west, south, north]: &[&[f32; STRIP]; 4], x: usize) -> f32 {
     let along = greater(west[x], 0.0) - lesser(east[x], 0.0);
@@ -184,13 +184,13 @@ pub fn room(base: i32, ceiling: i32, depth: i32) -> f32 {
     (ceiling - base - depth).max(0) as f32 * MARGIN
 }
 
-/// K_max of a column, of what is to come in and the room for it.
+/// K_max of a column, from its inflow and its room.
 #[inline(always)]
 pub fn most(into: f32, room: f32) -> f32 {
     if into > room { room / into } else { 1.0 }
 }
 
-/// Turns what is to come into each column into K_max, as if nothing left; returns the least.
+/// Turns the inflow of each column into K_max, as if nothing flowed out; returns the minimum.
 #[inline(always)]
 pub fn find_most(base: &[i32], ceiling: &[i32], depth: &[i32], into: &mut [f32]) -> f32 {
     let mut least = [1.0; STRIP];

@@ -1,12 +1,12 @@
-//! The largest mesh that liquid in given columns can have.
+//! Maximum size of a mesh of liquid in given columns.
 
 use crate::shallow::columns::grid::BOTTOMLESS;
 use crate::shallow::surface::quartets::links::{RING, Scene};
 use crate::shallow::surface::quartets::strips::positions;
 use crate::shallow::surface::{Columns, Counts, STRIP};
 
-/// The largest counts that the surface of any liquid in these columns can have, so that a host sizes its buffers once. Liquids that are
-/// full to just below uneven ceilings come near to it: their surface ends at every step of the ceiling.
+/// The maximum counts that the surface of any liquid in these columns can have, so that a host sizes its buffers once. Liquids that fill up
+/// to just below uneven ceilings come close: their surface ends at every step of the ceiling.
 pub fn bound(columns: &Columns) -> Counts {
     let walls = Walls::of(columns);
     let [nx, nz] = columns.grid.size;
@@ -47,12 +47,12 @@ struct Room {
     under: i32,
     base: i32,
     ceiling: i32,
-    /// Of the quartets to the north-east, north-west, south-west and south-east: a bit of each in which its surface may end at a wall.
+    /// For the quartets to the north-east, north-west, south-west and south-east: a bit for each in which its surface may end at a wall.
     walls: u8,
 }
 
 impl Room {
-    /// Whether there are depths with which the two are linked.
+    /// Whether the two are linked at some depths.
     fn may_link(&self, other: &Self) -> bool {
         let holds =
             |own: &Self, other: &Self| own.under.max(other.base) <= other.ceiling.min(own.ceiling - 1);
@@ -63,27 +63,27 @@ impl Room {
 /// The columns of a quartet.
 #[derive(Debug, Default)]
 struct Quartet {
-    /// Each with its corner and its group: those of which each may be linked with the next one.
+    /// Each with its corner and its set: columns joined by a chain of possible links.
     rooms: Vec<(Room, usize, usize)>,
     changes: Vec<i32>,
 }
 
 impl Quartet {
-    /// The most triangles, from the columns of each corner, and which of their quartets it is. Columns that may not be linked with each other,
-    /// nor both with others, share no triangle: the most of each such set are summed.
+    /// Maximum number of triangles, from the columns of each corner and which of their quartets it is. Columns that can neither be linked
+    /// with each other nor both with others share no triangle: the maxima of these sets are summed.
     ///
-    /// A set with a column or less at each corner has two triangles at most, or one at three corners: where all links are there, they are a
-    /// group of four, else two of its groups of three lack one. Where its surface may end at walls, and each of its columns may be linked
-    /// with each other one, so that the higher of two surfaces is linked with the other or ends above it: its highest wet column A, which alone has
-    /// the corner, is in two triangles at most: each column has one entry at a corner where it is linked or ends. Without A they lie at the
-    /// three other corners, and have the next lower wet column B, which may be linked there with a column and with A's wall: at each corner
-    /// but not at both, or A is in a group with them; three triangles; or B is not linked with A, and the third one C may be: two
-    /// triangles then. There is one less where the set lacks a corner, as only walls are there.
+    /// A set with at most one column at each corner has at most two triangles, or one if it has three corners: where all links exist, the
+    /// columns are a group of four, else two of its groups of three lack one. If its surface may end at walls, and each of its columns may
+    /// be linked with every other, then the higher of two surfaces is linked with the other or ends above it. The highest wet column A,
+    /// alone at its corner, is then in at most two triangles, as each column has one entry at a corner where it is linked or ends.
+    /// Triangles without A lie at the three other corners and contain the next lower wet column B. It may be linked there with both a
+    /// column and A's wall at either corner, but not at both, or A is in a group with them: three triangles. Or B is not linked with A, and
+    /// the third, C, may be: two triangles. There is one fewer where the set lacks a corner, as only walls are there.
     ///
     /// In other sets without walls, a wet column is in one group of four or two of three. A group has a wet column, and others only where
-    /// they are dry, which three groups at most can share: one triangle for each column. Groups that have no wet column in common are at
-    /// different heights, between which an underside lies: two triangles for each, and two more. A column with walls may be in two more, and
-    /// its neighbours' walls make four more in the sets of random scenes that need most (not proved: a test tries many).
+    /// they are dry, which at most three groups can share: one triangle per column. Groups without a common wet column are at different
+    /// heights with an underside between them: two triangles for each, and two more. A column with walls may be in two more, and its
+    /// neighbours' walls add four more in the sets of random scenes that need most (not proved: a test tries many).
     fn most_triangles(&mut self, cells: [(&Vec<Room>, u8); 4]) -> usize {
         let Self { rooms, changes } = self;
         rooms.clear();
@@ -135,9 +135,9 @@ impl Quartet {
 /// Where surfaces may end at walls.
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Walls {
-    /// Pairs of a column and one beside it whose solid reaches from below the ceiling of the first to it, or higher.
+    /// Pairs of a column and an adjacent one whose solid reaches from below the first one's ceiling up to it, or higher.
     pub pairs: usize,
-    /// Of each index, the quartets to the north-east, north-west, south-west and south-east in which it has such a wall: a bit each.
+    /// For each index, the quartets to the north-east, north-west, south-west and south-east in which it has such a wall: a bit each.
     sides: Vec<u8>,
 }
 

@@ -9,10 +9,10 @@ use crate::shallow::surface::quartets::strips::{Found, some};
 use crate::shallow::surface::rim::boundary::Wall;
 use crate::shallow::surface::{Indices, STRIP};
 
-/// Indices of a pair of triangles.
+/// Index count of a pair of triangles.
 const PAIR: usize = 6;
 
-/// Indices of a width.
+/// An index type: 16 or 32 bits.
 trait Index: Copy {
     fn from_vertex(vertex: u32) -> Self;
 }
@@ -31,15 +31,15 @@ impl Index for u32 {
     }
 }
 
-/// The triangles of 16 quartets side by side, whose vertices in the north are a + position and in the south c + position: each index is a + `add`,
-/// and c - a more where `south` has all bits set; the other way around where `turned` has the bit of a quartet that is turned.
+/// The triangles of 16 quartets side by side. The vertices in the north are a + position, those in the south c + position: each index is
+/// a + `add`, plus c - a where `south` has all bits set; the opposite where `turned` has the bit of a turned quartet.
 struct Pattern {
     add: [u32; PAIR * STRIP],
     south: [u32; PAIR * STRIP],
     turned: [u32; PAIR * STRIP],
 }
 
-/// Counter-clockwise, and clockwise: the second and third corner of each triangle are exchanged.
+/// Counter-clockwise and clockwise: the second and third corners of each triangle are swapped.
 static PATTERNS: [Pattern; 2] = [
     // North-west, south-west, south-east (turned: north-east); north-east, north-west (turned: south-west), south-east.
     Pattern::new([0, 0, 1, 1, 0, 1], [0, 1, 1, 0, 0, 1], [0, 0, 1, 0, 1, 0]),
@@ -73,7 +73,7 @@ impl Pattern {
     }
 }
 
-/// Writes all triangles but those of skirts; `flipped`: clockwise seen from above. Returns the count of their indices.
+/// Writes all triangles except those of skirts; `flipped`: clockwise seen from above. Returns the index count.
 pub(in crate::shallow::surface) fn write_triangles(
     scene: Scene<'_>,
     found: &Found,
@@ -103,7 +103,7 @@ fn write_full_u32(found: &Found, flipped: bool, out: &mut [u32]) -> usize {
     dispatch!(write_full(found: &Found, flipped: bool, out: &mut [u32]) -> usize)
 }
 
-/// Writes the triangles of full quartets and returns the count of indices.
+/// Writes the triangles of full quartets and returns the index count.
 #[inline(always)]
 fn write_full<I: Index>(found: &Found, flipped: bool, out: &mut [I]) -> usize {
     let pattern = &PATTERNS[usize::from(flipped)];
@@ -122,7 +122,7 @@ fn write_full<I: Index>(found: &Found, flipped: bool, out: &mut [I]) -> usize {
                 continue;
             }
             for run in runs(full) {
-                // The vertices of either row follow each other.
+                // The vertices of each row are consecutive.
                 let (a, c) = (found.vertex(strip, run.start), found.vertex(south, run.start));
                 let (a, c) = (a.wrapping_sub(run.start as u32), c.wrapping_sub(run.start as u32));
                 let out = &mut out[at..][..PAIR * run.len()];
@@ -134,7 +134,7 @@ fn write_full<I: Index>(found: &Found, flipped: bool, out: &mut [I]) -> usize {
     at
 }
 
-/// Runs of positions that are set.
+/// Runs of set positions.
 #[inline(always)]
 fn runs(positions: u16) -> impl Iterator<Item = Range<usize>> {
     let mut left = u32::from(positions);
@@ -146,7 +146,7 @@ fn runs(positions: u16) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// Writes the triangles of odd quartets and returns the count of indices.
+/// Writes the triangles of odd quartets and returns the index count.
 fn write_odd<I: Index>(
     scene: Scene<'_>,
     found: &Found,

@@ -1,17 +1,17 @@
-//! Normals of wet columns, from the heights of the wet columns that they are linked with on their four sides: central differences, one-sided
-//! where there is no such column.
+//! Normals of wet columns, from the heights of the wet columns that they are linked with on their four sides: central differences,
+//! one-sided where there is no such column.
 
 use crate::shallow::surface::quartets::links::Scene;
 use crate::shallow::surface::quartets::strips::Found;
 use crate::shallow::surface::{Columns, STRIP};
 
-/// The heights that are shown, and what makes slopes of their differences.
+/// The heights as shown, and the factor that turns their differences into slopes.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::shallow::surface) struct Shown<'a> {
     pub scene: Scene<'a>,
-    /// Of each index (units).
+    /// Height of each index (units).
     pub heights: &'a [i32],
-    /// A unit over two cells.
+    /// One unit divided by two cells.
     pub slope: f32,
 }
 
@@ -52,17 +52,17 @@ pub(in crate::shallow) fn upright(x: f32, z: f32) -> [f32; 3] {
     [x * y, y, z * y]
 }
 
-/// Normals that dry vertices need too, each computed once.
+/// Normals that dry vertices need as well, each computed once.
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Normals {
     /// By index.
     normals: Vec<[f32; 3]>,
-    /// Of each strip, the positions whose normal is known.
+    /// For each strip, the positions whose normal is known.
     known: Vec<u16>,
 }
 
 impl Normals {
-    /// Makes room for columns.
+    /// Reserves memory for columns.
     pub fn reset(&mut self, columns: &Columns) {
         if self.normals.len() != columns.len() {
             self.normals.resize(columns.len(), [0.0; 3]);
@@ -71,7 +71,7 @@ impl Normals {
         }
     }
 
-    /// Forgets the normals of a frame.
+    /// Clears the normals of a frame.
     pub fn clear(&mut self, found: &Found) {
         for span in &found.spans {
             self.known[span.first..span.first + span.len].fill(0);

@@ -14,11 +14,11 @@ use crate::shallow::surface::{Depths, Layout, MOST, NONE, STRIP, Target, Up};
 /// Velocity at the surface over the mean (Eq. 4.4).
 pub(in crate::shallow) const SURFACE_SPEED: f32 = 1.5;
 
-/// A run begins within a strip with at least so many columns at its end; at most so many columns beside each other are written one by one.
+/// A run starts within a strip if at least `LONG` columns at its end belong to it; up to `SHORT` adjacent columns are written one by one.
 const LONG: u32 = 8;
 const SHORT: u32 = 2;
 
-/// What vertices are made of.
+/// Source data of the vertices.
 pub(in crate::shallow::surface) struct Vertices<'a> {
     shown: Shown<'a>,
     found: &'a Found,
@@ -32,12 +32,12 @@ pub(in crate::shallow::surface) struct Vertices<'a> {
     /// Height of 0, and of a unit; centre of cell (0, 0), and edge of a cell (m x scale).
     low: f32,
     unit: f32,
-    /// The caller's units in a metre, and how far hems are below the ground (units).
+    /// The caller's units per metre, and how far hems are below the ground (units).
     scale: f32,
     least: i32,
     origin: [f32; 2],
     cell: f32,
-    /// Speed at the surface (m/s x scale) over the mean speed (m/s); opacity of a unit.
+    /// Speed at the surface (m/s x scale) per mean speed (m/s); opacity of one unit.
     speed: f32,
     opacity: f32,
 }
@@ -53,7 +53,7 @@ struct Vertex {
     column: u32,
 }
 
-/// Wet columns in a row of a span, with wet ones linked by full quartets on all sides.
+/// Wet columns in a row of a span that full quartets link with wet ones on all sides.
 #[derive(Clone, Copy)]
 struct Run {
     /// First index.
@@ -106,7 +106,7 @@ impl<'a> Vertices<'a> {
         ))
     }
 
-    /// A height (m x scale) of units.
+    /// Converts units to a height (m x scale).
     #[inline(always)]
     fn height(&self, units: f32) -> f32 {
         self.low + units * self.unit
@@ -118,13 +118,13 @@ impl<'a> Vertices<'a> {
         self.origin[axis] + cell as f32 * self.cell
     }
 
-    /// What a column carries.
+    /// The scalars that a column carries.
     #[inline(always)]
     fn carried(&self, index: usize) -> [f32; MOST] {
         self.carried.map(|numbers| numbers.get(index).copied().unwrap_or_default())
     }
 
-    /// A vertex that takes the mean of wet columns around cell (x, z), at a height of at most `most` (units).
+    /// A vertex with the mean of the wet columns around cell (x, z), at a height of at most `most` (units).
     fn mean(&self, [x, z]: [usize; 2], most: i32, normals: &mut Normals, around: &Around) -> Vertex {
         let mean = around.mean_height(|index| self.shown.heights[index]);
         let height = self.height(mean.min(f64::from(most)) as f32);
@@ -158,7 +158,7 @@ impl<'a> Vertices<'a> {
                 Some(own) => around.take_wall(scene, &self.walls[own]),
                 None => around.take_linked(scene, index),
             }
-            // Over ground that is lower than the liquid the rim would hover.
+            // At most the column's own height: above lower ground the rim would hover.
             let mean = self.mean([x, z], self.shown.heights[index], normals, around);
             return Vertex { layer, column: index as u32, ..mean };
         }
@@ -208,7 +208,7 @@ impl<'a> Vertices<'a> {
         }
     }
 
-    /// Writes a vertex where the surface of a column comes down to the ground's edge.
+    /// Writes the vertex where the surface of a column comes down to the ground's edge.
     pub fn put_hem(&self, at: usize, hem: &Hem, target: &mut Target<'_>) {
         let columns = self.shown.scene.columns;
         let index = hem.column as usize;
@@ -247,7 +247,7 @@ impl<'a> Vertices<'a> {
         if self.z_up { [x, z, up] } else { [x, up, z] }
     }
 
-    /// Writes the vertices of a run of a span with wet columns on all sides, from `at` on.
+    /// Writes the vertices of a run with wet columns on all sides, starting at `at`.
     #[inline(always)]
     fn put_inner(&self, span: &Span, run: Run, at: usize, target: &mut Target<'_>) {
         let (heights, Run { first, len }) = (self.shown.heights, run);
@@ -269,7 +269,7 @@ impl<'a> Vertices<'a> {
         self.put_run(span, run, at, target);
     }
 
-    /// Writes the vertices of some places of a strip, with or without wet columns on their sides, from `at` on.
+    /// Writes the vertices of some positions of a strip, with or without wet columns on their sides, starting at `at`.
     #[inline(always)]
     fn put_outer(
         &self,
@@ -287,7 +287,7 @@ impl<'a> Vertices<'a> {
         self.put_run(span, run, at, target);
     }
 
-    /// The normals of a strip's columns, which full quartets link with those on their sides, if any.
+    /// Normals of a strip's columns, from the columns that full quartets link on their sides, if any.
     #[inline(always)]
     fn outer_normals(&self, span: &Span, strip: usize) -> [[f32; 3]; STRIP] {
         let (heights, slope, sides) = (self.shown.heights, self.shown.slope, self.found.states[strip].sides);
@@ -315,7 +315,7 @@ impl<'a> Vertices<'a> {
         normals
     }
 
-    /// Writes all of the vertices of a run but their normals, from `at` on.
+    /// Writes all vertex data of a run except the normals, starting at `at`.
     #[inline(always)]
     fn put_run(&self, span: &Span, run: Run, at: usize, target: &mut Target<'_>) {
         let (heights, depths) = (self.shown.heights, self.shown.scene.depth);
@@ -362,7 +362,7 @@ impl<'a> Vertices<'a> {
     }
 }
 
-/// The vectors of a count of vertices from one on.
+/// The vectors of `count` vertices, starting at `at`.
 #[inline(always)]
 fn vectors(out: &mut [f32], at: usize, count: usize) -> &mut [[f32; 3]] {
     out[3 * at..][..3 * count].as_chunks_mut().0
@@ -383,7 +383,7 @@ fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Arou
                 run = Run { first: if run.len == 0 { first } else { run.first }, len: run.len + STRIP };
                 continue;
             }
-            // Those that go on with the run before, and those that begin one for the strip behind.
+            // Columns that continue the previous run, and columns that start one for the next strip.
             let before = if run.len > 0 { plain.trailing_ones() } else { 0 };
             let behind = plain.leading_ones();
             let behind = if behind < LONG { 0 } else { behind };
@@ -393,7 +393,7 @@ fn write_spans(vertices: &Vertices<'_>, normals: &mut Normals, around: &mut Arou
                 next += run.len;
             }
             let between = u16::MAX << before & (u32::from(u16::MAX) >> behind) as u16;
-            // What lies between columns that are looked at one by one.
+            // What lies between the columns that are written one by one.
             let smooth = state.used & state.wet & !state.rough & between;
             let mut left = state.used & between;
             while left != 0 {

@@ -1,22 +1,22 @@
 //! Minimum heights: how far wet columns are lifted so that the terrain's mesh does not show through a thin film, and how far dry ones are
 //! lowered so that the rim of the surface is hidden under it (thesis 4.2.4).
 //!
-//! The terrain's mesh is not aligned with the grid, and a film that follows the bases of columns cuts its bumps. For a vertex of the mesh at the
-//! height h_v, within a quartet whose columns have the bases b_k, the least lifts l_k are those for which
+//! The terrain's mesh is not aligned with the grid, so its bumps cut through a film that follows the bases of columns. For a vertex of the
+//! mesh at height h_v, within a quartet whose columns have the bases b_k, the minimum heights l_k are those that
 //!
-//! sum w_k l_k^2 is least, sum c_k (b_k + l_k) >= h_v + margin, and l_k >= the global least (Eq. 4.37),
+//! minimise sum w_k l_k^2, subject to sum c_k (b_k + l_k) >= h_v + margin and l_k >= the global minimum (Eq. 4.37),
 //!
-//! where c_k are barycentric coordinates of the vertex in a triangle of three columns, and w_k = dx / max(h_v - b_k, 1e-10 dx) (Eq. 4.38). A
-//! quartet may be divided along either diagonal, so the triangles of both constrain; the lift of a column is the most of all vertices. The
-//! thesis constrains the bilinear patch, which is neither, by an equation that would lower surfaces too.
+//! where c_k are the barycentric coordinates of the vertex in a triangle of three columns, and w_k = dx / max(h_v - b_k, 1e-10 dx)
+//! (Eq. 4.38). A quartet may be divided along either diagonal, so the triangles of both are constraints; a column takes the maximum over all
+//! vertices. The thesis constrains the bilinear patch, which is neither, by an equation that would also lower surfaces.
 //!
-//! Lagrange's solution is l_k = m c_k / w_k; columns for which that is under the global least have it, and leave the rest to the others.
+//! Lagrange multipliers give l_k = m c_k / w_k. Columns below the global minimum are set to it, and the others make up the rest.
 //!
-//! Where the weights make a lift of over dx, which a vertex close to a column at the top of a slope does to those at its foot, equal weights
-//! are tried, and taken if their greatest lift is the smaller one. A vertex that needs a height of more than dx above the highest base is
-//! discarded even so (thesis 4.2.4).
+//! Where the weights give a minimum height of over dx, as a vertex close to a column at the top of a slope does for the columns at its
+//! foot, equal weights are tried, and used if their maximum is smaller. A vertex that still needs a height of more than dx above the
+//! highest base is discarded (thesis 4.2.4).
 //!
-//! A film links three columns if each one's room holds the bases of the others; the vertex belongs to the columns whose rooms hold it.
+//! A film links three columns if each one's room holds the bases of the others; a vertex belongs to the columns whose rooms hold it.
 
 use std::ops::Range;
 
@@ -25,18 +25,18 @@ use crate::geometry::Vec3;
 use crate::shallow::columns::{Columns, STRIP, Strip};
 use crate::shallow::surface::quartets::links::{Scene, find_above};
 
-/// Where Eq. 4.38 is cut off: the least h_v - b_k, in cells.
+/// Cut-off of Eq. 4.38: minimum h_v - b_k, in cells.
 const LEAST_RISE: f64 = 1e-10;
 
-/// What a thin film keeps from the terrain's mesh.
+/// Distances between a thin film and the terrain's mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distance {
-    /// Global least: how far a wet vertex is above its base (cells).
+    /// Global minimum: how far a wet vertex is above its base (cells).
     pub least: f64,
     /// How far the surface is above the terrain's vertices (cells).
     pub margin: f64,
-    /// How far its rim is below them, and at least below the bases of dry columns (cells); more than the margin, as between its vertices the
-    /// terrain may be lower.
+    /// How far its rim is below them, and at least below the bases of dry columns (cells); more than the margin, as the terrain may be
+    /// lower between its vertices.
     pub rim: f64,
 }
 
@@ -46,42 +46,42 @@ impl Default for Distance {
     }
 }
 
-/// What became of the vertices that a call looked at: those that face up, within a quartet.
+/// Counts of the vertices that a call examined: those that face up, within a quartet.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Fitted {
-    /// Count of them.
+    /// Number of them.
     pub upward: usize,
     /// Of these, those that would need a height of over a cell above the highest base around: they may be above the surface.
     pub discarded: usize,
-    /// Of the others, those that lie too close to a ceiling for their lift.
+    /// Of the others, those too close to a ceiling for their minimum height.
     pub capped: usize,
 }
 
-/// Least depths at which columns are shown, and how far they are lowered where they are dry; keeps its memory.
+/// Minimum depths at which columns are shown, and how far they are lowered where they are dry; reuses its memory.
 #[derive(Debug, Default)]
 pub struct Lifts {
     least: Vec<i32>,
     sunk: Vec<i32>,
-    /// The strips that these are of, and all of them before the last change.
+    /// The strips of these arrays, and all three as they were before the last change.
     strips: Vec<Strip>,
     old: (Vec<i32>, Vec<i32>, Vec<Strip>),
     above: Vec<u32>,
-    /// Vertices of the last call that were given up.
+    /// Uncovered vertices of the last call.
     bare: Vec<u32>,
-    /// Of each vertex of the mesh, the area above of the triangles around: negative where they face down.
+    /// For each vertex of the mesh, the area of the triangles around it, seen from above: negative where they face down.
     facing: Vec<f64>,
 }
 
-/// Three columns that film links, the one at the right angle first: coordinates of a vertex, bases less the height of the vertex (units).
+/// Three columns that a film links, the one at the right angle first: barycentric coordinates of a vertex, bases minus its height (units).
 struct Triple {
     columns: [usize; 3],
     parts: [f64; 3],
     rises: [f64; 3],
-    /// Least lifts (units).
+    /// Minimum heights (units).
     lifts: [f64; 3],
 }
 
-/// The cells whose columns are found anew, and lengths in units.
+/// The cells whose columns are recomputed, and lengths in units.
 struct Area<'a> {
     scene: Scene<'a>,
     cells: [Range<usize>; 2],
@@ -92,7 +92,7 @@ struct Area<'a> {
 }
 
 impl Lifts {
-    /// Makes room for so many strips and vertices: [`Lifts::update`] then allocates nothing as long as there are no more.
+    /// Reserves memory for this many strips and vertices: [`Lifts::update`] then allocates nothing as long as there are no more.
     pub fn reserve(&mut self, strips: usize, vertices: usize) {
         let Self { least, sunk, strips: own, old, above, bare, facing } = self;
         for numbers in [least, sunk, &mut old.0, &mut old.1] {
@@ -106,7 +106,8 @@ impl Lifts {
         facing.reserve(vertices.saturating_sub(facing.len()));
     }
 
-    /// Least depth of each index (units) for [`Depths::least`](crate::shallow::surface::Depths::least), at most from base to ceiling; 0 without a column.
+    /// Minimum depth of each index (units) for [`Depths::least`](crate::shallow::surface::Depths::least), at most from base to ceiling; 0
+    /// without a column.
     pub fn least(&self) -> &[i32] {
         &self.least
     }
@@ -116,16 +117,17 @@ impl Lifts {
         &self.sunk
     }
 
-    /// Vertices that may be above the surface after all, of those that the last call looked at: discarded, or under a low ceiling; in order.
+    /// Vertices that may still be above the surface, of those that the last call examined: discarded, or under a low ceiling; in order.
     pub fn bare(&self) -> &[u32] {
         &self.bare
     }
 
-    /// Finds those of all columns, from the terrain's mesh: positions (m), and triangles that are counter-clockwise seen from outside.
+    /// Finds the minimum heights of all columns from the terrain's mesh: positions (m), and triangles that are counter-clockwise seen from
+    /// outside.
     ///
     /// # Errors
-    /// `Argument`: a vertex that is not finite, an index beyond the vertices, a distance that is negative or not finite. The lifts are then
-    /// of no use until they are found again.
+    /// `Argument`: a vertex that is not finite, an index beyond the vertices, a distance that is negative or not finite. The minimum
+    /// heights are then invalid until they are found again.
     pub fn find(
         &mut self,
         columns: &Columns,
@@ -137,8 +139,8 @@ impl Lifts {
         self.update(columns, positions, triangles, distance, [0..nx, 0..nz])
     }
 
-    /// Finds those near a box of cells (ranges of x and of z) anew, which are then as if all were found anew. Columns have changed, and
-    /// triangles lay or lie, in the box only; the others may have other indices.
+    /// Recomputes the minimum heights near a box of cells (ranges of x and of z); the result is as if all were recomputed. Changed columns,
+    /// and the old and new positions of changed triangles, must lie in the box; other columns may have other indices.
     ///
     /// # Errors
     /// As [`Lifts::find`]; also a box that is not within the grid.
@@ -164,7 +166,7 @@ impl Lifts {
                 "cells {x:?} x {z:?} are not a box within {nx} x {nz} cells"
             )));
         }
-        // Quartets with a cell of the box reach one further.
+        // Quartets with a cell of the box extend one cell further.
         let cells = [0, 1].map(|axis| {
             let Range { start, end } = cells[axis];
             if start == end { start..end } else { start.saturating_sub(1)..(end + 1).min(size[axis]) }
@@ -188,7 +190,7 @@ impl Lifts {
         Ok(out)
     }
 
-    /// Moves what is known to the indices of the same columns now.
+    /// Moves the known values to the current indices of the same columns.
     fn follow(&mut self, columns: &Columns) {
         let now = columns.strips();
         if self.strips == now {
@@ -217,7 +219,7 @@ impl Lifts {
 }
 
 impl Area<'_> {
-    /// Finds twice the areas, seen from above, of the triangles around each vertex in the quartets of these cells, and around some others.
+    /// Finds twice the area, seen from above, of the triangles around each vertex in the quartets of these cells, and around some others.
     fn face(&self, positions: &[Vec3], triangles: &[[u32; 3]], facing: &mut Vec<f64>) -> Result<()> {
         if let Some(bad) = positions.iter().position(|p| !p.iter().all(|length| length.is_finite())) {
             return Err(Error::argument(format!("vertex {bad} of the terrain is not finite")));
@@ -250,7 +252,7 @@ impl Area<'_> {
         Ok(())
     }
 
-    /// Gives the columns of the box what they have without a vertex above.
+    /// Resets the columns of the box to their values without a vertex above.
     fn clear(&self, least: &mut [i32], sunk: &mut [i32]) {
         let columns = self.scene.columns;
         let [across, rows] = &self.cells;
@@ -267,19 +269,19 @@ impl Area<'_> {
         }
     }
 
-    /// A lift of a column in whole units, within its room.
+    /// A minimum height of a column in whole units, within its room.
     fn lift(&self, index: usize, lift: f64) -> i32 {
         (lift.ceil() as i32).min(self.scene.columns.ceilings()[index] - self.scene.columns.bases()[index])
     }
 
-    /// A way down from a column's base in whole units, within its solid.
+    /// A displacement down from a column's base in whole units, within its solid.
     fn sink(&self, index: usize, sink: f64) -> i32 {
         (sink.ceil() as i32).min(
             self.scene.columns.bases()[index].saturating_sub(self.scene.columns.unders()[index]).max(1) - 1,
         )
     }
 
-    /// Lifts and sinks columns for a vertex that faces up.
+    /// Raises and lowers columns for a vertex that faces up.
     fn fit(&self, at: &Vec3, numbers: [&mut [i32]; 2], out: &mut Fitted) {
         let (grid, heights) = (self.scene.columns.grid, self.scene.columns.heights);
         let position = [f64::from(at.x), f64::from(at.z)];
@@ -299,7 +301,7 @@ impl Area<'_> {
         self.fit_triples(triples.iter().flatten(), numbers, out);
     }
 
-    /// The quartets along an axis that have a cell of the box and a position: cells from the centre of the first.
+    /// The quartets along an axis that contain a cell of the box and a position, which counts in cells from the centre of the first cell.
     fn quartets(&self, axis: usize, position: f64) -> Range<usize> {
         let last = self.scene.columns.grid.size[axis] - 1;
         let cells = &self.cells[axis];
@@ -316,7 +318,7 @@ impl Area<'_> {
         start.max(range.start)..(first + 1).min(range.end)
     }
 
-    /// The triangles of film in a quartet that a position within is in: at most one along each diagonal, or both on a diagonal itself.
+    /// The film triangles in a quartet that contain a position: at most one along each diagonal, or both on a diagonal itself.
     fn triples(&self, [x, z]: [usize; 2], [u, w]: [f64; 2], height: f64) -> impl Iterator<Item = Triple> {
         let scene = self.scene;
         let (bases, unders, ceilings) =
@@ -341,7 +343,7 @@ impl Area<'_> {
         })
     }
 
-    /// Lifts and sinks the columns of all triangles that a vertex is in.
+    /// Raises and lowers the columns of all triangles that contain a vertex.
     fn fit_triples<'t>(
         &self,
         triples: impl Iterator<Item = &'t Triple> + Clone,
@@ -386,7 +388,7 @@ impl Area<'_> {
         self.cells[0].contains(&x) && self.cells[1].contains(&z)
     }
 
-    /// Lifts (units) of three columns for a vertex; the least if it is covered anyway.
+    /// Minimum heights (units) of three columns for a vertex; the global minimum if it is covered anyway.
     fn lifts(&self, triple: &Triple) -> [f64; 3] {
         let need = self.margin - triple.mean(triple.rises);
         if need <= self.least {
@@ -402,8 +404,8 @@ impl Area<'_> {
         if most(equal) < most(lifts) { equal } else { lifts }
     }
 
-    /// How far (units) three dry columns go down so that a vertex hides what is between them. One over a cell lower, at the foot of a
-    /// cliff, does not.
+    /// How far (units) three dry columns go down so that a vertex hides what is between them. A vertex more than a cell lower, at the foot
+    /// of a cliff, hides nothing.
     fn sinks(&self, triple: &Triple) -> Option<[f64; 3]> {
         let need = self.rim + triple.mean(triple.rises);
         (need > self.rim && need <= self.cell + self.rim)
@@ -412,14 +414,14 @@ impl Area<'_> {
 }
 
 impl Triple {
-    /// The mean of three numbers at the vertex, in an order that turns and mirrors with the scene.
+    /// The mean of three numbers at the vertex, summed in an order that rotates and mirrors with the scene.
     fn mean(&self, of: [f64; 3]) -> f64 {
         let [a, b, c] = [0, 1, 2].map(|k| self.parts[k] * of[k]);
         a + (b + c)
     }
 
-    /// The numbers of which the mean at the vertex is `need`, none is under `least`, which is less, and the sum of squares / `ease` is the
-    /// least.
+    /// Numbers whose mean at the vertex is `need`, none of them below `least` (itself below `need`), with the minimum sum of squares /
+    /// `ease`.
     fn least_squares(&self, need: f64, least: f64, ease: [f64; 3]) -> [f64; 3] {
         let mut out = [least; 3];
         let mut is_free = self.parts.map(|part| part > 0.0);

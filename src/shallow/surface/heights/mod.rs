@@ -1,4 +1,4 @@
-//! At which heights columns are shown.
+//! Heights at which columns are shown.
 
 pub mod minimum_heights;
 pub(in crate::shallow) mod shown;

@@ -1,5 +1,5 @@
-//! The heights at which columns are shown: of wet ones at least a minimum above their base, of dry ones some way below it, so that the rim of
-//! the surface is hidden under the ground; between both, a height that goes with the depth.
+//! Heights at which columns are shown: wet ones at least a minimum above their base, dry ones somewhat below it, so that the rim of the
+//! surface is hidden under the ground; in between, the height follows the depth.
 
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::grid::TOP;
@@ -9,9 +9,9 @@ use crate::shallow::surface::{Columns, Depths, Layout, STRIP};
 
 /// How heights follow from depths (units).
 struct Rule<'a> {
-    /// Least depth of all columns, and how far dry ones are lowered, where no array says so.
+    /// Minimum depth of all columns, and how far dry ones are lowered, unless an array gives them.
     least: i32,
-    /// Depth from which a column is at its full height, and one over it.
+    /// Depth from which a column is at its full height, and its reciprocal.
     fade: i32,
     per_fade: f32,
     depth: &'a [i32],
@@ -19,7 +19,7 @@ struct Rule<'a> {
     sunk_of: &'a [i32],
 }
 
-/// Makes room for columns.
+/// Reserves memory for the heights of columns.
 pub(in crate::shallow::surface) fn reserve(columns: &Columns, heights: &mut Vec<i32>) {
     if heights.len() != columns.len() {
         heights.clear();
@@ -27,7 +27,7 @@ pub(in crate::shallow::surface) fn reserve(columns: &Columns, heights: &mut Vec<
     }
 }
 
-/// Finds the heights of all columns in strips that have something.
+/// Finds the heights of the columns in all strips listed in `found`.
 pub(in crate::shallow::surface) fn find_heights(
     columns: &Columns,
     found: &Found,
@@ -98,7 +98,7 @@ fn find_strips(columns: &Columns, found: &Found, rule: &Rule<'_>, heights: &mut 
     }
 }
 
-/// Whether all depths of a strip are at least so great.
+/// Whether all depths of a strip are at least `least`.
 #[inline(always)]
 fn are_over(depth: &[i32; STRIP], least: i32) -> bool {
     let mut under = [0; STRIP];
@@ -116,7 +116,7 @@ fn find_full(base: &[i32; STRIP], depth: &[i32; STRIP], least: &[i32; STRIP], ou
     }
 }
 
-/// Finds the heights of a strip. Depths that no liquid has may wrap around, and are never a panic.
+/// Finds the heights of a strip. Impossible depths may wrap around, but never panic.
 #[inline(always)]
 fn find_strip<const FADES: bool>(
     [base, under, depth, least, sunk]: [&[i32; STRIP]; 5],
@@ -143,7 +143,7 @@ fn find_strip<const FADES: bool>(
 mod tests {
     use super::*;
 
-    /// Heights over a base of 1000, of an underside of -50, with a least depth of 300, and of 200 where dry.
+    /// Heights over a base of 1000 with an underside of -50, a minimum depth of 300, and 200 below the base where dry.
     fn heights<const FADES: bool>(depth: [i32; STRIP]) -> [i32; STRIP] {
         let mut out = [7; STRIP];
         let all = [[1000; STRIP], [-50; STRIP], depth, [300; STRIP], [200; STRIP]];

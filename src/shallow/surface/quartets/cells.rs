@@ -8,17 +8,17 @@ use crate::shallow::surface::{Columns, NONE, STRIP};
 /// A column, or an extra.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::shallow) struct Entry {
-    /// Index of the column; of an extra, count of indices + its position among the walls.
+    /// Index of the column; for an extra, count of indices + its position among the walls.
     pub id: u32,
     /// Layer of the column.
     pub layer: u32,
-    /// Height, room (units); an extra has no room.
+    /// Height and room (units); an extra has no room.
     pub height: i32,
     pub under: i32,
     pub ceiling: i32,
     pub base: i32,
     pub wet: bool,
-    /// The wall that links it with others than its height does, or [`NONE`].
+    /// The wall that links it with columns beyond those of its height, or [`NONE`].
     pub wall: u32,
 }
 
@@ -34,20 +34,20 @@ impl Entry {
         self.holds(other.height) & other.holds(self.height)
     }
 
-    /// Whether the surface of a wet column, whose height `wall` holds, ends at its solid.
+    /// Whether the surface of this wet column ends at the solid of `wall`, whose room holds its height.
     pub fn ends_at(&self, wall: &Self) -> bool {
         self.height < self.ceiling && self.ceiling <= wall.base
     }
 }
 
-/// Cells in a row of a block and the one behind.
+/// Cells in a row of a block, plus the next one.
 const CELLS: usize = STRIP + 1;
 
 #[derive(Debug, Default)]
 struct Row {
     /// Strips by layer: of the block, and of the one to the east.
     strips: [Vec<usize>; 2],
-    /// Cell by cell, from the lowest.
+    /// Entries cell by cell, from the lowest up.
     entries: Vec<Entry>,
     ends: [usize; CELLS + 1],
 }
@@ -61,7 +61,7 @@ pub(in crate::shallow::surface) struct Cells {
 }
 
 impl Cells {
-    /// Makes room for so many layers.
+    /// Reserves memory for this many layers.
     pub fn reserve(&mut self, layers: usize) {
         for row in &mut self.rows {
             row.strips.iter_mut().for_each(|strips| strips.reserve(layers));
@@ -71,7 +71,7 @@ impl Cells {
         self.full.reserve(layers);
     }
 
-    /// Takes the cells of quartets of a block.
+    /// Loads the cells of some quartets of a block.
     pub fn enter(&mut self, scene: Scene<'_>, found: &Found, walls: &[Wall], block: usize, quartets: u16) {
         let (row, at) = (block / found.across, block % found.across);
         let reaches_east = quartets >> 15 == 1;
@@ -96,7 +96,7 @@ impl Cells {
         &row.entries[row.ends[cell]..row.ends[cell + 1]]
     }
 
-    /// Whether a column of a quartet is in a full group: then it is in no other.
+    /// Whether a column of a quartet is in a full group: it is then in no other.
     #[inline(always)]
     pub fn is_done(&self, quartet: usize, entry: &Entry) -> bool {
         self.full.get(entry.layer as usize).is_some_and(|full| full >> quartet & 1 == 1)

@@ -1,4 +1,4 @@
-//! Finds which columns are wet, which quartets full and which odd. Most quartets are full, and known from comparisons of whole strips.
+//! Finds which columns are wet and which quartets are full or odd. Most quartets are full, which comparisons of whole strips detect.
 
 use super::links::Scene;
 use super::strips::{Found, Span, State, count, some};
@@ -32,11 +32,11 @@ fn find_wet_strips(scene: Scene<'_>, active: Option<&[bool]>, found: &mut Found)
     found.find_spans(columns);
 }
 
-/// 16 positions, and those to the east of them: depth, base, ceiling, underside.
+/// Depth, base, ceiling and underside at 16 positions, and at those to the east of them.
 type Windows<'a> = [[&'a [i32; STRIP]; 2]; 4];
 
-/// Positions whose quartet is linked as a whole: the highest of its heights is under the lowest ceiling, the lowest not under the highest
-/// underside; and those where the sum of the heights in the north-east and south-west is the greater.
+/// Positions whose quartet is linked as a whole (the highest of its heights is below the lowest ceiling, the lowest not below the highest
+/// underside), and positions where the sum of the heights in the north-east and south-west is larger.
 #[inline(always)]
 fn compare([depth, base, ceiling, under]: Windows<'_>, south: Windows<'_>) -> [u16; 2] {
     let [depth_s, base_s, ceiling_s, under_s] = south;
@@ -150,19 +150,19 @@ impl Corners {
     }
 }
 
-/// Each position of a strip with the value of the position to the east; of the last, that of the strip to the east.
+/// Each position of a strip gets the value of the position to the east; the last one that of the strip to the east.
 #[inline(always)]
 fn from_east(own: u16, east: u16) -> u16 {
     own >> 1 | east << 15
 }
 
-/// Each position of a strip with the value of the position to the west.
+/// Each position of a strip gets the value of the position to the west.
 #[inline(always)]
 fn from_west(own: u16, west: u16) -> u16 {
     own << 1 | west >> 15
 }
 
-/// 16 positions of a strip and the one behind.
+/// 16 positions of a strip and the next one.
 #[inline(always)]
 fn windows(arrays: [&[i32]; 4], strip: usize) -> Windows<'_> {
     let [a, b, c, d] = arrays;
@@ -175,8 +175,8 @@ fn window(numbers: &[i32], strip: usize) -> [&[i32; STRIP]; 2] {
     [window.first_chunk().expect("16 of 17"), window.last_chunk().expect("16 of 17")]
 }
 
-/// Chooses diagonals: the quartets to divide from north-east to south-west, from what is wet in their corners and where the sum of the heights
-/// there is the greater.
+/// Chooses diagonals: the quartets to divide from north-east to south-west, from which corners are wet and where the sum of the heights
+/// there is larger.
 #[inline(always)]
 fn choose([a, b, c, d]: [u16; 4], greater: u16) -> u16 {
     if a & b & c & d == u16::MAX {
@@ -190,8 +190,8 @@ fn choose([a, b, c, d]: [u16; 4], greater: u16) -> u16 {
     from_east_end & !from_west_end | both | neither
 }
 
-/// Marks the odd quartets of a strip's wet columns, of which the quartets to the south-east, south-west, north-east and north-west are full
-/// where `covered` says so.
+/// Marks the odd quartets around a strip's wet columns; `covered` has the columns whose quartets to the south-east, south-west, north-east
+/// and north-west are full.
 fn add_odd(columns: &Columns, found: &mut Found, strip: usize, covered: [u16; 4]) {
     let position = columns.strips()[strip];
     let (row, at) = (position.row as usize, position.at as usize);

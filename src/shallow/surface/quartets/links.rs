@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::shallow::columns::{Columns, NONE, STRIP, Strip};
 
-/// The eight cells around one, in a circle from the east by the north: steps along x and z.
+/// The eight cells around one, from the east through the north: steps along x and z.
 pub(in crate::shallow::surface) const RING: [[i32; 2]; 8] =
     [[1, 0], [1, -1], [0, -1], [-1, -1], [-1, 0], [-1, 1], [0, 1], [1, 1]];
 
@@ -19,7 +19,7 @@ pub(in crate::shallow::surface) struct Scene<'a> {
     pub columns: &'a Columns,
     /// Depth of each index (units).
     pub depth: &'a [i32],
-    /// Of each strip where the one of the layer above is, or would be, probably; may be empty.
+    /// For each strip, the (probable) position of the strip in the layer above, or where it would be; may be empty.
     pub above: &'a [u32],
 }
 
@@ -28,12 +28,12 @@ impl<'a> Scene<'a> {
         self.depth[index] > 0
     }
 
-    /// Height (units). Depths beyond the ceiling may wrap around; they are the caller's fault, and never a panic.
+    /// Height (units). Depths beyond the ceiling may wrap around: the caller's error, but never a panic.
     pub fn height(self, index: usize) -> i32 {
         self.columns.bases()[index].wrapping_add(self.depth[index].max(0))
     }
 
-    /// Whether a column's room holds a height; that of an index without a column holds none.
+    /// Whether a column's room holds a height; an index without a column holds none.
     pub fn holds(self, index: usize, height: i32) -> bool {
         self.columns.unders()[index] <= height && height < self.columns.ceilings()[index]
     }
@@ -43,7 +43,7 @@ impl<'a> Scene<'a> {
         self.holds(a, self.height(b)) && self.holds(b, self.height(a))
     }
 
-    /// The column whose room holds a height in the cell at a step of -1, 0 or 1 along x and z from a column's.
+    /// The column whose room holds a height, in the cell at a step of -1, 0 or 1 along x and z from another column's.
     pub fn beside(self, index: usize, [dx, dz]: [i32; 2], height: i32) -> Option<usize> {
         let columns = self.columns;
         let (strip, position) = (index / STRIP, index % STRIP);
@@ -52,7 +52,7 @@ impl<'a> Scene<'a> {
             1 => columns.south(strip),
             _ => strip as u32,
         };
-        // Mostly it is the one of the same layer.
+        // Usually the one of the same layer.
         if row != NONE {
             let (row, position) = (row as usize, position as i32 + dx);
             let strip = match position {
@@ -68,7 +68,7 @@ impl<'a> Scene<'a> {
         self.of_cell(cell_at(columns.cell(index), [dx, dz])).find(|&other| self.holds(other, height))
     }
 
-    /// The columns of a cell, from the lowest; none outside of the grid.
+    /// The columns of a cell, from the lowest; none outside the grid.
     pub fn of_cell(self, [x, z]: [usize; 2]) -> impl Iterator<Item = usize> + 'a {
         let columns = self.columns;
         let [nx, nz] = columns.grid.size;
@@ -100,7 +100,7 @@ impl<'a> Scene<'a> {
         self.find(Strip { layer: own.layer + 1, ..own }, guess, strip + 1..end.min(strip + across + 1))
     }
 
-    /// A strip within a range; `guess`, where it is or would be, is mostly right.
+    /// A strip within a range; `guess`, where it is or would be, is usually right.
     #[inline]
     fn find(self, wanted: Strip, guess: usize, range: Range<usize>) -> Option<usize> {
         let strips = self.columns.strips();
@@ -119,19 +119,19 @@ impl<'a> Scene<'a> {
         strips[range.clone()].binary_search(&wanted).ok().map(|found| range.start + found)
     }
 
-    /// Whether the surface of a wet column ends at the solid of a column beside it, which holds its height.
+    /// Whether the surface of a wet column ends at the solid of an adjacent column, whose room holds its height.
     pub fn ends_at(self, wet: usize, wall: usize) -> bool {
         let ceiling = self.columns.ceilings()[wet];
         self.height(wet) < ceiling && ceiling <= self.columns.bases()[wall]
     }
 }
 
-/// The cell at a step from one; before the first it wraps around to none of the grid.
+/// The cell at a step from another; a step before the first cell wraps around to one outside the grid.
 pub(in crate::shallow::surface) fn cell_at([x, z]: [usize; 2], [dx, dz]: [i32; 2]) -> [usize; 2] {
     [x.wrapping_add_signed(dx as isize), z.wrapping_add_signed(dz as isize)]
 }
 
-/// Finds where the strips above each other are, or would be.
+/// Finds, for each strip, where the one above is or would be.
 pub(in crate::shallow::surface) fn find_above(columns: &Columns, out: &mut Vec<u32>) {
     let strips = columns.strips();
     let across = columns.grid.size[0].div_ceil(STRIP);

@@ -6,29 +6,29 @@ use super::strips::{Found, positions};
 use super::wall::Walled;
 use crate::shallow::surface::rim::boundary::Walls;
 
-/// Corners of a quartet besides one.
+/// For each corner of a quartet, the other three.
 pub(in crate::shallow) const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
 
-/// The triangle without a corner, facing up.
+/// For each corner, the triangle of the other three, facing up.
 const TRIANGLES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [1, 0, 3], [0, 2, 1]];
 
-/// What a search for groups works with.
+/// Scratch buffers of a search for groups.
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Search {
     cells: Cells,
     /// The columns of a quartet's triangles.
     triangles: Vec<[u32; 3]>,
     walled: Walled,
-    /// The triangles of odd quartets that have some, without walls and with, and how many each quartet has.
+    /// The triangles of odd quartets that have any, without and with walls, and how many each quartet has.
     found: [Vec<[u32; 3]>; 2],
     counts: [Vec<u32>; 2],
 }
 
 impl Search {
-    /// Makes room for so many layers, odd quartets and triangles.
+    /// Reserves memory for this many layers, odd quartets and triangles.
     pub fn reserve(&mut self, layers: usize, quartets: usize, triangles: usize) {
         self.cells.reserve(layers);
-        // A column of the eight cells around ends at one extra of a cell at most.
+        // In each cell, at most one extra per column of the eight cells around.
         self.walled.reserve(4 * layers * (1 + 8));
         self.triangles.reserve(32 * layers);
         self.forget();
@@ -36,19 +36,19 @@ impl Search {
         self.counts.iter_mut().for_each(|counts| counts.reserve(quartets));
     }
 
-    /// Forgets the frame before.
+    /// Clears the previous frame.
     fn forget(&mut self) {
         self.found.iter_mut().for_each(Vec::clear);
         self.counts.iter_mut().for_each(Vec::clear);
     }
 
-    /// Keeps the triangles of a quartet without walls (0), or with (1).
+    /// Stores the triangles of a quartet without walls (0), or with (1).
     fn keep(&mut self, kind: usize) {
         self.counts[kind].push(self.triangles.len() as u32);
         self.found[kind].extend_from_slice(&self.triangles);
     }
 
-    /// Finds the triangles of a quartet without walls; returns false if there is one, and calls `add_wall` with each.
+    /// Finds the triangles of a quartet without walls; if it has any, calls `add_wall` with each and returns false.
     fn find(&mut self, quartet: usize, mut add_wall: impl FnMut(u32)) -> bool {
         self.triangles.clear();
         let mut has_wall = false;
@@ -57,7 +57,7 @@ impl Search {
                 if !wet.wet || self.cells.is_done(quartet, wet) {
                     continue;
                 }
-                // A column is linked with at most one of each cell: the one whose room holds its height.
+                // A column is linked with at most one column of each cell: the one whose room holds its height.
                 let mut near = [None; 4];
                 for other in others {
                     if let Some(holder) =
@@ -78,7 +78,7 @@ impl Search {
     }
 }
 
-/// Adds the triangles of groups of which `wet`, at `corner`, is the first that is wet, from what it is linked with.
+/// Adds the triangles of groups whose first wet column is `wet`, at `corner`, given the columns that it is linked with.
 #[inline(always)]
 pub(in crate::shallow) fn add_triangles(
     corner: usize,
@@ -132,7 +132,7 @@ pub(in crate::shallow::surface) fn divide(four: [&Entry; 4]) -> [[u32; 3]; 2] {
     omitted.map(|corner| TRIANGLES[corner].map(|corner| four[corner].id))
 }
 
-/// Finds the groups of odd quartets, marks their vertices and returns how many triangles they become.
+/// Finds the groups of odd quartets, marks their vertices and returns the triangle count.
 pub(in crate::shallow::surface) fn find_groups(
     scene: Scene<'_>,
     found: &mut Found,
@@ -155,7 +155,7 @@ pub(in crate::shallow::surface) fn find_groups(
                     search.keep(0);
                 }
             }
-            // Those without triangles are looked at no more.
+            // Quartets without triangles are not searched again.
             let out = &mut found.blocks[block];
             out.walled |= u16::from(!is_plain) << quartet;
             out.odd &= !(u16::from(is_plain && search.triangles.is_empty()) << quartet);

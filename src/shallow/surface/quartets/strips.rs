@@ -1,15 +1,15 @@
-//! What is known of strips in a frame, a bit for each position.
+//! State of strips in a frame, one bit per position.
 
 use crate::shallow::surface::{Columns, NONE, STRIP};
 
-/// A strip, with a bit for each position.
+/// State of a strip, one bit per position.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in crate::shallow::surface) struct State {
     /// Wet columns.
     pub wet: u16,
     /// Full quartets of this layer, at their north-west column.
     pub full: u16,
-    /// Those of them that are divided from north-east to south-west.
+    /// Of these, the ones divided from north-east to south-west.
     pub turned: u16,
     /// Wet columns in an odd quartet.
     pub rough: u16,
@@ -23,18 +23,18 @@ pub(in crate::shallow::surface) struct State {
     pub first: u32,
 }
 
-/// A run of 16 cells along x, with a bit for each quartet.
+/// A run of 16 cells along x, one bit per quartet.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in crate::shallow::surface) struct Block {
     /// Odd quartets.
     pub odd: u16,
     /// Those in which a surface ends at a wall.
     pub walled: u16,
-    /// Those that were odd, also without triangles.
+    /// Quartets that were odd, including those without triangles.
     pub searched: u16,
 }
 
-/// Strips that follow each other along x, as do those to the north and to the south of them.
+/// Strips that are consecutive along x, as are those to the north and to the south of them.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::shallow::surface) struct Span {
     /// First strip.
@@ -52,7 +52,7 @@ pub(in crate::shallow::surface) struct Span {
 pub(in crate::shallow::surface) struct Bits(Vec<u64>);
 
 impl Bits {
-    /// None of so many.
+    /// Clears the set, for indices below `count`.
     pub fn reset(&mut self, count: usize) {
         self.0.clear();
         self.0.resize(count.div_ceil(64), 0);
@@ -67,7 +67,7 @@ impl Bits {
         self.0[index / 64] >> (index % 64) & 1 == 1
     }
 
-    /// Adds the indices before and behind each; the last is below `count`.
+    /// Adds the indices before and after each; the last is below `count`.
     pub fn widen(&mut self, count: usize) {
         let mut before = 0;
         for word in 0..self.0.len() {
@@ -81,7 +81,7 @@ impl Bits {
         }
     }
 
-    /// Its indices, from the least.
+    /// Its indices, ascending.
     #[inline(always)]
     pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
         self.0.iter().enumerate().flat_map(|(word, &bits)| positions(bits).map(move |bit| word * 64 + bit))
@@ -110,7 +110,7 @@ impl Bits {
     }
 }
 
-/// Positions of the bits that are set, from the lowest.
+/// Positions of the set bits, from the lowest.
 #[inline(always)]
 pub(in crate::shallow::surface) fn positions(bits: impl Into<u64>) -> impl Iterator<Item = usize> {
     let mut bits: u64 = bits.into();
@@ -121,20 +121,20 @@ pub(in crate::shallow::surface) fn positions(bits: impl Into<u64>) -> impl Itera
     })
 }
 
-/// What is known of all strips.
+/// State of all strips.
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Found {
-    /// Of each strip, and behind the last one of no strip: nothing.
+    /// One per strip, and after the last an empty one, for no strip.
     pub states: Vec<State>,
-    /// Of each run of 16 cells, row by row.
+    /// One per run of 16 cells, row by row.
     pub blocks: Vec<Block>,
     /// Runs of 16 cells in a row.
     pub across: usize,
-    /// Strips that may have something: those with a wet column, those around them, and others with vertices or walls.
+    /// Strips that may not be empty: those with a wet column, those around them, and others with vertices or walls.
     pub near: Bits,
     /// The same, as spans.
     pub spans: Vec<Span>,
-    /// Strips joined `near` since the spans were found.
+    /// Whether strips were added to `near` since the spans were found.
     is_stale: bool,
     /// Blocks with odd quartets.
     pub odd: Bits,
@@ -145,7 +145,7 @@ pub(in crate::shallow::surface) struct Found {
 }
 
 impl Found {
-    /// Forgets the frame before.
+    /// Clears the previous frame.
     pub fn reset(&mut self, columns: &Columns) {
         let [nx, nz] = columns.grid.size;
         let (strips, across) = (columns.strips().len(), nx.div_ceil(STRIP));
@@ -168,9 +168,9 @@ impl Found {
         self.is_stale = false;
     }
 
-    /// Finds the strips around those with wet columns, which are in `near`, and the spans.
+    /// Finds the strips around those with wet columns (those in `near`), and the spans.
     pub fn find_spans(&mut self, columns: &Columns) {
-        // A strip and the one behind it may not lie side by side; then one too many is looked at.
+        // A strip and the next one may not lie side by side; then one strip too many is searched.
         self.near.widen(columns.strips().len());
         self.near.find_spans(columns, &mut self.spans);
     }
@@ -224,7 +224,7 @@ impl Found {
     }
 }
 
-/// Count of bits; mostly they are the lowest ones, which is faster without an instruction for it.
+/// Count of bits. Usually they are the lowest ones: this case is faster without a popcount instruction.
 #[inline(always)]
 pub(in crate::shallow::surface) fn count(bits: u16) -> u32 {
     let ones = bits.trailing_ones();

@@ -1,4 +1,4 @@
-//! Odd quartets in which a surface ends at a wall: a cell may have several entries there that are linked with one.
+//! Odd quartets in which a surface ends at a wall: several entries of a cell may be linked with the same entry there.
 
 use super::cells::{Cells, Entry};
 use super::odd::{OTHERS, divide, three};
@@ -8,26 +8,26 @@ use crate::shallow::surface::rim::boundary::Wall;
 /// Entries of a quartet, and their links.
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Walled {
-    /// Corner by corner.
+    /// Entries, corner by corner.
     entries: Vec<Entry>,
-    /// Where each corner's begin, and the end of the last.
+    /// Where the entries of each corner begin, and the end of the last.
     ends: [usize; 5],
-    /// Entries of each wall, those of all walls of its column, and links of each wet entry: a bit for each entry, [`WORD`] in a word.
+    /// Bit sets of entries, [`WORD`] bits in a word: members of each wall, members of all walls of its column, links of each wet entry.
     members: Vec<u64>,
     of_column: Vec<u64>,
     links: Vec<u64>,
-    /// Words of an entry.
+    /// Words per entry.
     words: usize,
     /// Wet entries; entries that have a wall, with its position among the walls.
     wet: Vec<usize>,
     at_walls: Vec<(usize, usize)>,
 }
 
-/// Bits of a word.
+/// Bits per word.
 const WORD: usize = 64;
 
 impl Walled {
-    /// Makes room for so many entries.
+    /// Reserves memory for this many entries.
     pub fn reserve(&mut self, entries: usize) {
         self.clear(0);
         self.entries.clear();
@@ -55,7 +55,7 @@ impl Walled {
         triangles.clear();
         self.entries.clear();
         for corner in 0..4 {
-            // A wet column of a full group has no link but with the group's.
+            // A wet column of a full group has no links outside the group.
             let open = cells.corner(quartet, corner).iter();
             self.entries.extend(open.filter(|entry| !(entry.wet && cells.is_done(quartet, entry))));
             self.ends[corner + 1] = self.entries.len();
@@ -98,7 +98,7 @@ impl Walled {
                 members[own * words + wet / WORD] |= 1 << (wet % WORD);
             }
         }
-        // A wall's vertex goes with the columns whose surface ends there, and with those that are linked with one of them and have no
+        // A wall's vertex is linked with the columns whose surface ends there, and with those that are linked with one of them and have no
         // other vertex there.
         for &(own, wall) in at_walls.iter() {
             for &(other, _) in at_walls.iter().filter(|(_, other)| walls[*other].column == walls[wall].column)
@@ -137,7 +137,7 @@ impl Walled {
         (self.ends[corner]..self.ends[corner + 1]).filter(move |&other| self.has(wet, other))
     }
 
-    /// Adds the triangles of groups of which the wet entry `own`, at `corner`, is the first that is wet.
+    /// Adds the triangles of groups whose first wet entry is `own`, at `corner`.
     fn add(&self, corner: usize, own: usize, triangles: &mut Vec<[u32; 3]>) {
         let [p, q, r] = OTHERS[corner];
         if [p, q, r].into_iter().filter(|&other| self.near(own, other).next().is_some()).count() < 2 {

@@ -1,17 +1,17 @@
-//! Where the liquid ends: walls and the extra vertices within them, and the means that dry and extra vertices take (thesis 4.2.3).
+//! Where the liquid ends: walls, the extra vertices within them, and the averages for dry and extra vertices (thesis 4.2.3).
 
 use crate::shallow::surface::quartets::links::{RING, Scene, are_near, cell_at};
 use crate::shallow::surface::quartets::strips::{Found, positions};
 use crate::shallow::surface::{NONE, STRIP};
 
-/// The surface of linked wet columns that ends at a column's solid.
+/// A surface of linked wet columns that ends at a column's solid.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::shallow::surface) struct Wall {
     /// Index of the column.
     pub column: u32,
     /// The wet columns whose surface ends there, by position in the ring of cells around, or [`NONE`].
     pub members: [u32; 8],
-    /// They take the column's own vertex, which is dry and lies between columns linked with them; else an extra one.
+    /// Whether the members use the column's own vertex, which is dry and lies between columns linked with them, instead of an extra one.
     pub is_own: bool,
     /// Mean height of the members (units).
     pub height: i32,
@@ -33,21 +33,21 @@ pub(in crate::shallow::surface) fn walls_of(list: &[Wall], column: u32) -> std::
     first..first + count
 }
 
-/// Walls beyond those of the terrain that there is room for: a tool that dips into liquid makes some hundred, in frames that should allocate nothing.
+/// Walls to reserve beyond those of the terrain: a tool that dips into liquid makes some hundred, in frames that should allocate nothing.
 const ROOM: usize = 1024;
 
 /// All walls, in order of columns.
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Walls {
     pub list: Vec<Wall>,
-    /// Whether a triangle has the extra vertex.
+    /// For each wall, whether a triangle uses its extra vertex.
     pub used: Vec<bool>,
-    /// Columns around one whose surface ends there: position in the ring, index; and whether they have a wall.
+    /// Columns around a column whose surface ends at it: position in the ring, index, and whether they have a wall.
     nodes: Vec<(usize, u32, bool)>,
 }
 
 impl Walls {
-    /// Makes room for so many pairs of a wet column and a wall, and so many layers; and for [`ROOM`] more.
+    /// Reserves memory for this many pairs of a wet column and a wall, this many layers, and [`ROOM`] more walls.
     pub fn reserve(&mut self, pairs: usize, layers: usize) {
         self.clear();
         self.list.reserve(pairs + ROOM);
@@ -60,7 +60,7 @@ impl Walls {
         self.used.clear();
     }
 
-    /// Finds what ends at the columns that are marked as walls.
+    /// Finds the surfaces that end at the columns marked as walls.
     pub fn find(&mut self, scene: Scene<'_>, found: &Found) {
         for strip in found.near.iter() {
             for position in positions(found.states[strip].walls) {
@@ -83,7 +83,7 @@ impl Walls {
                 }
             }
         }
-        // Those that are linked with a wet column that the dry column itself is linked with take its vertex.
+        // Nodes linked with a wet column that the dry column itself is linked with use its vertex.
         if !scene.is_wet(column) {
             let linked = RING.map(|step| scene.wet_beside(column, step));
             self.add(scene, column, linked, true);
@@ -95,7 +95,7 @@ impl Walls {
         }
     }
 
-    /// Adds the wall of the nodes that are linked with the given columns, or with each other from the first that has none on.
+    /// Adds the wall of the nodes linked with the given columns, or else that of the first node without a wall and those linked with it.
     fn add(&mut self, scene: Scene<'_>, column: usize, linked: [Option<usize>; 8], is_own: bool) {
         let mut members = [NONE; 8];
         let is_linked =
@@ -132,7 +132,7 @@ impl Walls {
         }
     }
 
-    /// Numbers the extra vertices that triangles have, from `first`, and returns their count.
+    /// Numbers the extra vertices that triangles use, starting at `first`, and returns their count.
     pub fn number(&mut self, first: u32) -> u32 {
         let mut next = first;
         for (wall, _) in self.list.iter_mut().zip(&self.used).filter(|(_, used)| **used) {
@@ -143,12 +143,12 @@ impl Walls {
     }
 }
 
-/// The wet columns that a vertex takes the mean of: position in the ring, index.
+/// The wet columns that a vertex averages: position in the ring, index.
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Around(Vec<(usize, usize)>);
 
 impl Around {
-    /// Makes room for all that there may be: eight columns, and for each eight neighbours.
+    /// Reserves memory for the maximum: eight columns, and eight neighbours of each.
     pub fn reserve(&mut self) {
         self.0.clear();
         self.0.reserve(8 + 8 + 8 * 8);
@@ -160,7 +160,7 @@ impl Around {
         }
     }
 
-    /// Takes the wet columns that a dry one is linked with.
+    /// Collects the wet columns that a dry one is linked with.
     pub fn take_linked(&mut self, scene: Scene<'_>, column: usize) {
         self.0.clear();
         for (ring, step) in RING.into_iter().enumerate() {
@@ -170,8 +170,8 @@ impl Around {
         }
     }
 
-    /// Takes the members of a wall and those of its cell's neighbours that are linked with one of them, and what its own column is linked
-    /// with if they take its vertex.
+    /// Collects the members of a wall and the neighbours of its cell that are linked with one of them; if they use its column's vertex,
+    /// also the columns that this column is linked with.
     pub fn take_wall(&mut self, scene: Scene<'_>, wall: &Wall) {
         self.0.clear();
         if wall.is_own {
@@ -194,7 +194,7 @@ impl Around {
         sum as f64 / self.0.len().max(1) as f64
     }
 
-    /// Sum of vectors, in an order that turns and mirrors with the scene.
+    /// Sum of vectors, in an order that rotates and mirrors with the scene.
     pub fn sum<const N: usize>(&self, mut vector: impl FnMut(usize) -> [f32; N]) -> [f32; N] {
         let mut of_ring = [[0.0; N]; 8];
         for &(ring, index) in &self.0 {

@@ -1,5 +1,5 @@
-//! Where the ground of a mesh ends, between the middles of the cells: on each side of a column at which films end, how far its triangles reach along the
-//! line to the middle of the next cell, and how high they are there.
+//! Where the ground of a mesh ends between the middles of the cells: on each side of a column at which films end, how far its triangles
+//! reach along the line to the middle of the next cell, and how high they are there.
 
 use std::ops::Range;
 
@@ -10,23 +10,23 @@ use crate::shallow::columns::grid::Grid;
 use crate::shallow::surface::quartets::links::RING;
 use crate::shallow::surface::{Columns, Depths, Surface};
 
-/// Finds the silhouette of the ground; keeps its memory.
+/// Finds the silhouette of the ground; reuses its memory.
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Silhouette {
-    /// Films on all of the ground (units): where their surface ends, there may be a hem.
+    /// A film on all of the ground (units): where its surface ends, there may be a hem.
     film: Vec<i32>,
     films: Surface,
-    /// Hems in order of cells, row by row, and how far the ground reaches on their sides as far as triangles were looked at.
+    /// Hems in order of cells, row by row, and how far the ground reaches on their sides in the triangles processed so far.
     hems: Vec<Hem>,
     ends: Vec<[Option<End>; 4]>,
     crowd: Crowd,
-    /// Of each vertex along x and z the last cell whose middle is not behind it, within a cell around the domain.
+    /// For each vertex, along x and z, the last cell whose middle is not behind it, clamped to a cell around the domain.
     cells: Vec<[i32; 2]>,
 }
 
 impl Silhouette {
-    /// Hems of all columns at which films end within the domain, in their order. A vertex has three finite numbers, and faces have vertices that are
-    /// there.
+    /// Hems of all columns at which films end within the domain, in their order. Vertices must be finite, and faces must have existing
+    /// vertices.
     pub fn find(&mut self, columns: &Columns, positions: &[Vec3], faces: &[[u32; 3]]) -> Result<&[Hem]> {
         self.find_ends_of_films(columns)?;
         if self.hems.is_empty() {
@@ -71,7 +71,7 @@ impl Silhouette {
         Ok(())
     }
 
-    /// Puts the hems in order, and counts those of each cell.
+    /// Sorts the hems by cell, and counts those of each cell.
     fn position(&mut self, columns: &Columns) {
         let Self { hems, ends, crowd, .. } = self;
         let cell = |hem: &Hem| columns.cell(hem.column as usize);
@@ -93,7 +93,7 @@ impl Silhouette {
         self.cells.extend(positions.iter().map(|at| [position(0, at.x), position(1, at.z)]));
     }
 
-    /// Looks how far a triangle reaches from the hems of a box of cells.
+    /// Finds how far a triangle reaches from the hems of a box of cells.
     fn cut(&mut self, columns: &Columns, corners: [[f64; 3]; 3], [xs, zs]: [[usize; 2]; 2]) {
         let (grid, heights) = (columns.grid, columns.heights);
         let [across_x, _, across_z] = [0, 1, 2].map(|axis| {
@@ -129,10 +129,10 @@ impl Silhouette {
     }
 }
 
-/// How many hems there are in boxes of cells: a summed-area table.
+/// Counts of hems in boxes of cells: a summed-area table.
 #[derive(Debug, Default)]
 struct Crowd {
-    /// Hems in the cells that are both west and north of a corner of the grid, row by row: one more along each axis than there are cells.
+    /// Hems in the cells that are both west and north of a grid corner, row by row: one more along each axis than there are cells.
     before: Vec<u32>,
     /// Count of cells along x and z.
     size: [usize; 2],
@@ -157,7 +157,7 @@ impl Crowd {
         }
     }
 
-    /// Hems of some cells of a row: their numbers row by row.
+    /// Hems of some cells of a row, numbered row by row.
     fn numbers(&self, xs: [usize; 2], row: usize) -> Range<usize> {
         let across = self.size[0] + 1;
         let [above, below] = [row, row + 1].map(|row| &self.before[row * across..][..across]);
@@ -166,7 +166,7 @@ impl Crowd {
         start..end
     }
 
-    /// The box of cells, ends behind the last ones, within a cell of a triangle whose corners are in these, if there are hems in it.
+    /// The box of cells (ends exclusive) within a cell of a triangle whose corners are in the given cells, if the box contains hems.
     #[inline]
     fn near(&self, corners: [[i32; 2]; 3]) -> Option<[[usize; 2]; 2]> {
         let [[west, east], [north, south]] = [0, 1].map(|axis| {
@@ -181,7 +181,7 @@ impl Crowd {
     }
 }
 
-/// How far ground reaches from the middle of a cell (cells), and how much higher than there it then is (m).
+/// How far the ground reaches from the middle of a cell (cells), and its height there above the column's base (m).
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct End {
     at: f64,
@@ -189,13 +189,14 @@ struct End {
 }
 
 impl End {
-    /// Whether another one is farther, or as far and higher.
+    /// Whether another one is farther, or equally far and higher.
     fn is_before(&self, other: &Self) -> bool {
         (self.at, self.height) < (other.at, other.height)
     }
 }
 
-/// Where a triangle, of corners along a line, up and across it, ends on the line from 0 to 1. None where it does not cross it, or is upright.
+/// Where a triangle, with corners along, above and across a line, ends on the line from 0 to 1. None if it does not cross it or is
+/// vertical.
 fn crossing(corners: [[f64; 3]; 3]) -> Option<End> {
     let mut points = [[0.0; 2]; 2];
     let mut count = 0;

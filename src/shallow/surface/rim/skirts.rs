@@ -1,7 +1,7 @@
 //! Skirts: where the surface ends between wet columns, it comes down to the ground.
 //!
-//! An edge between two wet columns that has a triangle on one side only lies between a full quartet and an odd one, or in odd ones. Of all other edges both
-//! sides are known to be closed, so that few are looked at.
+//! An edge between two wet columns with a triangle on one side only lies between a full quartet and an odd one, or within odd ones. All
+//! other edges are known to be closed, so few are examined.
 
 use super::ledges::{Hem, Ledges};
 use crate::shallow::surface::buffers::vertices::Vertices;
@@ -10,24 +10,24 @@ use crate::shallow::surface::quartets::odd::Search;
 use crate::shallow::surface::quartets::strips::{Found, positions, some};
 use crate::shallow::surface::{Columns, Indices, NONE, STRIP, Target};
 
-/// The skirts of a surface; keeps its memory.
+/// The skirts of a surface; reuses its memory.
 #[derive(Debug, Default)]
 pub(in crate::shallow::surface) struct Skirts {
-    /// Edges of odd quartets and of full ones beside them, between wet columns, as triangles have them.
+    /// Edges of odd quartets and of full ones beside them, between wet columns, in the direction of their triangles.
     edges: Vec<[u32; 2]>,
-    /// Of each column the ways that such edges lead from it: a bit for each position of the ring of cells around. 0 between surfaces.
+    /// For each column, the directions of such edges from it: a bit per position of the ring of cells around. Reset to 0 between surfaces.
     ways: Vec<u8>,
     /// The edges that have a skirt.
     open: Vec<[u32; 2]>,
     /// Hems, in order of their vertices, and the first of these.
     hems: Vec<Hem>,
     first: u32,
-    /// Of each column the position of its hem, or [`NONE`], as all are between surfaces.
+    /// For each column, the position of its hem, or [`NONE`], to which all are reset between surfaces.
     positions: Vec<u32>,
 }
 
 impl Skirts {
-    /// Finds the edges that have a triangle on one side only; the first hem is vertex `first`. Returns the counts of vertices and of indices.
+    /// Finds the edges that have a triangle on one side only; the first hem is vertex `first`. Returns the counts of vertices and indices.
     pub fn find(
         &mut self,
         scene: Scene<'_>,
@@ -47,7 +47,7 @@ impl Skirts {
             positions.clear();
             positions.resize(len, NONE);
         }
-        // With as many columns nothing is allocated any more: a column has eight ways at most.
+        // For the same count of columns nothing is allocated again: a column has at most eight directions.
         edges.reserve(8 * ledges.most);
         open.reserve(ledges.most);
         hems.reserve(ledges.most);
@@ -91,14 +91,14 @@ impl Skirts {
         &self.hems
     }
 
-    /// Writes the hems behind all other vertices.
+    /// Writes the hems after all other vertices.
     pub fn write_hems(&self, vertices: &Vertices<'_>, target: &mut Target<'_>) {
         for (vertex, hem) in (self.first as usize..).zip(&self.hems) {
             vertices.put_hem(vertex, hem, target);
         }
     }
 
-    /// Writes the triangles behind `at` indices; `flipped`: clockwise seen from outside.
+    /// Writes the triangles after `at` indices; `flipped`: clockwise seen from outside.
     pub fn write_triangles(&self, found: &Found, at: usize, flipped: bool, out: &mut Indices<'_>) {
         match out {
             Indices::None => {}
@@ -119,7 +119,7 @@ impl Skirts {
         }
     }
 
-    /// Forgets the surface before.
+    /// Clears the previous surface.
     fn forget(&mut self) {
         self.hems.iter().for_each(|hem| self.positions[hem.column as usize] = NONE);
         self.edges.clear();
@@ -128,7 +128,7 @@ impl Skirts {
     }
 }
 
-/// Position in the ring of cells around a column where another one is.
+/// Position, in the ring of cells around a column, of another column.
 fn way(columns: &Columns, [from, to]: [u32; 2]) -> Option<u8> {
     if from == NONE || to == NONE {
         return None;
@@ -137,7 +137,8 @@ fn way(columns: &Columns, [from, to]: [u32; 2]) -> Option<u8> {
     RING.iter().position(|&step| cell_at(from, step) == to).map(|way| way as u8)
 }
 
-/// To the right of a way between two columns, seen from each of them: the axis that nothing is on. Of a diagonal it is the corner between both.
+/// The side to the right of a step between two columns, for each of them: nothing is there. For a diagonal step it is the corner between
+/// both.
 fn sides(way: u8) -> [u8; 2] {
     let turns = if way.is_multiple_of(2) { [6, 6] } else { [7, 5] };
     turns.map(|turn| (way + turn) % 8 / 2)
@@ -152,7 +153,7 @@ fn ends_within(scene: Scene<'_>, edge: [u32; 2], way: u8) -> bool {
     })
 }
 
-/// Calls `add` with the edges of full quartets beside quartets that were searched and are not full themselves, of the same layer.
+/// Calls `add` with the edges of full quartets beside quartets of the same layer that were searched and are not full.
 fn edges_of_full(scene: Scene<'_>, found: &Found, mut add: impl FnMut([u32; 2])) {
     let columns = scene.columns;
     let full = |strip: Option<usize>| strip.map_or(0, |strip| found.states[strip].full);

@@ -1,9 +1,9 @@
 //! One triangle mesh of the surface of fine and coarse cells, without a crack between them.
 //!
-//! The meshes of both liquids ([`crate::shallow::surface`]) end at the centres of their outermost columns. A strip of 1.5 fine cells lies between them: it is
-//! stitched from vertex to vertex, a triangle on each coarse column and its two fine ones, two between it and the next, and one at each corner of
-//! the near cells (`stitches.rs`). Columns are linked across it as they are within a liquid. A column that has a vertex in no mesh but is
-//! part of the strip gets one (`sewn.rs`). Where a surface ends at a wall that lies beyond the edge, it ends at the column before it.
+//! The meshes of both liquids ([`crate::shallow::surface`]) end at the centres of their outermost columns. The strip of 1.5 fine cells
+//! between them is stitched from vertex to vertex: a triangle on each coarse column and its two fine ones, two between it and the next, and
+//! one at each corner of the near cells (`stitches.rs`). Columns are linked across it as within a liquid. A column of the strip that has no
+//! vertex in either mesh gets one (`sewn.rs`). Where a surface ends at a wall beyond the edge, it ends at the column before the wall.
 
 mod sewn;
 mod stitches;
@@ -15,7 +15,7 @@ use crate::shallow::surface::{self, Counts, Depths, Indices, Layout, Target};
 use sewn::Sewn;
 use stitches::Stitches;
 
-/// The largest counts that the surface of any liquid in these columns can have.
+/// The maximum counts that the surface of any liquid in these columns can have.
 pub fn bound(detail: &Detail) -> Counts {
     let [fine, coarse] = [&detail.fine, &detail.coarse].map(|liquid| surface::bound(&liquid.columns));
     let [sewn, triangles] = stitches::bound(detail);
@@ -26,21 +26,21 @@ pub fn bound(detail: &Detail) -> Counts {
     }
 }
 
-/// Makes surfaces; keeps its memory from one to the next.
+/// Builds surfaces; reuses its memory.
 #[derive(Debug, Default)]
 pub struct Surface {
     /// Of fine and of coarse cells.
     liquids: [surface::Surface; 2],
-    /// Columns of the vertices of both.
+    /// Columns of the vertices of both meshes.
     columns: [Vec<u32>; 2],
-    /// Vertex indices of the coarse mesh, from 0 on.
+    /// Vertex indices of the coarse mesh, starting from 0.
     indices: Vec<u32>,
     stitches: Stitches,
     sewn: Sewn,
 }
 
 impl Surface {
-    /// Makes room for whatever liquid there may be: from then on [`Surface::build`] allocates nothing, until the near cells or the ground change.
+    /// Reserves memory for any liquid: from then on [`Surface::build`] allocates nothing until the near cells or the ground change.
     pub fn reserve(&mut self, detail: &Detail) {
         let liquids = [&detail.fine, &detail.coarse];
         for ((own, liquid), columns) in self.liquids.iter_mut().zip(liquids).zip(&mut self.columns) {
@@ -57,11 +57,11 @@ impl Surface {
         self.sewn.reserve(sewn, triangles);
     }
 
-    /// Size of the mesh that [`Surface::build`] would write. `depths` are those of the fine liquid and of the coarse one; their ledges
-    /// are not looked at.
+    /// Size of the mesh that [`Surface::build`] would write. `depths` are those of the fine liquid and of the coarse one; their ledges are
+    /// ignored.
     ///
     /// # Errors
-    /// As [`Surface::build`], of the depths.
+    /// As [`Surface::build`], for the depths.
     pub fn count(&mut self, detail: &Detail, depths: [&Depths<'_>; 2]) -> Result<Counts> {
         let depths = depths.map(without_ledges);
         let depths = depths.each_ref();
@@ -69,9 +69,9 @@ impl Surface {
         Ok(self.sum(both))
     }
 
-    /// Writes the mesh and returns its size; [`bound`] is the most that it can be. The vertices of fine cells come first, then those of coarse
-    /// ones, then those of the strip between them. [`Target::columns`] are indices of the fine columns; those of coarse ones follow them: the first is
-    /// their count, `detail.fine().columns().len()`.
+    /// Writes the mesh and returns its size, at most [`bound`]. The vertices of fine cells come first, then those of coarse ones, then
+    /// those of the strip between them. [`Target::columns`] are indices of the fine columns, followed by those of the coarse ones, which
+    /// start at the count of the fine ones, `detail.fine().columns().len()`.
     ///
     /// # Errors
     /// As [`surface::Surface::build`]: nothing is written.
@@ -135,12 +135,12 @@ impl Surface {
     }
 }
 
-/// Ledges are of one liquid's columns: along the edge of the near cells its surface goes on.
+/// Drops ledges: they belong to one liquid's columns, but along the edge of the near cells its surface continues.
 fn without_ledges<'a>(depths: &Depths<'a>) -> Depths<'a> {
     Depths { ledges: None, ..*depths }
 }
 
-/// What is behind some vertices, without indices and columns.
+/// The part of a target after its first vertices, without indices and columns.
 fn part<'t>(target: &'t mut Target<'_>, first: usize) -> Target<'t> {
     let Target { positions, normals, depths, opacities, velocities, carried, layers, .. } = target;
     Target {
@@ -156,7 +156,7 @@ fn part<'t>(target: &'t mut Target<'_>, first: usize) -> Target<'t> {
     }
 }
 
-/// Writes vertex indices from a position on.
+/// Writes vertex indices, starting at a position.
 fn put_indices(indices: impl Iterator<Item = u32>, first: usize, out: &mut Indices<'_>) {
     match out {
         Indices::None => {}

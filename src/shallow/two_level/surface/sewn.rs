@@ -1,5 +1,5 @@
-//! Vertices of the strip between fine and coarse cells that neither mesh has: of columns whose surface goes on across the edge only, and of dry ones
-//! beside liquid that ends there.
+//! Vertices of the strip between fine and coarse cells that are in neither mesh: of columns whose surface continues only across the edge,
+//! and of dry ones beside liquid that ends there.
 
 use super::stitches::Stitches;
 use crate::shallow::columns::Columns;
@@ -10,12 +10,12 @@ use crate::shallow::surface::heights::shown::height_of;
 use crate::shallow::surface::{Depths, Layout, Target, Up};
 use crate::shallow::two_level::Detail;
 
-/// What these vertices are made of.
+/// Source data of these vertices.
 #[derive(Debug, Default)]
 pub(super) struct Sewn {
-    /// A vertex and a wet column of a triangle that it has.
+    /// Pairs of a vertex and a wet column that share a triangle.
     partners: Vec<[u32; 2]>,
-    /// By vertex: height as it is shown (units), and the sum of its triangles' normals.
+    /// For each vertex: its height as shown (units), and the sum of its triangles' normals.
     heights: Vec<f64>,
     slopes: Vec<[f64; 3]>,
 }
@@ -43,13 +43,13 @@ impl<'a> Columnar<'a> {
         depths.depth[index].max(0)
     }
 
-    /// The height at which it is shown by its own depth (units).
+    /// The height at which its own depth shows it (units).
     fn height(self, id: u32) -> i32 {
         let (columns, depths, index) = self.of(id);
         height_of(columns, depths, self.layout, index)
     }
 
-    /// Middle, in fine cells.
+    /// Its middle, in fine cells.
     fn middle(self, id: u32) -> [f64; 2] {
         let (columns, _, index) = self.of(id);
         let cells = columns.grid.cell / self.detail.fine.columns.grid.cell;
@@ -68,7 +68,7 @@ impl<'a> Columnar<'a> {
 }
 
 impl Sewn {
-    /// Makes room for so many vertices and triangles.
+    /// Reserves memory for this many vertices and triangles.
     pub fn reserve(&mut self, vertices: usize, triangles: usize) {
         self.partners.clear();
         self.heights.clear();
@@ -78,7 +78,7 @@ impl Sewn {
         self.slopes.reserve(vertices);
     }
 
-    /// Writes the vertices of a strip, from the beginning of a target on.
+    /// Writes the vertices of a strip, from the start of a target.
     pub fn write(
         &mut self,
         detail: &Detail,
@@ -99,7 +99,7 @@ impl Sewn {
         }
     }
 
-    /// Finds the wet columns around each vertex, each once.
+    /// Finds the wet columns around each vertex, each only once.
     fn find_partners(&mut self, all: Columnar<'_>, stitches: &Stitches) {
         self.partners.clear();
         for triangle in &stitches.triangles {
@@ -119,7 +119,7 @@ impl Sewn {
         self.partners[first..end].iter().map(|[_, id]| *id)
     }
 
-    /// A wet column has its own height, a dry one the mean of those around, and not over its ground.
+    /// A wet column has its own height, a dry one the mean of those around, but not above its ground.
     fn find_heights(&mut self, all: Columnar<'_>, sewn: &[u32]) {
         let mut heights = std::mem::take(&mut self.heights);
         heights.clear();
@@ -134,7 +134,7 @@ impl Sewn {
         self.heights = heights;
     }
 
-    /// Sums the normals of triangles, by their area, at each vertex.
+    /// Sums the normals of triangles, weighted by area, at each vertex.
     fn find_slopes(&mut self, all: Columnar<'_>, stitches: &Stitches) {
         self.slopes.clear();
         self.slopes.resize(stitches.sewn.len(), [0.0; 3]);

@@ -7,10 +7,11 @@ use crate::shallow::surface::quartets::cells::Entry;
 use crate::shallow::surface::quartets::odd::{OTHERS, add_triangles};
 use crate::shallow::two_level::Detail;
 
-/// A cell at each corner of a piece of the strip, north-west, north-east, south-west and south-east: whether it is coarse, and where it is.
+/// The cell at each corner of a piece of the strip, north-west, north-east, south-west and south-east: whether it is coarse, and its
+/// position.
 type Piece = [Option<(bool, [usize; 2])>; 4];
 
-/// The triangles of the strip. Of both liquids' columns those of the coarse one have ids behind those of the fine one.
+/// The triangles of the strip. Ids are columns of both liquids, those of the coarse one after those of the fine one.
 #[derive(Debug, Default)]
 pub(super) struct Stitches {
     /// Columns of the triangles: they face up.
@@ -22,7 +23,7 @@ pub(super) struct Stitches {
     corners: [Vec<Entry>; 4],
 }
 
-/// The most vertices and triangles that the strip may have, besides those of both meshes.
+/// Maximum vertices and triangles of the strip, besides those of both meshes.
 pub(super) fn bound(detail: &Detail) -> [usize; 2] {
     let (mut columns, mut triangles) = (0, 0);
     each_piece(detail, |piece| {
@@ -35,12 +36,12 @@ pub(super) fn bound(detail: &Detail) -> [usize; 2] {
 }
 
 impl Stitches {
-    /// Makes room for so many triangles, and columns of a cell.
+    /// Reserves memory for this many triangles, and columns of a cell.
     pub fn reserve(&mut self, triangles: usize, layers: usize) {
         self.forget();
         self.triangles.reserve(triangles);
         self.indices.reserve(3 * triangles);
-        // Before those of several triangles are united.
+        // As it is before duplicates of several triangles are removed.
         self.sewn.reserve(3 * triangles);
         self.corners.iter_mut().for_each(|corner| corner.reserve(layers));
     }
@@ -52,7 +53,7 @@ impl Stitches {
         self.corners.iter_mut().for_each(Vec::clear);
     }
 
-    /// Finds the strip. `columns` are those of both meshes' vertices, in order, but for the extras behind.
+    /// Finds the strip. `columns` are those of both meshes' vertices, in order, except for the extras at the end.
     pub fn find(&mut self, detail: &Detail, depths: [&[i32]; 2], columns: [&Vec<u32>; 2], both: [Counts; 2]) {
         self.forget();
         let Self { triangles, indices, sewn, corners } = self;
@@ -141,7 +142,7 @@ fn each_piece(detail: &Detail, mut see: impl FnMut(Piece)) {
     for (axis, way) in sides {
         let Some(across) = outer(axis, way) else { continue };
         let along = &near[1 - axis];
-        // A position of a piece: before or behind along the edge, and fine or coarse.
+        // A corner of a piece: before or behind along the edge, and fine or coarse.
         let corner = |is_behind: bool, is_coarse: bool| {
             let bits = [is_coarse == (way > 0), is_behind];
             let [x, z] = if axis == 0 { bits } else { [bits[1], bits[0]] };

@@ -27,8 +27,8 @@ pub struct Claim {
 }
 
 impl Claims {
-    /// Claims of the objects that remove snow from `from` to `to` (s); `usual` is the compression of objects that have none
-    /// of their own.
+    /// Claims of the objects that remove snow from `from` to `to` (s); `usual` is the default compression, for objects that have none of
+    /// their own.
     ///
     /// # Errors
     /// A pose that cannot be computed.
@@ -83,7 +83,7 @@ impl ClaimsHere<'_> {
         let mut best = (f64::INFINITY, self.share);
         for claim in &self.claims {
             for mesh in &claim.meshes {
-                // Only what is nearer than the best so far.
+                // Only surfaces nearer than the best so far.
                 if let Some(distance) =
                     mesh.distance(position, best.0.min(FARTHEST)).filter(|near| *near < best.0)
                 {

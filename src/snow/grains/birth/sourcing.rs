@@ -1,8 +1,8 @@
 //! Creates grains from the snow that a step removed (thesis section 3.3.2).
 //!
-//! Candidate positions are the jittered sites of a face-centred cubic lattice fixed in world space. Of the sites of a block
-//! that the step cleared, as many become grains as its removed volume pays for. What the volume pays for beyond the available
-//! sites is owed and carried over, so that no snow is lost from slices thinner than a grain, few of which contain a site.
+//! Candidate positions are the jittered sites of a face-centred cubic lattice fixed in world space. In a block that the step cleared, as
+//! many sites become grains as its removed volume pays for. Grains paid for beyond the available sites are owed and carried over, so that
+//! no snow is lost from slices thinner than a grain, few of which contain a site.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,7 +20,7 @@ use crate::snow::grains::colliders::field::Window;
 
 /// Packing of new grains: the share of space that they fill.
 pub const PACKING: f64 = 0.55;
-/// Jitter of a site, in distances between neighbouring sites, which are 1.10 diameters apart.
+/// Jitter of a site, relative to the distance between neighbouring sites, which is 1.10 diameters.
 const JITTER: f64 = 0.04;
 
 /// The base layer that a step of grains reads.
@@ -130,7 +130,7 @@ pub fn removals(before: &FloatGrid, after: &FloatGrid) -> Result<Vec<Removal>> {
     Ok(out)
 }
 
-/// The snow removed from blocks; blocks that lost none are left out.
+/// The snow removed from blocks; blocks that lost none are omitted.
 fn volumes(before: &FloatGrid, after: &FloatGrid, origins: &[Origin]) -> Result<Vec<Removal>> {
     let cell = after.voxel_size() as f32;
     let (old, new) = (before.probe(origins)?, after.probe(origins)?);
@@ -195,8 +195,8 @@ impl Sourcing {
         (blocks as f64 * sites * size_of::<Site>() as f64) as u64
     }
 
-    /// Positions (m) of new grains, none of which `is_behind` ground: interpolated between cells, the layer reaches into it. `owed`
-    /// holds the grains that each block has paid for but that do not exist yet.
+    /// Positions (m) of new grains, of which none is behind ground (`is_behind`): interpolated between cells, the layer extends into the
+    /// ground. `owed` holds the grains that each block has paid for but that do not exist yet.
     ///
     /// # Errors
     /// When a grid cannot be read.

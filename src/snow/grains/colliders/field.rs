@@ -98,7 +98,7 @@ impl<'a> Seen<'a> {
         Ok(())
     }
 
-    /// Distance (diameters) of a member of the block of an index from the surface; none where no surface is near the block.
+    /// Distance (diameters) of a member of the block with this index from the surface; none where no surface is near the block.
     pub fn distance(&self, index: usize, at: At, position: V) -> Option<f32> {
         let patch = self.patches.get(index)?.as_ref().filter(|patch| !patch.values.is_empty())?;
         Some(patch.sample(self.voxel(at, position)).0 / self.diameter as f32)
@@ -140,16 +140,16 @@ const ROOM: f64 = 1.0;
 /// Values of a level set around a block; empty where no surface is near.
 #[derive(Default)]
 struct Patch {
-    /// Least voxel index along each axis.
+    /// Minimum voxel index along each axis.
     low: [i32; 3],
-    /// Count of voxels along each axis.
+    /// Number of voxels along each axis.
     size: [usize; 3],
     values: Vec<f32>,
     least: f32,
 }
 
 impl Patch {
-    /// Values of the voxels from `low` to before `end`.
+    /// Values of the voxels from `low` up to `end`, exclusive.
     fn of(window: &Window<'_>, low: [i32; 3], end: [i32; 3]) -> Self {
         let size = [0, 1, 2].map(|axis| (end[axis] - low[axis]) as usize);
         let mut values = Vec::with_capacity(size.iter().product());
@@ -174,15 +174,15 @@ impl Patch {
 
 /// A box of adjacent leaves of a level set.
 pub struct Window<'a> {
-    /// Least leaf index along each axis.
+    /// Minimum leaf index along each axis.
     low: [i32; 3],
-    /// Count of leaves along each axis.
+    /// Number of leaves along each axis.
     size: [usize; 3],
     probes: Vec<Probe<'a>>,
 }
 
 impl<'a> Window<'a> {
-    /// A window for each pair of a least and a greatest leaf index.
+    /// A window for each pair of a minimum and a maximum leaf index.
     ///
     /// # Errors
     /// Errors of the grid.

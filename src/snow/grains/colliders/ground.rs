@@ -1,7 +1,7 @@
-//! Ground as a collider: a mesh that does not move and has a front, in front of which grains stay.
+//! Ground as a collider: a mesh that does not move and has a front side, on which grains stay.
 //!
-//! The front of a solid is its outside. A sheet is turned as the base layer turns it: faces that disagree with their neighbours
-//! follow the larger part, and the whole faces up. Beyond its rim a sheet has no front: grains may fall past it.
+//! The front of a solid is its outside. A sheet is oriented as in the base layer: faces that disagree with their neighbours follow the
+//! larger part, and the sheet as a whole faces up. Beyond its rim a sheet has no front: grains may fall past it.
 
 use rayon::prelude::*;
 
@@ -23,7 +23,7 @@ pub const FRICTION: f32 = 0.5;
 pub const RIM_CORNER: u8 = 3;
 
 impl Ground {
-    /// The ground of a mesh (m).
+    /// The ground formed by a mesh (m).
     pub fn new(mesh: &TriMesh) -> Self {
         let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
         let sides = Sides::of(&mesh.triangles, &positions);
@@ -43,7 +43,7 @@ impl Ground {
         !mesh.triangles.is_empty() && Sides::of(&mesh.triangles, &positions).is_closed()
     }
 
-    /// Whether a position (m) lies behind it, at most `within` (m) deep.
+    /// Whether a position (m) is behind it, at most `within` (m) deep.
     pub fn is_behind(&self, position: DVec3, within: f64) -> bool {
         self.shell.is_behind(position, within)
     }
@@ -54,7 +54,7 @@ impl Ground {
     }
 }
 
-/// The sides of a mesh's triangles, sorted by edge: coincident corners are one.
+/// The sides of a mesh's triangles, sorted by edge; coincident corners count as one.
 struct Sides {
     sides: Vec<Side>,
     /// The corner that each corner coincides with.
@@ -100,7 +100,7 @@ impl Sides {
         self.edges().all(|sides| sides.len() % 2 == 0)
     }
 
-    /// The triangles, turned so that neighbours agree, as most of the area of each part was.
+    /// The triangles, flipped so that neighbours agree, with the original orientation of most of each component's area.
     fn turned(&self, triangles: &[[u32; 3]], positions: &[DVec3]) -> Vec<[u32; 3]> {
         let pairs = self.edges().filter_map(|sides| match sides {
             [a, b] => Some((a.triangle, b.triangle, a.runs_up == b.runs_up)),
@@ -159,7 +159,7 @@ impl Sides {
             }
         }
         for side in &self.sides {
-            // The corners beside the one that is opposite.
+            // The two corners that are not opposite.
             let [low, high] = side.edge;
             let [first, second] = if side.runs_up { [low, high] } else { [high, low] };
             for (end, corner) in [(first, (side.corner + 1) % 3), (second, (side.corner + 2) % 3)] {
@@ -174,7 +174,7 @@ impl Sides {
 
 /// Six times the volume (m3) of a solid whose faces run counter-clockwise seen from outside.
 fn six_volumes(triangles: &[[u32; 3]], positions: &[DVec3]) -> f64 {
-    // Relative to a position of its own, so that no precision is lost far from the world's origin.
+    // Relative to one of the positions, so that no precision is lost far from the world's origin.
     let origin = positions.first().copied().unwrap_or_default();
     let six = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|vertex| positions[vertex as usize] - origin);
@@ -183,7 +183,7 @@ fn six_volumes(triangles: &[[u32; 3]], positions: &[DVec3]) -> f64 {
     triangles.iter().map(six).sum()
 }
 
-/// Twice the area (m2) that faces up, less what faces down, seen from above.
+/// Twice the area (m2) that faces up, minus the area that faces down, seen from above.
 fn area_up(triangles: &[[u32; 3]], positions: &[DVec3]) -> f64 {
     let up = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|vertex| positions[vertex as usize]);
@@ -196,7 +196,7 @@ fn area_up(triangles: &[[u32; 3]], positions: &[DVec3]) -> f64 {
 mod tests {
     use super::*;
 
-    /// A sheet over the square of 0 to 1 m, as high as a function says.
+    /// A sheet over the square from 0 to 1 m, with heights given by a function.
     fn sheet(height: impl Fn(f64, f64) -> f64) -> TriMesh {
         let at = |index: u32| f64::from(index) / 8.0;
         let corners = (0..9).flat_map(|x| (0..9).map(move |z| (at(x), at(z))));

@@ -1,4 +1,4 @@
-//! What grains touch: meshes that move, the ground, the base layer.
+//! Colliders of grains: moving meshes, the ground, the base layer.
 
 pub(in crate::snow) mod field;
 pub(in crate::snow::grains) mod ground;

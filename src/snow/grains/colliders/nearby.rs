@@ -14,12 +14,12 @@ pub struct Nearby {
     boxes: Vec<Boxes>,
     /// Their triangles, once queried.
     triangles: Vec<Option<Triangles>>,
-    /// Leaves in reach of the last query, and the squares of the distances to their boxes (m2).
+    /// Leaves within reach of the last query, and the squares of the distances to their boxes (m2).
     reached: Vec<(u32, f32)>,
     /// Bounding box of the positions, and the distance from them within which surfaces are known (m).
     positions: [DVec3; 2],
     far: f64,
-    /// The boxes are clamped to this one (m).
+    /// Box to which the leaves' boxes are clamped (m).
     within: [DVec3; 2],
     middle: DVec3,
 }
@@ -27,8 +27,8 @@ pub struct Nearby {
 /// The boxes of eight leaves.
 #[derive(Clone, Copy)]
 struct Boxes {
-    /// Clamped, relative to the middle (m): least and greatest along each axis. Slightly enlarged, so that rounding rejects
-    /// no triangle. Unused lanes lie far away.
+    /// Clamped, relative to the middle (m): minimum and maximum along each axis. Slightly enlarged, so that rounding rejects no triangle.
+    /// Unused lanes are far away.
     sides: [[Lanes; 2]; 3],
     /// Largest displacement of a vertex in the sub-step (m).
     ways: Lanes,
@@ -97,7 +97,7 @@ impl Nearby {
 /// Error bound of a distance in single precision, relative to the largest number that it is computed from.
 const ROUNDING: f64 = 4.0e-6;
 
-/// Eight triangles relative to the middle (m). Unused lanes lie far away.
+/// Eight triangles relative to the middle (m). Unused lanes are far away.
 struct Triangles {
     corner: [Lanes; 3],
     /// The edges from that corner.

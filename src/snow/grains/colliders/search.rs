@@ -9,7 +9,7 @@ use crate::snow::grains::solver::layout::{Block, EDGE, world};
 use crate::snow::grains::solver::rest;
 use crate::snow::grains::solver::rows::{Row, Shared, V, dot, norm, scaled, sub};
 
-/// Working memory of one thread.
+/// Scratch memory of one thread.
 #[derive(Default)]
 pub struct Scratch {
     asking: Vec<Asking>,
@@ -22,7 +22,7 @@ struct Asking {
     slot: u32,
     /// Its position (m).
     position: DVec3,
-    /// Largest distance (diameters) of a surface that counts as near.
+    /// Maximum distance (diameters) of a surface that counts as near.
     reach: f64,
     /// Search distance for surfaces (diameters).
     within: f64,
@@ -47,7 +47,7 @@ pub struct Search<'a> {
 pub struct Travel {
     /// Common displacement (diameters).
     pub along: V,
-    /// Largest displacement of a vertex beside it (diameters).
+    /// Largest deviation of a vertex from it (diameters).
     pub beside: f64,
 }
 
@@ -67,29 +67,29 @@ impl Travel {
         Self { along: [0, 1, 2].map(|axis| (middle[axis] / diameter) as f32), beside: beside / diameter }
     }
 
-    /// Bound of the displacement of a vertex (diameters).
+    /// Upper bound of the displacement of a vertex (diameters).
     pub fn most(&self) -> f64 {
         f64::from(norm(self.along)) + self.beside
     }
 }
 
-/// Largest [`Travel::most`], as a multiple of the largest displacement of a vertex: beyond it, grains that do not ride would
+/// Maximum of [`Travel::most`], as a multiple of the largest displacement of a vertex: beyond it, grains that do not ride on a mesh would
 /// search too often.
 const ALONG: f64 = 1.2;
 
-/// Largest distance (diameters) from the middle of a block to a mesh that its members touch: they have left the block by less
-/// than two diameters.
+/// Maximum distance (diameters) from the middle of a block to a mesh that its members touch: they have left the block by less than two
+/// diameters.
 pub fn around() -> f64 {
     0.5 * f64::from(EDGE) * 3f64.sqrt() + REACH + 2.0
 }
 
 impl Search<'_> {
-    /// Largest speed (m/s) that contacts may give grains, by the speed of the fastest one now (m/s), restitution and gravity
-    /// (m/s2); infinite without meshes.
+    /// Largest speed (m/s) that contacts may give grains, from the speed of the fastest one now (m/s), restitution and gravity (m/s2);
+    /// infinite without meshes.
     ///
-    /// Grains in a closing gap between an object and the base would be squeezed out like a liquid, the faster the shorter the
-    /// sub-steps, without bound; snow is compacted instead. Contacts dissipate: apart from falling, no grain becomes faster than
-    /// what drives them all.
+    /// Grains in a closing gap between an object and the base would be squeezed out like a liquid, faster without bound the shorter the
+    /// sub-steps; snow is compacted instead. Contacts dissipate energy: apart from falling, no grain becomes faster than whatever drives
+    /// them all.
     pub fn fastest(&self, fastest: f32, restitution: f32, gravity: f32) -> f32 {
         let Some(way) = self.shells.iter().map(|shell| shell.way()).reduce(f64::max) else {
             return f32::INFINITY;
@@ -99,12 +99,12 @@ impl Search<'_> {
         fastest.max(thrown).max(falls) * (1.0 + ROUNDING)
     }
 
-    /// Whether a mesh may be within `reach` (diameters), by a stored limit.
+    /// Whether a mesh may be within `reach` (diameters), according to a stored limit.
     fn is_within(&self, limit: f32, reach: f64) -> bool {
         f64::from(limit) - self.before < reach
     }
 
-    /// Whether a mesh may be near members of a block, by the block's limit.
+    /// Whether a mesh may be near members of a block, according to the block's limit.
     pub fn may_be_near(&self, block: &Block) -> bool {
         !block.members.is_empty() && self.is_within(block.limit, around() + self.travel.most())
     }
@@ -160,7 +160,7 @@ impl Search<'_> {
         touches
     }
 
-    /// Travel of the meshes at which one can reach a position (m), from a search within so many diameters.
+    /// Travel of the meshes at which one can reach a position (m), from a search within `within` diameters.
     fn limit(&self, position: DVec3, within: f64) -> f32 {
         let square =
             |shell: &&Shell| shell.nearest(position, within * self.diameter).map(|found| found.square);
@@ -190,7 +190,7 @@ impl Search<'_> {
     }
 }
 
-/// Largest distance (diameters) between a grain's centre and a mesh that count as near.
+/// Maximum distance (diameters) between a grain's centre and a mesh that counts as near.
 const REACH: f64 = 0.5 + SKIN as f64;
 /// Additional search distance (diameters), so that a grain need not search in every sub-step.
 const AHEAD: f64 = 1.5;

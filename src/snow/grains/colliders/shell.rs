@@ -30,7 +30,7 @@ pub struct Shell {
     triangles: Vec<[u32; 3]>,
     /// Whether it has an inside.
     closed: bool,
-    /// Of ground, which has an inside and does not move: the sides and corners of each triangle that lie on the rim of a sheet
+    /// For ground, which has an inside and does not move: the sides and corners of each triangle that lie on the rim of a sheet
     /// ([`RIM_CORNER`]).
     rims: Option<Vec<u8>>,
     now: Vec<DVec3>,
@@ -100,7 +100,7 @@ impl Shell {
         shell
     }
 
-    /// Ground: a mesh that does not move and whose inside no grain may enter, but beyond the rims of its sheets.
+    /// Ground: a mesh that does not move and whose inside no grain may enter, except beyond the rims of its sheets.
     pub fn in_front(
         friction: f32,
         triangles: Vec<[u32; 3]>,
@@ -154,7 +154,7 @@ impl Shell {
         });
     }
 
-    /// Advances to the next sub-step: the next pose becomes the current one, and `pose` the next. Ground stays as it is.
+    /// Advances to the next sub-step: the next pose becomes the current one, and `pose` the next. Ground is unchanged.
     pub fn follow(&mut self, pose: &[DVec3]) {
         if self.is_ground() {
             return;
@@ -193,12 +193,12 @@ impl Shell {
         self.way
     }
 
-    /// Least and greatest displacement of a vertex in the sub-step along each axis (m).
+    /// Minimum and maximum displacement of a vertex in the sub-step along each axis (m).
     pub fn bounds_of_ways(&self) -> &[DVec3; 2] {
         &self.bounds_of_ways
     }
 
-    /// Finds the largest displacement, and their bounds.
+    /// Finds the largest displacement and the bounds of all displacements.
     fn measure(&mut self) {
         let ways = self.now.par_iter().zip(&self.next).with_min_len(VERTICES).map(|(now, next)| next - now);
         let with = |(square, [low, high]): (f64, [DVec3; 2]), way: DVec3| {

@@ -18,7 +18,7 @@ pub struct Touch {
     pub offset: f32,
     /// Velocity of the surface (m/s).
     pub velocity: V,
-    /// Friction against it of a grain that does not slide.
+    /// Friction of a grain that does not slide against it.
     pub friction: f32,
     /// Friction in this sub-step.
     pub friction_now: f32,

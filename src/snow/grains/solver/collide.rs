@@ -8,9 +8,9 @@ use crate::numeric::lanes::{LaneMask, Lanes};
 
 /// Share of an overlap that a sub-step removes.
 const REMOVED: f32 = 0.8;
-/// Largest correction of an overlap in a sub-step (diameters).
+/// Maximum correction of an overlap in a sub-step (diameters).
 pub const FARTHEST: f32 = 0.5;
-/// Largest gap (diameters) at which a contact still supports and keeps its impulse.
+/// Maximum gap (diameters) at which a contact still supports and keeps its impulse.
 pub const TOUCHING: f32 = 0.02;
 /// Gap (diameters) below which contacts are not closed, and overlap (`SLOP`) that they may keep. If every overlap were
 /// removed, a heap would never come to rest: each push opens and closes contacts around it.
@@ -19,15 +19,14 @@ const SLACK: f32 = 0.01;
 const SLOP: f32 = 0.02;
 /// The same for grains that attract each other: a larger value would let walls crack.
 const SLOP_OF_WALLS: f32 = 0.005;
-/// An impulse changes the velocity of a supported grain right above another supported one by this share more than equal
-/// masses would, and that of the lower one by as much less. Masses thus fall upward by a factor e^(-2 x this) per diameter,
-/// and one upward sweep nearly finds the impulses of a deep bed. Equal masses never do: a bed creeps down slopes of a third
-/// of its angle of repose. Grains that attract each other have equal masses: their strength is a force, and walls of any
-/// height would stand.
+/// An impulse changes the velocity of a supported grain directly above another supported one by this share more than equal masses would,
+/// and that of the lower one by this share less. Masses thus decrease upward by a factor e^(-2 x this) per diameter, and one upward sweep
+/// nearly finds the impulses of a deep bed. Equal masses never do: a bed creeps down slopes of a third of its angle of repose. Grains that
+/// attract each other have equal masses: their strength is a force, and with unequal masses walls of any height would stand.
 const LIGHTER_ABOVE: f32 = 0.2;
-/// Least distance (diameters) between two grains that defines a direction.
+/// Minimum distance (diameters) between two grains that defines a direction.
 const LEAST: f32 = 1.0e-6;
-/// Least upward component of the direction from a grain to one that it supports.
+/// Minimum upward component of the direction from a grain to one that it supports.
 pub const STEEP: f32 = 0.2;
 
 type V8 = [Lanes; 3];
@@ -180,7 +179,7 @@ pub fn collide(a: Eight, b: Eight, batch: &mut Batch, c: &Coefficients) -> (Eigh
 }
 
 impl Contact {
-    /// Unsupported grains bounce: the impulse that stopped them gives their speed of approach (Poisson's hypothesis).
+    /// Unsupported grains bounce: the impulse that stopped them gives them their approach speed (Poisson's hypothesis).
     #[inline(always)]
     pub fn bounce(
         &self,

@@ -13,8 +13,8 @@ use super::rows::{Row, V, norm, sub};
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::{LANES, Lanes};
 
-/// Largest gap (diameters) between the anchors of a pair: pairs are found again once a grain is half as far from its anchor.
-/// Less than the edge of a cell minus a diameter.
+/// Maximum gap (diameters) between the anchors of a pair: pairs are found again once a grain is half as far from its anchor. Less than the
+/// edge of a cell minus a diameter.
 pub const SKIN: f32 = 0.25;
 /// The same in blocks with a fast grain, whose pairs last only a sub-step or two: slightly more than the gap at which grains
 /// wake each other.
@@ -22,13 +22,13 @@ pub const THIN_SKIN: f32 = 0.12;
 
 /// Bits of the slot in a code; the bits above are the step to the block of the other grain, two bits per axis.
 const INDEX: u32 = 26;
-/// Largest count of grains.
+/// Maximum number of grains.
 pub const MOST: usize = 1 << INDEX;
 
 /// Eight pairs that share no grain. Unused lanes repeat the first one.
 #[derive(Clone, Copy)]
 pub struct Batch {
-    /// Slots of the owners: of each pair the grain in the later block (by y, x, z), or in one block the later member.
+    /// Slots of the owners: for each pair the grain in the later block (by y, x, z) or, within one block, the later member.
     pub owners: [u32; LANES],
     /// Slots of the other grains, with the step to their block above.
     codes: [u32; LANES],
@@ -67,18 +67,18 @@ struct Pair {
     impulse: V,
 }
 
-/// Working memory of one thread.
+/// Scratch memory of one thread.
 #[derive(Default)]
 struct Scratch {
     /// Index of each member's first pair, then the count of pairs.
     starts: Vec<u32>,
     /// Pairs by owner.
     pairs: Vec<Pair>,
-    /// For each grain around, the index after the last batch that holds it.
+    /// For each grain around, the index after the last batch that contains it.
     behind: Vec<u32>,
     /// Count of pairs in each batch.
     counts: Vec<u8>,
-    /// For each batch itself if it has room, else a later one to try.
+    /// For each batch itself if it is not full, else a later one to try.
     room: Vec<u32>,
 }
 
@@ -261,8 +261,8 @@ impl Layout {
         pairs.filter(|overlap| *overlap > -0.02).map(|overlap| overlap.max(0.0)).collect()
     }
 
-    /// The impulses of all pairs, sorted by slots: the same whether a pair was found in this step or kept. Pairs are freed block
-    /// by block, so that memory need not hold both.
+    /// The impulses of all pairs, sorted by slots: the same whether a pair was found in this step or kept. Pairs are freed block by block,
+    /// so that both need not be in memory at once.
     pub fn take_held(&mut self) -> Vec<Held> {
         let batches = std::mem::take(&mut self.batches);
         let kept = std::mem::take(&mut self.kept);
@@ -323,7 +323,7 @@ impl Block {
         homes[0].block == index as u32 && homes[1].block == self.near[code]
     }
 
-    /// Largest distance (diameters) between the anchors of a pair of a member and one of `other`.
+    /// Maximum distance (diameters) between the anchors of a pair of a member and one of `other`.
     fn reach_to(&self, other: &Self) -> f32 {
         1.0 + 0.5 * (self.skin + other.skin)
     }
@@ -334,7 +334,7 @@ struct Run<'a> {
     block: &'a Block,
     low: u32,
     high: u32,
-    /// Largest distance (diameters) between the anchors of a pair.
+    /// Maximum distance (diameters) between the anchors of a pair.
     reach: f32,
     /// From the owner's block to this one (diameters).
     shift: V,
@@ -386,7 +386,7 @@ fn find_in(scratch: &mut Scratch, blocks: &[Block], index: usize) {
                 runs.push(Run { block: there, low, high, reach, shift, bits, first });
             }
         }
-        // The earlier members of a grain's own cell.
+        // The earlier members of the grain's own cell.
         let mut before = Run {
             block,
             low: own.start,
@@ -457,7 +457,7 @@ impl Scratch {
         false
     }
 
-    /// Puts each pair into the first batch with room after those of its grains' earlier pairs.
+    /// Puts each pair into the first batch that is not full after those of its grains' earlier pairs.
     fn schedule(&mut self, members: &[u32], batches: &mut Vec<Batch>) {
         let Self { starts, pairs, behind, counts, room } = self;
         counts.clear();

@@ -25,18 +25,18 @@ use crate::snow::grains::heap::{Colliders, Heap};
 const CELL: f32 = 2.0;
 /// Cells along a block's edge.
 const PER_BLOCK: i32 = (EDGE / CELL) as i32;
-/// Most grains in a cell that is not crowded; a random packing fits ten.
+/// Maximum number of grains in a cell that is not crowded; a random packing fits ten.
 pub const MOST: usize = 14;
-/// The same before a step: only a cell with more than this, as from a file of grains at one position, would give grains too
-/// many neighbours. Grains that the last step could not position are not tried again.
+/// The same before a step: only a cell with more than this, for example from a file with many grains at one position, would give grains too
+/// many neighbours. Grains that the last step could not move out are not tried again.
 pub const MOST_BEFORE: usize = 64;
 /// Grains that a crowded cell keeps in addition to one for each octant that is clear of surfaces.
 const KEPT: usize = 2;
 /// A cell with fewer grains than this has free space.
 const LOOSE: usize = 7;
-/// Longest path of a grain (cells).
+/// Maximum length of a grain's path (cells).
 const FARTHEST: usize = 100;
-/// Least distance (diameters) from a surface at which a moved grain is placed.
+/// Minimum distance (diameters) from a surface at which a moved grain is placed.
 const CLEAR: f64 = 0.5;
 /// Largest offset (diameters) of a moved grain from the centre of its octant, along each axis.
 const JITTER: f32 = 0.25;
@@ -386,7 +386,7 @@ fn block(cell: Cell) -> At {
     cell.map(|at| at.div_euclid(PER_BLOCK))
 }
 
-/// A jittered position in an octant of a cell (diameters, from the cell's least corner).
+/// A jittered position in an octant of a cell (diameters, from the cell's minimum corner).
 fn scattered(cell: Cell, eighth: usize) -> V {
     let hash = crate::snow::grains::birth::sourcing::hash(eighth as u64, 0, cell.map(i64::from));
     [0, 1, 2].map(|axis: usize| {

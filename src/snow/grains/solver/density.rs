@@ -12,9 +12,8 @@ use super::rows::{Row, norm, sub};
 /// Count of neighbours that shelter a grain from the air completely: about as many as in a settled heap.
 pub const SURROUNDED: usize = 6;
 
-/// Share of the velocity that air takes in a sub-step, by the count of neighbours. `air` is the share that a lone grain keeps
-/// in a second (beta), `dt` the sub-step (s): the drag coefficient, -ln(beta), is multiplied by the share of missing
-/// neighbours.
+/// Share of the velocity that air removes in a sub-step, by the number of neighbours. `air` is the share that a lone grain keeps in a
+/// second (beta), `dt` the sub-step (s): the drag coefficient, -ln(beta), is multiplied by the share of missing neighbours.
 pub fn air_by_neighbours(air: f64, dt: f64) -> [f32; SURROUNDED + 1] {
     let mut all = [0.0; SURROUNDED + 1];
     for (count, taken) in all.iter_mut().enumerate() {

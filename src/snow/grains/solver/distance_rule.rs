@@ -17,9 +17,9 @@ use crate::snow::grains::heap::{Heap, Pose};
 /// Speed above which a grain is fast, in sqrt(g d): a slower one rises by at most d / 32, too little to leave the hollow
 /// between the grains below it.
 const FAST: f64 = 0.25;
-/// Edge of a cell as a share of the distance; at least [`LEAST`].
+/// Edge of a cell as a share of the distance, but not below [`LEAST`].
 const EDGE: f64 = 0.25;
-/// Least edge of a cell (diameters), so that a cell holds many grains.
+/// Minimum edge of a cell (diameters), so that a cell holds many grains.
 const LEAST: f64 = 4.0;
 
 type Cell = [i32; 3];
@@ -95,7 +95,7 @@ impl Heap {
 /// The rows of cells that contain a point nearer than a distance (cells) to a point of the cell in the middle.
 fn runs(distance: f64) -> Vec<Run> {
     let most = distance.ceil() as i32;
-    // Least distance between two cells along an axis, squared.
+    // Minimum distance between two cells along an axis, squared.
     let gap = |steps: i32| f64::from((steps.abs() - 1).max(0)).powi(2);
     let mut runs = Vec::new();
     for (x, y) in (-most..=most).flat_map(|x| (-most..=most).map(move |y| (x, y))) {
@@ -126,7 +126,7 @@ mod tests {
             let runs = runs(distance);
             let sources = |at: Cell| is_near([0; 3], &[[-9, 0, 0], at, [9, 0, 0]], &runs);
             for at in (0..11 * 11 * 11).map(|index| [index / 121 - 5, index / 11 % 11 - 5, index % 11 - 5]) {
-                // Least distance between the two cells along an axis, squared.
+                // Minimum distance between the two cells along an axis, squared.
                 let gap = |corner: i32| f64::from((corner.abs() - 1).max(0)).powi(2);
                 let nearest = at.map(gap).iter().sum::<f64>().sqrt();
                 assert_eq!(sources(at), nearest < distance, "{at:?} {distance}");

@@ -19,7 +19,7 @@ pub const EDGE: f32 = 8.0;
 pub const CELLS: usize = 6;
 /// Count of cells of a block.
 pub const ALL_CELLS: usize = CELLS * CELLS * CELLS;
-/// An index that stands for none.
+/// Sentinel: no index.
 pub const NONE: u32 = u32::MAX;
 
 /// Index of a block along each axis.
@@ -37,7 +37,7 @@ pub struct Block {
     pub starts: [u32; ALL_CELLS + 1],
     /// Anchors of the members (diameters), by axis; padded with infinity.
     pub anchors: [Vec<f32>; 3],
-    /// Largest gap (diameters) between the anchors of two members that form a pair.
+    /// Maximum gap (diameters) between the anchors of two members that form a pair.
     pub skin: f32,
     /// Touches of members, sorted by slot and collider.
     pub touches: Vec<Touch>,
@@ -55,7 +55,7 @@ pub struct Block {
     pub is_stirred: bool,
     /// Whether its touches are out of date.
     pub lacks_touches: bool,
-    /// Whether they are found again in this sub-step.
+    /// Whether its touches are to be found again in this sub-step.
     pub is_due: bool,
     /// Whether its pairs are out of date.
     pub lacks_pairs: bool,
@@ -140,7 +140,7 @@ fn cell(position: V) -> usize {
     (y * CELLS + x) * CELLS + z
 }
 
-/// The slots of grains, sorted by column, level, cell and identity. Those in blocks that do not fit into a key are left out.
+/// The slots of grains, sorted by column, level, cell and identity. Grains in blocks that do not fit into a key are omitted.
 pub fn order(rows: &[Row], ids: &[u32], at: &[At]) -> Vec<u32> {
     let mut keys: Vec<Key> = (rows.par_iter(), ids.par_iter(), at.par_iter())
         .into_par_iter()
@@ -361,7 +361,7 @@ impl Layout {
     }
 }
 
-/// Working memory of one thread that sorts members.
+/// Scratch memory of one thread that sorts members.
 #[derive(Default)]
 struct Ranking {
     /// Anchor and cell of each member.
@@ -369,8 +369,8 @@ struct Ranking {
     members: Vec<u32>,
 }
 
-/// Anchor of a grain, which its pairs are found from: slightly ahead of it, so that it takes longer to stray. `ahead` is how
-/// far (diameters) a grain goes at 1 m/s while its pairs should last.
+/// Anchor of a grain, from which its pairs are found: slightly ahead of it, so that it takes longer to stray. `ahead` is the distance
+/// (diameters) that a grain covers at 1 m/s while its pairs should last.
 fn anchor(row: &Row, ahead: f32, skin: f32) -> V {
     // Less than half the skin.
     let most = 0.45 * skin;
@@ -381,7 +381,7 @@ fn anchor(row: &Row, ahead: f32, skin: f32) -> V {
     position.map(|x| x.clamp(0.0, EDGE))
 }
 
-/// Count of sub-steps for which pairs should last.
+/// Number of sub-steps for which pairs should last.
 pub const SUB_STEPS_AHEAD: f32 = 6.0;
 /// Displacement (diameters) in a sub-step beyond which a thin skin is cheaper: some grain nearby then strays in every
 /// sub-step, and the pairs around it are found again.
@@ -403,7 +403,7 @@ pub fn settle(row: &mut Row, at: &mut At) {
                 *since -= EDGE;
             }
         }
-        // So little below 0 that it, or an eighth of it, is a denormal that was flushed to 0.
+        // A value so slightly below 0 that it, or an eighth of it, is a denormal that was flushed to 0.
         if *position <= 0.0 {
             *position = 0.0;
         }

@@ -1,4 +1,4 @@
-//! Grains in motion: pairs, contacts, rest, and what is put right at the end of a step.
+//! Grains in motion: pairs, contacts, rest, and corrections at the end of a step.
 
 mod collide;
 pub(in crate::snow::grains) mod contacts;

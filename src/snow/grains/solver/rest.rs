@@ -15,8 +15,7 @@ pub const NEAR: f32 = 0.1;
 const JUST_WOKEN: f32 = f32::MAX;
 /// Added to `marks`: something wakes the grain.
 pub const WOKEN: f32 = 2.0;
-/// Time without motion before a grain rests, in standard sub-steps of sqrt(0.02 d / g), so that grains of every size rest
-/// alike.
+/// Time without motion before a grain rests, in standard sub-steps of sqrt(0.02 d / g), so that grains of every size behave alike.
 const PATIENCE: f64 = 96.0;
 /// The same for an unsupported grain, as a multiple.
 const HELD: f32 = 4.0;

@@ -11,7 +11,7 @@ pub type V = [f32; 3];
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[repr(C, align(64))]
 pub struct Row {
-    /// Position within its block (diameters), relative to the block's least corner.
+    /// Position within its block (diameters), relative to the block's minimum corner.
     pub position: V,
     /// Inverse mass (1, or 0 at rest), plus 2 if a chain of contacts led down to something fixed in the last sub-step.
     pub hold: f32,

@@ -1,16 +1,14 @@
 //! The granular solver (thesis section 3.3.1): position based dynamics in small sub-steps, with two corrections per contact.
 //!
-//! Averaged or few-iteration position projections lose the weight of what lies above: piles end at a few degrees and deep
-//! heaps sink into themselves. Here each contact keeps an *impulse* from sub-step to sub-step (projected Gauss-Seidel with
-//! warm start: Moreau 1988; small steps: Macklin et al. 2019), whose total is bounded by Coulomb's cone, and overlap is removed
-//! by a *push*, a displacement that never becomes velocity (split impulse: Guendelman et al. 2003). Impulses are equal and
-//! opposite, so a free heap keeps its momentum. Pushes move the upper of two grains if a chain of contacts holds the lower one
-//! (mass scaling by height: Macklin et al. 2014), so that a heap of any depth is as dense as its packing after one sweep
-//! upward. Impulses favour the upper grain slightly if chains hold both, so that a deep bed keeps its slope. A sinking grain
-//! also loses the part of its velocity that its push undid.
+//! Averaged position projections, or ones with few iterations, lose the weight of the grains above: piles end at a few degrees and deep
+//! heaps collapse into themselves. Here each contact keeps an *impulse* from sub-step to sub-step (projected Gauss-Seidel with warm start:
+//! Moreau 1988; small steps: Macklin et al. 2019), whose total is bounded by Coulomb's cone, and overlap is removed by a *push*, a
+//! displacement that never becomes velocity (split impulse: Guendelman et al. 2003). Impulses are equal and opposite, so a free heap keeps
+//! its momentum. Pushes move the upper of two grains if a chain of contacts supports the lower one (mass scaling by height: Macklin et al.
+//! 2014), so that a heap of any depth is as dense as its packing after one upward sweep. Impulses favour the upper grain slightly if chains
+//! support both, so that a deep bed keeps its slope. A sinking grain also loses the part of its velocity that its push undid.
 //!
-//! Columns are swept upward in a fixed order, in four sets within which they share no grain: any count of threads gives the
-//! same bytes.
+//! Columns are swept upward in a fixed order, in four sets within which they share no grain: any number of threads gives the same bytes.
 //! Eight pairs are solved at a time (`contacts`).
 
 use rayon::prelude::*;
@@ -40,23 +38,23 @@ pub struct Coefficients {
     pub up: V,
     /// Share of the velocity that drag removes in a sub-step: 1 - beta^dt.
     pub air: f32,
-    /// The same by the count of neighbours that shelter a grain; none: they do not.
+    /// The same by the number of neighbours that shelter a grain; none: neighbours do not shelter it.
     pub air_by_neighbours: Option<[f32; SURROUNDED + 1]>,
-    /// Friction between grains that do not slide over each other yet.
+    /// Friction between grains that do not yet slide over each other.
     pub friction: f32,
     /// Friction between grains that slide.
     pub friction_of_sliding: f32,
     /// Square of the speed (m2/s2) above which a grain slides over another, or over a collider.
     pub slides: f32,
-    /// Largest impulse of attraction in a sub-step (m/s).
+    /// Maximum impulse of attraction in a sub-step (m/s).
     pub attraction: f32,
     /// Speed that gravity adds in a sub-step (m/s).
     pub weight: f32,
     /// Share of its speed that a grain keeps in a bounce.
     pub restitution: f32,
-    /// Least speed of approach that bounces (m/s): contacts that carry weight do not.
+    /// Minimum approach speed of a bounce (m/s): contacts that carry weight do not bounce.
     pub bouncing: f32,
-    /// Largest gap (diameters) at which grains attract each other.
+    /// Maximum gap (diameters) at which grains attract each other.
     pub band: f32,
     /// When grains come to rest; none: never.
     pub rest: Option<Rest>,
@@ -69,7 +67,7 @@ pub struct Coefficients {
 pub struct Motion {
     /// Common displacement of the meshes (diameters).
     pub along: V,
-    /// Largest speed (m/s) that contacts may give a grain, not counting gravity.
+    /// Maximum speed (m/s) that contacts may give a grain, not counting gravity.
     pub fastest: f32,
 }
 
@@ -102,7 +100,7 @@ enum Pass {
     Begin,
     /// Corrects the impulses.
     Solve,
-    /// Corrects the impulses, and computes pushes and what the next sub-step needs.
+    /// Corrects the impulses, and computes pushes and the data that the next sub-step needs.
     SolveLast,
 }
 
@@ -176,12 +174,12 @@ fn begin_touch(row: &mut Row, touch: &mut Touch, c: &Coefficients) {
 
 /// Friction of a touch in this sub-step.
 ///
-/// A collider holds a grain with its own friction until the grain slides: what lies stays, up to the angle whose tangent that is.
-/// A grain that slides would roll, which these cannot. It meets the friction between grains, which is less for the same reason, and
-/// the slope of the surface more, so that it stops wherever a grain can lie, and slides by Coulomb's law where none can. With the
-/// whole friction, columns that collapse run out a third less far than in experiments, where the ground does not matter (Lube et al.
-/// 2004): their lowest layer never moves. Two keep the whole friction: grains that attract each other, which hold together and do not
-/// roll, and those on a collider that moves, which carries them along with the friction that it was given.
+/// A collider holds a grain with its own friction until the grain slides: a resting grain stays, up to the angle whose tangent is that
+/// friction. A real grain that slides would roll, which these cannot. It therefore gets the friction between grains, which is lower for the
+/// same reason, plus the slope of the surface, so that it stops wherever a grain can lie, and slides by Coulomb's law where none can. With
+/// full friction, columns that collapse run out a third less far than in experiments, where the ground does not matter (Lube et al. 2004):
+/// their lowest layer never moves. Two kinds keep full friction: grains that attract each other, which stick together and do not roll, and
+/// those on a moving collider, which carries them along with the friction that it was given.
 fn friction(row: &Row, touch: &Touch, c: &Coefficients) -> f32 {
     if c.attraction > 0.0 || touch.velocity != [0.0; 3] {
         return touch.friction;
@@ -229,11 +227,11 @@ fn advance(rows: &mut [Row], layout: &mut Layout, c: &Coefficients, motion: Moti
 
 /// Moves a grain; a supported one loses the part of its velocity that its push undid.
 ///
-/// Each contact removes part of its own overlap, so the pushes of a grain that is pressed from all sides add up to more than
-/// needed to leave them all: their sum is bounded too.
+/// Each contact removes part of its own overlap, so the pushes on a grain that is pressed from all sides add up to more than is needed to
+/// resolve them all: their sum is bounded too.
 fn move_on(row: &mut Row, c: &Coefficients, motion: &Motion) {
     row.push = bounded(row.push, FARTHEST);
-    // The limit spares what gravity adds in this sub-step: a grain that falls or slides down a slope keeps accelerating.
+    // The limit excludes the speed that gravity adds in this sub-step: a grain that falls or slides down a slope keeps accelerating.
     let fall = scaled(c.gravity, c.dt);
     let driven = sub(row.velocity, fall);
     let most = motion.fastest * motion.fastest;
@@ -290,8 +288,8 @@ fn resist(row: &mut Row, touch: &mut Touch, c: &Coefficients, last: bool) {
     }
 }
 
-/// Keeps a grain in front of ground, whatever else presses on it: what is pressed between an object, or the underside of the
-/// base layer, and the ground stays on the ground.
+/// Keeps a grain in front of ground, whatever else presses on it: a grain pressed between an object, or the underside of the base layer,
+/// and the ground stays on the ground.
 fn hold(row: &mut Row, touch: &Touch, c: &Coefficients) {
     if row.rests() {
         return;
@@ -304,7 +302,7 @@ fn hold(row: &mut Row, touch: &Touch, c: &Coefficients) {
     }
 }
 
-/// Depth (diameters) to which something else may press a grain into ground.
+/// Depth (diameters) to which other contacts may press a grain into ground.
 const HELD: f32 = 1.0e-3;
 
 /// A vector shortened to at most a length.
@@ -371,7 +369,7 @@ fn solve_batches_last(rows: Shared<'_, Row>, batches: &mut [Batch], c: &Coeffici
         unsafe {
             let (a, b) = (Eight::load(rows, &batch.owners), Eight::load(rows, &others));
             let (mut a, mut b, contact) = collide(a, b, batch, c);
-            // Two grains that collide in the air then part: their impulse is no guess for the next sub-step.
+            // Two grains that collide in the air then separate: their impulse is a poor guess for the next sub-step.
             let mut is_held = a.supported & b.supported;
             is_held = is_held | (a.supported | b.supported) & contact.gap.is_less(Lanes::all(TOUCHING));
             if c.attraction > 0.0 {

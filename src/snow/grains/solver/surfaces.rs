@@ -16,9 +16,9 @@ const FAR: f64 = 5.5;
 /// Share of [`DEEP`] that released grains must stay within, so that it still holds after positions are written with less
 /// precision.
 const ROUNDED: f64 = 0.98;
-/// Most times that a grain is moved out of each surface.
+/// Maximum number of times that a grain is moved out of each surface.
 const ROUNDS: usize = 16;
-/// Largest displacement (diameters).
+/// Maximum displacement (diameters).
 const FARTHEST: f64 = 1.5;
 /// Cosine between the outward directions on the two sides of a mesh.
 const OPPOSITE: f64 = -0.5;
@@ -134,7 +134,7 @@ impl<'a> Surfaces<'a> {
         (way(position), true)
     }
 
-    /// Moves a position (m) out of each surface in turn, or of ground only, and reports the depth (diameters) that it had in each.
+    /// Moves a position (m) out of each surface in turn, or only out of ground, and reports its depth (diameters) in each.
     fn for_each_way_out(
         &self,
         position: &mut DVec3,

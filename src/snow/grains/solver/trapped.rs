@@ -1,6 +1,6 @@
-//! Grains that a step leaves inside a surface, for example pressed between a sole and the base. At the end of the step each
-//! is moved out of the surfaces around it, one after another, repeatedly. A grain that reaches no free position within a
-//! diameter and a half stays where it was, but in front of ground: it is *trapped*.
+//! Grains that a step leaves inside a surface, for example pressed between a sole and the base. At the end of the step each is moved out of
+//! the surfaces around it, one after another, repeatedly. A grain that reaches no free position within a diameter and a half stays where it
+//! was, except that it is moved out of ground: it is *trapped*.
 
 use rayon::prelude::*;
 
@@ -34,8 +34,8 @@ pub struct End<'a> {
 }
 
 impl End<'_> {
-    /// Members of each block that may be inside a surface, with the level set as the blocks saw it; `before` holds the identities of
-    /// those that the last step left trapped, ascending.
+    /// Members of each block that may be inside a surface, with the level set as the blocks saw it; `before` has the identities of the
+    /// grains that the last step left trapped, ascending.
     pub fn deep(&self, rows: &[Row], ids: &[u32], before: &[u32], field: Option<&Seen<'_>>) -> Vec<Vec<u32>> {
         (0..self.layout.blocks.len())
             .into_par_iter()
@@ -82,9 +82,8 @@ impl End<'_> {
         Ok(trapped)
     }
 
-    /// Members of a block that may be inside a surface: awake ones that are close to the plane of a touch, or in a surface that they
-    /// did not touch before the last sub-step pushed them there; resting ones inside such a plane; and resting ones that were
-    /// trapped before.
+    /// Members of a block that may be inside a surface: awake grains close to the plane of a touch, or in a surface that they did not touch
+    /// before the last sub-step pushed them there; resting grains inside such a plane; and resting grains that were trapped before.
     fn deep_members(
         &self,
         index: usize,

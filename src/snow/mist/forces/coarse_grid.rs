@@ -1,18 +1,18 @@
-//! Vectors at every fourth corner of cells, for what changes slowly from place to place: wind and turbulence.
+//! Vectors at every fourth corner of cells, for fields that vary slowly in space: wind and turbulence.
 
 use rayon::prelude::*;
 
 use crate::flow::{Coord, Flow, tiles::FACES};
 use crate::geometry::DVec3;
 
-/// Cells between two positions.
+/// Cells between adjacent positions.
 const SPACING: usize = 4;
 /// Positions along the edge of a tile, both ends included.
 const EDGE: usize = 8 / SPACING + 1;
 /// Positions of a tile.
 pub const POSITIONS: usize = EDGE * EDGE * EDGE;
 
-/// The positions (m) of a tile with cells of an edge (m).
+/// The positions (m) of a tile whose cells have the edge `cell` (m).
 pub fn positions(tile: Coord, cell: f64) -> [DVec3; POSITIONS] {
     std::array::from_fn(|index| {
         let at = [index / (EDGE * EDGE), index / EDGE % EDGE, index % EDGE];
@@ -21,8 +21,8 @@ pub fn positions(tile: Coord, cell: f64) -> [DVec3; POSITIONS] {
     })
 }
 
-/// Changes the velocity (m/s) at all faces of active cells: `change(old, value)` of the vectors at the positions of their tiles,
-/// interpolated linearly.
+/// Changes the velocity (m/s) at all faces of active cells to `change(old, value)`, where `value` is interpolated linearly from the vectors
+/// at the positions of their tiles.
 pub fn change(flow: &mut Flow, values: &[[[f32; 3]; POSITIONS]], change: impl Fn(f32, f32) -> f32 + Sync) {
     let (tiles, velocity, _) = flow.fields();
     for (axis, field) in velocity.iter_mut().enumerate() {
@@ -30,7 +30,7 @@ pub fn change(flow: &mut Flow, values: &[[[f32; 3]; POSITIONS]], change: impl Fn
             let below = tiles.neighbours()[slot][FACES[2 * axis]] as usize;
             for (cell, face) in faces.iter_mut().enumerate() {
                 let mut at = [cell >> 6, cell >> 3 & 7, cell & 7];
-                // The first faces of the rim are the upper ones of the tile below.
+                // The first faces of the rim are the upper faces of the tile below.
                 let values = match values.get(slot) {
                     None if at[axis] == 0 => {
                         at[axis] = 8;
@@ -46,7 +46,7 @@ pub fn change(flow: &mut Flow, values: &[[[f32; 3]; POSITIONS]], change: impl Fn
     }
 }
 
-/// The component on an axis at the lower face on it of a cell of a tile, 8 along that axis for the upper faces of the last ones.
+/// The component along an axis at the lower face of a cell on that axis; 8 along the axis means the upper faces of the last cells.
 fn at_face(values: &[[f32; 3]; POSITIONS], axis: usize, at: [usize; 3]) -> f32 {
     let (mut low, mut share) = ([0; 3], [0.0f32; 3]);
     for along in 0..3 {

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use crate::flow::{Flow, tiles::FACES};
 
-/// Gravity acts where there is mist (thesis section 3.4.1): a face between two cells with mist gains all of `speed` (m/s, upward),
-/// one at the border of the mist half of it.
+/// Gravity acts where there is mist (thesis section 3.4.1): a face between two cells with mist gains the full `speed` (m/s, upward), a face
+/// at the border of the mist half of it.
 pub fn fall(flow: &mut Flow, speed: f32) {
     if speed == 0.0 {
         return;

@@ -1,6 +1,6 @@
-//! Turbulence: eddies of a size push the air about. Their acceleration is the curl of three smooth noises, which neither gathers
-//! nor spreads the air (Bridson, Houriham and Nordenstam 2007). The wind carries them along, and each set of noises fades into
-//! another one that has nothing to do with it, so that eddies come and go: moved noises would be the same eddies for ever.
+//! Turbulence: eddies of a given size push the air. Their acceleration is the curl of three smooth noises, which has no divergence
+//! (Bridson, Houriham and Nordenstam 2007). The wind carries them along, and each set of noises fades into an unrelated one, so that eddies
+//! come and go: noises that only move would keep the same eddies for ever.
 
 use fastnoise_lite::{FastNoiseLite, NoiseType};
 use rayon::prelude::*;
@@ -12,14 +12,14 @@ use crate::flow::Flow;
 use crate::geometry::DVec3;
 use crate::snow::mist::Params;
 
-/// Curl of the noises, in units of their size, whose root mean square is 1 (measured by the test).
+/// Root mean square of the noises' curl in units of their size (measured by the test).
 const UNIT: f64 = 0.231_8;
-/// Share of its size over which a difference is taken.
+/// Finite-difference step, as a share of the size.
 const STEP: f64 = 0.05;
-/// Time (s) in which one set of noises fades into the next.
+/// Time (s) over which one set of noises fades into the next.
 const LIFETIME: f64 = 0.7;
 
-/// The eddies act on the air for `dt` (s) from a time (s) on.
+/// Accelerates the air by the eddies for `dt` (s), from a time (s) on.
 ///
 /// # Errors
 /// Cancel.
@@ -45,10 +45,10 @@ pub fn stir(ctx: &Context, flow: &mut Flow, params: &Params, time: f64, dt: f64)
 
 /// The noises at a time.
 struct Eddies {
-    /// Two sets of three, each with its weight: the sum of the weights' squares is 1, and thus the strength always the same.
+    /// Two sets of three, each with its weight: the squares of the weights sum to 1, so that the strength is constant.
     sets: [([FastNoiseLite; 3], f64); 2],
     size: f64,
-    /// How far the wind has carried them (m).
+    /// Displacement by the wind (m).
     shift: DVec3,
 }
 
@@ -57,7 +57,7 @@ impl Eddies {
         let lives = time / LIFETIME;
         let first = lives.floor();
         let share = lives - first;
-        // Neither the weights nor their rates of change jump.
+        // Both the weights and their rates of change are continuous.
         let angle = std::f64::consts::FRAC_PI_2 * share * share * (3.0 - 2.0 * share);
         let (rising, falling) = libm::sincos(angle);
         let set = |life: f64| [0, 1, 2].map(|component| noise(params.seed, life as i64, component));
@@ -78,7 +78,7 @@ impl Eddies {
         of_set(&self.sets[0]) + of_set(&self.sets[1])
     }
 
-    /// Their curl at a position (m), with a root mean square of 1.
+    /// The curl of the noises at a position (m), with a root mean square of 1.
     fn curl(&self, position: DVec3) -> DVec3 {
         let half = 0.5 * STEP * self.size;
         let slope = |component: usize, axis: usize| {
@@ -90,7 +90,7 @@ impl Eddies {
     }
 }
 
-/// The noise of a component in a life, which has nothing to do with those of others.
+/// The noise of a component in a lifetime, unrelated to all others.
 fn noise(seed: i32, life: i64, component: u64) -> FastNoiseLite {
     let mut noise = FastNoiseLite::with_seed(mixed(seed, life, component));
     noise.set_noise_type(Some(NoiseType::OpenSimplex2));
@@ -98,7 +98,7 @@ fn noise(seed: i32, life: i64, component: u64) -> FastNoiseLite {
     noise
 }
 
-/// A seed for a component in a life (Steele, Lea and Flood 2014: SplitMix64).
+/// The seed of a component in a lifetime (Steele, Lea and Flood 2014: SplitMix64).
 fn mixed(seed: i32, life: i64, component: u64) -> i32 {
     let mut state = (life as u64).wrapping_mul(3).wrapping_add(component);
     state = state.wrapping_mul(0x9e37_79b9_7f4a_7c15)
@@ -133,7 +133,7 @@ mod tests {
                 (eddies.curl(position + off)[axis] - eddies.curl(position - off)[axis]) / (2.0 * h)
             })
             .sum();
-        // Of a unit field of this size, slopes are about 1 / size = 5.
+        // In a unit field of this size, slopes are about 1 / size = 5.
         assert!(divergence.abs() < 0.02, "{divergence}");
     }
 
@@ -145,7 +145,7 @@ mod tests {
         (0..24usize.pow(3)).map(|index| eddies.curl(at(index) * (params.turbulence_size / 6.0))).collect()
     }
 
-    /// The best correlation of two such fields over all shifts by up to 8 points on each axis.
+    /// The maximum correlation of two such fields over all shifts by up to 8 points on each axis.
     fn best_correlation(one: &[DVec3], other: &[DVec3]) -> f64 {
         let shifts =
             (-8i32..=8).flat_map(|x| (-8i32..=8).flat_map(move |y| (-8i32..=8).map(move |z| [x, y, z])));
@@ -174,9 +174,9 @@ mod tests {
         let first = sampled(&params, 0.25);
         let later = [0.05, 0.35, 0.7, 2.0].map(|by| best_correlation(&first, &sampled(&params, 0.25 + by)));
         assert!(later[0] > 0.95 && later.is_sorted_by(|a, b| a >= b), "{later:?}");
-        // What is left is what two fields of so many eddies have in common at the best of 4,913 shifts.
+        // The rest is the chance correlation of two fields with this many eddies, at the best of 4,913 shifts.
         assert!(later[2] < 0.6 && later[3] < 0.4, "{later:?}");
-        // One set of noises after another: no jump.
+        // From one set of noises to the next without a jump.
         for time in [0.0, LIFETIME, -LIFETIME, 3.0 * LIFETIME] {
             let [before, after] = [-1.0e-5, 1.0e-5].map(|by| sampled(&params, time + by));
             let farthest = before.iter().zip(&after).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);

@@ -1,4 +1,4 @@
-//! Wind that differs from place to place.
+//! Wind that varies in space.
 
 use super::coarse_grid;
 use crate::context::Context;
@@ -7,21 +7,21 @@ use crate::flow::Flow;
 use crate::geometry::DVec3;
 use crate::snow::mist::params::FASTEST_WIND;
 
-/// Time (s) in which the air takes half of the difference to the wind.
+/// Half-life (s) of the difference between the air and the wind.
 const RESPONSE: f64 = 0.1;
 
 /// The wind's velocity (m/s) at positions (m).
 pub type Sampler<'a> = dyn Fn(&Context, &[DVec3]) -> Result<Vec<[f32; 3]>> + Sync + 'a;
 
-/// Wind that differs from place to place: where there is mist, the air takes half of the difference to it in a tenth of a
-/// second. It is read at every fourth cell.
+/// Wind that varies in space: where there is mist, the difference between the air and the wind halves in a tenth of a second. It is sampled
+/// at every fourth cell.
 pub struct Wind<'a>(pub &'a Sampler<'a>);
 
 impl Wind<'_> {
-    /// The air takes the wind's velocity on, for `dt` (s).
+    /// Relaxes the air towards the wind's velocity for `dt` (s).
     ///
     /// # Errors
-    /// A velocity that is not finite or over [`FASTEST_WIND`]; those of the sampler.
+    /// A velocity that is not finite or is over [`FASTEST_WIND`]; errors of the sampler.
     pub fn blow(&self, ctx: &Context, flow: &mut Flow, dt: f64) -> Result<()> {
         let cell = f64::from(flow.cell());
         let tiles = &flow.tiles().coords()[..flow.tiles().active()];

@@ -1,4 +1,4 @@
-//! Where grains raise mist (thesis section 3.4.2): along the way of each fast grain within the frame, a tube of twice its radius.
+//! Where grains raise mist (thesis section 3.4.2): in a tube of twice the grain's radius along the path of each fast grain within the frame.
 
 pub(in crate::snow::mist) mod new_mist;
 
@@ -10,9 +10,10 @@ use crate::error::{Error, Result};
 use crate::flow::{Coord, Tile};
 use crate::geometry::DVec3;
 
-/// Farthest position of a grain from the origin on an axis (cells).
+/// Maximum coordinate of a grain (cells).
 const FARTHEST_CELL: f64 = 1e7;
-/// Acceleration (m/s2) up to which a grain is taken to fly freely, under gravity and the drag of air; at twice as much it is hit.
+/// Maximum acceleration (m/s2) of a grain that is assumed to fly freely, under gravity and air drag; from twice this on it is assumed to be
+/// hit.
 const FREE: f64 = 20.0;
 /// Largest radius of a grain (cells).
 const LARGEST: f64 = 64.0;
@@ -26,21 +27,21 @@ pub struct Source {
     pub velocity: [f32; 3],
     /// Radius (m) of the grain.
     pub radius: f64,
-    /// Where it was at the beginning of the step; none: it moved at its velocity all the time.
+    /// Its state at the beginning of the step; none: it moved at its velocity throughout.
     pub start: Option<Start>,
 }
 
 /// A grain at the beginning of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Start {
-    /// Position (m): that of its birth where it was born in the step.
+    /// Position (m): the birth position if it was born in the step.
     pub position: DVec3,
-    /// Velocity (m/s), 0 where it was born in the step.
+    /// Velocity (m/s), 0 if it was born in the step.
     pub velocity: [f32; 3],
 }
 
 impl Source {
-    /// Checks that it can raise mist in cells of an edge (m).
+    /// Checks that it can raise mist in cells with the edge `cell` (m).
     ///
     /// # Errors
     /// A number that is not finite; a position that is too far from the origin; a radius that is negative or too large.
@@ -73,12 +74,12 @@ impl Source {
         Ok(())
     }
 
-    /// Whether a grain is fast enough to raise mist at either end of a step, and does not fall there where falling grains do not.
+    /// Whether a grain is fast enough to raise mist at either end of a step, and is not falling there unless falling grains raise mist too.
     pub fn raises(&self, params: &Params) -> bool {
         raises(self.velocity, params) || self.start.is_some_and(|start| raises(start.velocity, params))
     }
 
-    /// Its greatest speed (m/s) on any axis.
+    /// Its largest speed (m/s) on any axis.
     pub(super) fn fastest(&self) -> f32 {
         let start = self.start.map_or([0.0; 3], |start| start.velocity);
         self.velocity.iter().chain(&start).fold(0.0, |most, speed| most.max(speed.abs()))
@@ -90,7 +91,7 @@ impl Source {
         let before = DVec3::from(start.velocity.map(f64::from)) * dt;
         let (gain, off) = (now - before, start.position + now - self.position);
         let middle = (off.dot(&gain) / gain.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        // What the velocities do not lead to is spread over the step.
+        // The displacement that the velocities do not explain is spread over the step.
         let rest = gain * middle - off;
         let free = 2.0 - gain.norm() / (FREE * dt * dt);
         let width = 2.0 * middle.min(1.0 - middle) * free.clamp(0.0, 1.0);
@@ -98,15 +99,16 @@ impl Source {
     }
 }
 
-/// The motion of a grain in a step: one change of velocity, evenly in a time around the moment by which both velocities lead as
-/// near to its end as they can. Of a grain that flies that is all of the step, of one that is hit a moment.
+/// The motion of a grain in a step: its velocity changes once, uniformly over an interval. The interval is centred on the moment for which
+/// both velocities lead as close as possible to its end position; it is the whole step for a grain in flight and an instant for one that is
+/// hit.
 struct Motion {
     /// Position (m) at the beginning.
     from: DVec3,
-    /// Displacement (m) in a step at the first velocity, and what it is more at the last one.
+    /// Displacement (m) over a whole step at the first velocity, and the additional displacement at the last one.
     before: DVec3,
     gain: DVec3,
-    /// Middle of the change, and its length: shares 0..=1 of the step.
+    /// Centre and length of the interval: shares 0..=1 of the step.
     middle: f64,
     width: f64,
 }
@@ -132,18 +134,18 @@ fn raises(velocity: [f32; 3], params: &Params) -> bool {
     speed > params.from_speed && (params.falling || velocity[1] >= 0.0)
 }
 
-/// Mist that is new in a tile.
+/// New mist in a tile.
 pub struct Seed {
     /// Its tile.
     pub coord: Coord,
     /// Density 0..=1 at the cells' centres.
     pub density: Box<Tile>,
-    /// Velocity (m/s) there: the mean of the grains', by how much of the cell each one's tube covers.
+    /// Velocity (m/s) there: the mean of the grains' velocities, weighted by how much of the cell each one's tube covers.
     pub velocity: Box<[Tile; 3]>,
 }
 
-/// The ways (m) of grains that raise mist in the part of a step of `dt` (s) between two shares 0..=1 of it, at their mean velocity
-/// in it.
+/// The paths (m) of grains that raise mist in the part of a step of `dt` (s) between two shares 0..=1 of it, at their mean velocity in that
+/// part.
 pub fn ways(sources: &[Source], params: &Params, dt: f64, [first, last]: [f64; 2]) -> Vec<Way> {
     let time = (last - first) * dt;
     let way = |source: &Source| {
@@ -164,7 +166,7 @@ pub fn ways(sources: &[Source], params: &Params, dt: f64, [first, last]: [f64; 2
     sources.iter().filter_map(way).collect()
 }
 
-/// The way of a grain.
+/// The path of a grain.
 pub struct Way {
     /// Its ends (m).
     ends: [DVec3; 2],
@@ -173,7 +175,7 @@ pub struct Way {
     radius: f64,
 }
 
-/// The new mist along ways, by tile, sorted.
+/// The new mist along paths, by tile, sorted.
 ///
 /// # Errors
 /// More memory than the context allows.
@@ -195,14 +197,14 @@ pub fn seeds(ctx: &Context, ways: &[Way], params: &Params) -> Result<Vec<Seed>> 
     let groups: Vec<&[(Coord, u32)]> = touched.chunk_by(|a, b| a.0 == b.0).collect();
     ctx.allow(WHAT, groups.len() as u64 * SEED_BYTES)?;
     let seeds = groups.into_par_iter().map(|group| seed(group, ways, params));
-    // Tubes pass by many tiles that they may touch, and of some they cover next to nothing.
+    // Tubes miss many tiles that they might touch, and cover only a negligible part of others.
     Ok(seeds.filter(|seed| seed.density.iter().any(|density| *density > LEAST)).collect())
 }
 
 /// Bytes of a seed.
 const SEED_BYTES: u64 = 4 * size_of::<Tile>() as u64;
 
-/// Least and greatest tile of the box around a way's tube.
+/// Minimum and maximum tile of the box around a path's tube.
 fn box_of(way: &Way, cell: f64) -> [Coord; 2] {
     let [from, to] = way.ends;
     let reach = DVec3::repeat(2.0 * way.radius + cell);
@@ -210,7 +212,7 @@ fn box_of(way: &Way, cell: f64) -> [Coord; 2] {
     [tile(from.inf(&to) - reach), tile(from.sup(&to) + reach)]
 }
 
-/// Coordinates of the tiles that a way's tube may touch.
+/// Coordinates of the tiles that a path's tube may touch.
 fn tiles_of(way: &Way, cell: f64) -> Vec<Coord> {
     let ([from, to], [low, high]) = (way.ends, box_of(way, cell));
     let mut out = Vec::new();
@@ -281,7 +283,7 @@ fn seed(group: &[(Coord, u32)], ways: &[Way], params: &Params) -> Seed {
     Seed { coord, density, velocity }
 }
 
-/// The noise, over cells.
+/// The noise, as a function of cell coordinates.
 fn noise(params: &Params) -> fastnoise_lite::FastNoiseLite {
     let mut noise = fastnoise_lite::FastNoiseLite::with_seed(params.seed);
     noise.set_noise_type(Some(fastnoise_lite::NoiseType::OpenSimplex2));

@@ -1,4 +1,4 @@
-//! New mist in the air.
+//! Adds new mist to the air.
 
 use rayon::prelude::*;
 
@@ -22,8 +22,8 @@ pub fn seeds(tiles: &[Coord], of: impl Fn([i32; 3]) -> (f32, [f32; 3])) -> Vec<S
 }
 
 impl Mist {
-    /// Puts new mist into air whose tiles are there: the greater density counts, and the air takes the new one's velocity as
-    /// far as it fills the cells.
+    /// Adds new mist to air whose tiles exist: the larger density is kept, and the air takes on the new mist's velocity in proportion to
+    /// how far the mist fills the cells.
     pub(in crate::snow::mist) fn sow(&mut self, seeds: &[Seed]) {
         let coords: Vec<Coord> = seeds.iter().map(|seed| seed.coord).collect();
         let (tiles, velocity, density) = self.flow.fields();

@@ -1,4 +1,4 @@
-//! Corners of cells, and level sets at them.
+//! Corners of cells, and level sets sampled at them.
 
 use crate::context::Context;
 use crate::error::Result;
@@ -7,17 +7,17 @@ use crate::geometry::DVec3;
 use crate::snow::grains::colliders::field::Window;
 use crate::vdb::FloatGrid;
 
-/// The corners of cells, and of the parts into which they are divided.
+/// The corners of cells, and of the parts into which cells are divided.
 #[derive(Clone, Copy)]
 pub struct Lattice {
     /// Edge of a cell (m).
     pub cell: f64,
-    /// Parts of an edge.
+    /// Parts along an edge.
     pub parts: usize,
 }
 
 impl Lattice {
-    /// Distance of two corners (m).
+    /// Distance between adjacent corners (m).
     pub fn spacing(&self) -> f64 {
         self.cell / self.parts as f64
     }
@@ -27,7 +27,7 @@ impl Lattice {
         8 * self.parts + 1
     }
 
-    /// Least and greatest corner (m) of tiles.
+    /// Minimum and maximum corner (m) of tiles.
     pub fn bounds(&self, tiles: &[Coord]) -> [DVec3; 2] {
         let low = |coord: &Coord| DVec3::from(coord.map(f64::from)) * (8.0 * self.cell);
         let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
@@ -54,7 +54,7 @@ impl Lattice {
 pub struct Grid<'a> {
     /// Corners' spacing in cells of the level set.
     scale: f64,
-    /// For each tile; none: it is far away.
+    /// For each tile; none: it is far from the surface.
     near: Vec<Option<Distances<'a>>>,
 }
 
@@ -62,11 +62,11 @@ pub struct Grid<'a> {
 enum Distances<'a> {
     /// The leaves around it.
     Leaves(Window<'a>),
-    /// Those at its corners.
+    /// The values at its corners.
     Corners(Vec<f32>),
 }
 
-/// Widest tile (cells of a level set) whose leaves are looked at; of wider ones there are too many.
+/// Maximum width of a tile (cells of a level set) whose leaves are searched; wider tiles have too many.
 const WIDEST: f64 = 24.0;
 
 impl<'a> Grid<'a> {
@@ -85,7 +85,7 @@ impl<'a> Grid<'a> {
             let high = tile.map(|at| (f64::from(at + 1) * edge).ceil() as i32).map(|at| at.saturating_add(1));
             [low, high]
         });
-        // Beside the level set, and above it, nothing is solid; below it, what it encloses ends.
+        // Beside and above the level set nothing is solid; below it, the enclosed solid ends.
         let is_near = |[least, most]: &[[i32; 3]; 2]| {
             (0..3).all(|axis| {
                 least[axis] <= high[axis].saturating_add(1) && most[axis] >= low[axis].saturating_sub(1)
@@ -117,7 +117,7 @@ impl<'a> Grid<'a> {
         })
     }
 
-    /// Signed distance (m) at a corner of a tile, `at` its index there; none far away.
+    /// Signed distance (m) at a corner of a tile, where `at` is the corner's index; none if far away.
     pub fn at(&self, slot: usize, at: usize, corner: DVec3) -> Option<f32> {
         Some(match self.near[slot].as_ref()? {
             Distances::Leaves(window) => window.sample((corner * self.scale).into()).0,

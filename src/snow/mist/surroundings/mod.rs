@@ -1,7 +1,7 @@
-//! What mist flows around: the base layer, the ground and objects.
+//! The surroundings that mist flows around: the base layer, the ground and objects.
 //!
-//! Objects that bound a solid count by their winding number ([`crate::sweep`]), so that self-intersecting characters have one
-//! inside; meshes with large holes, and the ground's, count as sheets two cells thick.
+//! Objects that bound a solid are evaluated by their winding number ([`crate::sweep`]), so that self-intersecting characters have one
+//! inside; meshes with large holes, and the ground mesh, count as sheets two cells thick.
 
 #[cfg(feature = "vdb")]
 mod corners;
@@ -24,14 +24,14 @@ use crate::sweep::{self, Body, Settings};
 use crate::vdb::FloatGrid;
 use corners::{Grid, Lattice};
 
-/// What mist flows around in a step.
+/// The surroundings that mist flows around in a step.
 pub struct Surroundings<'a> {
-    /// The base layer at the beginning of the step. That at its end has room for objects on their whole path: air would be
-    /// pressed out of it through gaps that are not there. It opens as those of [`Self::removing`] move into it.
+    /// The base layer at the beginning of the step. The layer at its end is already open along the whole path of the objects: air would be
+    /// pressed out through gaps that do not exist yet. It opens as the objects of [`Self::removing`] move into it.
     pub base: Option<&'a FloatGrid>,
     /// Objects, moving or not.
     pub bodies: &'a [&'a Body],
-    /// Which of them take away the snow that they move through; those behind the last one do not.
+    /// Whether each of them removes the snow that it moves through; objects beyond the end of this list do not.
     pub removing: &'a [bool],
     /// Height of a level ground plane (m).
     pub floor: Option<f64>,
@@ -49,17 +49,16 @@ pub struct Walls<'a> {
     held: Mutex<Held>,
 }
 
-/// What was computed in a step and is asked for again.
+/// Results of a step that are requested again.
 #[derive(Default)]
 struct Held {
     /// Objects that stand still.
     fixed: Option<Moment>,
-    /// Moving ones at the last moment that was asked for: finer and wider cells ask for the same one.
+    /// Moving objects at the last moment requested: finer and wider cells request the same one.
     moving: Option<Moment>,
-    /// What moving ones have taken out of the base layer since the step began.
+    /// The part of the base layer that moving objects have removed since the step began.
     opened: Option<Opened>,
-    /// Faces of tiles that no moving object comes near in the step, by the cells' edge (m, its bits) and the tile; none: all
-    /// are open.
+    /// Faces of tiles that no moving object approaches in the step, by the cells' edge (m, its bits) and the tile; none: all are open.
     faces: HashMap<(u64, Coord), Option<Faces>>,
 }
 
@@ -67,17 +66,17 @@ struct Held {
 struct Moment {
     /// Share 0..=1 of the step.
     share: f64,
-    /// Indices of the objects that are in it.
+    /// Indices of the objects in it.
     near: Vec<usize>,
-    /// Level set of those that have an inside.
+    /// Level set of the objects that have an inside.
     solid: Option<FloatGrid>,
-    /// The others, and moving ones.
+    /// The surfaces of the others, and of moving objects.
     surfaces: Vec<Surface>,
 }
 
 /// The volume that objects have swept since the step began.
 struct Opened {
-    /// Share 0..=1 of the step at which that was.
+    /// Share 0..=1 of the step up to which it is swept.
     share: f64,
     /// Indices of the objects.
     near: Vec<usize>,
@@ -89,32 +88,31 @@ struct Moving<'a> {
     body: &'a Body,
     /// Whether it has no inside.
     is_sheet: bool,
-    /// Whether it moves too fast to carry the air along: it then stands where it ends.
+    /// Whether it moves too fast to carry the air along: it then stands at its final position.
     jumps: bool,
     /// Whether it opens the base layer as it moves.
     opens: bool,
     /// Its triangles, counter-clockwise seen from outside.
     triangles: Vec<[u32; 3]>,
-    /// Least and greatest corner over the step (m).
+    /// Minimum and maximum corner over the step (m).
     bounds: [DVec3; 2],
-    /// Greatest speed (m/s) of its points over the step.
+    /// Largest speed (m/s) of its points over the step.
     speed: f64,
 }
 
-/// Half thickness of a sheet (cells): it then closes all faces next to it, wherever it lies between them.
+/// Half thickness of a sheet (cells): the sheet then closes all faces next to it, at any position between them.
 const SHEET: f64 = 1.0;
 /// Share of the step over which the speed of a surface is measured.
 const INSTANT: f64 = 0.125;
-/// Distance from a surface (cells) within which covered faces move as it does: no air touches those farther inside.
+/// Distance from a surface (cells) within which covered faces move with it; faces farther inside do not touch air.
 const NEAR: f64 = 2.0;
-/// Most spacing of the corners (cells of the base) at which a narrow band of three cells on each side shows where the surface
-/// is.
+/// Maximum spacing of the corners (cells of the base) at which a narrow band of three cells on each side shows where the surface is.
 const BAND: f64 = 2.9;
-/// Most parts of a cell's edge. In cells of more than 11 voxels of the base its surface lies where the sign changes.
+/// Maximum parts of a cell's edge. In cells of more than 11 voxels of the base, its surface is placed where the sign changes.
 const PARTS: usize = 4;
 
 impl<'a> Surroundings<'a> {
-    /// What is around in a step from `from` to `to` (s), for cells of an edge (m) and wider ones.
+    /// The walls in a step from `from` to `to` (s), for cells of an edge (m) and wider ones.
     ///
     /// # Errors
     /// A pose that cannot be computed.
@@ -136,7 +134,7 @@ impl<'a> Moving<'a> {
         let is_sheet = body.share_of_caps(&first) >= HOLES || body.contradictions() > 0;
         let farthest = first.iter().zip(&last).map(|(a, b)| (b - a).norm()).fold(0.0, f64::max);
         let jumps = farthest > FASTEST_OBJECT * (to - from);
-        // A turn may lead outside the box of both poses.
+        // A rotation may leave the bounding box of both poses.
         let room = DVec3::repeat(if jumps { 0.0 } else { farthest });
         let positions = last.iter().chain(first.iter().filter(|_| !jumps));
         let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
@@ -161,7 +159,7 @@ impl<'a> Moving<'a> {
 }
 
 impl Walls<'_> {
-    /// Open shares and speeds of faces at a share 0..=1 of the step, for tiles with cells of an edge (m).
+    /// Open fractions and speeds of faces at a share 0..=1 of the step, for tiles with cells of an edge (m).
     ///
     /// # Errors
     /// A pose that cannot be computed; cancel; errors of a grid.
@@ -183,7 +181,7 @@ impl Walls<'_> {
         let moving = self.at(ctx, moving, share, |body| body.speed > 0.0 && is_near(body))?;
         let opened = self.opened(ctx, opened, share, |body| body.opens && is_near(body))?;
         let grid = |grid| Grid::new(ctx, grid, &unknown, &lattice);
-        // A level set whose band is narrower does not show what lies that deep.
+        // A level set with a narrower band has no distances that deep.
         let band = moving.solid.as_ref().map_or(0.0, |grid| f64::from(grid.background()));
         let around = Around {
             lattice,
@@ -214,7 +212,7 @@ impl Walls<'_> {
         Ok(Solids::new(tiles, out))
     }
 
-    /// Greatest speed (m/s) of objects that come near the air, or near grains that raise mist, during the step.
+    /// Largest speed (m/s) of objects that come near the air, or near grains that raise mist, during the step.
     pub fn fastest_near(&self, mist: &Mist, sources: &[Source]) -> f64 {
         let cell = mist.params().cell;
         let lattice = Lattice { cell, parts: 1 };
@@ -227,14 +225,14 @@ impl Walls<'_> {
         near.map(|body| body.speed).fold(0.0, f64::max)
     }
 
-    /// Into how many parts the edge of a cell is divided: so many that the base's band shows where its surface is in the finest
-    /// cells, up to [`PARTS`]. Wider ones are for the air far away.
+    /// Number of parts into which the edge of a cell is divided, so that the base's band shows where its surface is in the finest cells, up
+    /// to [`PARTS`]. Wider cells are for air far away.
     fn parts(&self) -> usize {
         let most = self.around.base.map_or(f64::INFINITY, |base| BAND * base.voxel_size());
         (1..PARTS).find(|parts| self.cell / *parts as f64 <= most).unwrap_or(PARTS)
     }
 
-    /// The objects that are wanted, at a share 0..=1 of the step: those that are held if they are these.
+    /// The wanted objects at a share 0..=1 of the step; the cached ones if they match.
     fn at<'h>(
         &self,
         ctx: &Context,
@@ -258,7 +256,7 @@ impl Walls<'_> {
         Ok(held.insert(moment))
     }
 
-    /// The level set of what objects have swept since the step began; it goes on from the last one that was asked for.
+    /// The level set of the volume that objects have swept since the step began; continues from the last one requested.
     fn opened<'h>(
         &self,
         ctx: &Context,
@@ -308,7 +306,7 @@ impl Walls<'_> {
         Ok(out)
     }
 
-    /// The triangles of an object, with the way that they have made lately.
+    /// The triangles of an object, with their displacements over the preceding [`INSTANT`].
     fn surface(&self, index: usize, share: f64) -> Result<Surface> {
         let body = &self.bodies[index];
         let (mut now, mut before) = (Vec::new(), Vec::new());
@@ -328,24 +326,24 @@ struct Surface {
     /// Index of the object.
     body: usize,
     shell: Shell,
-    /// Inverse of the time (1/s) in which its points made their way.
+    /// Inverse of the time (1/s) over which its displacements are measured.
     rate: f64,
 }
 
-/// All that is around at a moment.
+/// All surroundings at a moment.
 struct Around<'a> {
     lattice: Lattice,
     floor: Option<f64>,
     /// The base layer, and objects that stand still.
     still: [Option<Grid<'a>>; 2],
-    /// What moving objects have taken out of the base layer.
+    /// The part of the base layer that moving objects have removed.
     opened: Option<Grid<'a>>,
     /// Moving objects.
     moving: Option<Grid<'a>>,
     bodies: &'a [Moving<'a>],
-    /// Of objects that stand still, and of moving ones.
+    /// Surfaces of objects that stand still, and of moving ones.
     surfaces: [&'a [Surface]; 2],
-    /// Signed distance (m) below which the velocity of what covers a face does not matter.
+    /// Signed distance (m) below which the velocity of a covered face does not matter.
     deepest: f64,
 }
 
@@ -353,9 +351,9 @@ struct Around<'a> {
 struct Corners {
     /// Along an edge.
     count: usize,
-    /// To what stands still, and to what moves.
+    /// To static and to moving surroundings.
     distances: [Vec<f32>; 2],
-    /// To the nearest of both.
+    /// To the nearer of both.
     nearest: Vec<f32>,
 }
 
@@ -364,7 +362,7 @@ impl Corners {
         self.nearest[(x * self.count + y) * self.count + z]
     }
 
-    /// Whether what moves is nearer than what stands still.
+    /// Whether the moving surroundings are nearer than the static ones.
     fn moves(&self, [x, y, z]: [usize; 3]) -> bool {
         let index = (x * self.count + y) * self.count + z;
         self.distances[1][index] < self.distances[0][index]
@@ -372,7 +370,7 @@ impl Corners {
 }
 
 impl Around<'_> {
-    /// The faces of a tile, `index` among those of the grids; none: all are open.
+    /// The faces of a tile with this `index` in the grids; none: all are open.
     fn faces(&self, index: usize, tile: Coord) -> Option<Faces> {
         let bounds = self.lattice.bounds(&[tile]);
         let is_sheet = |surface: &&Surface| {
@@ -415,7 +413,7 @@ impl Around<'_> {
         for corner in 0..count.pow(3) {
             let at = [corner / (count * count), corner / count % count, corner % count];
             let position = self.lattice.position(tile, at);
-            // Level sets are sampled in their own cells: the corner's number keeps what is exact so.
+            // Level sets are sampled in their own cells: using the corner's index keeps exact values exact.
             let number = DVec3::from(
                 [0, 1, 2].map(|axis| f64::from(tile[axis] * 8 * self.lattice.parts as i32 + at[axis] as i32)),
             );
@@ -437,7 +435,7 @@ impl Around<'_> {
         Corners { count, distances, nearest }
     }
 
-    /// Open share of the lower face of a cell on an axis: the mean of its parts.
+    /// Open fraction of the lower face of a cell on an axis: the mean over its parts.
     fn open(&self, corners: &Corners, axis: usize, cell: [usize; 3]) -> f32 {
         let (parts, count) = (self.lattice.parts, corners.count);
         let steps = [count * count, count, 1];
@@ -452,10 +450,10 @@ impl Around<'_> {
         sum / (parts * parts) as f32
     }
 
-    /// Speed (m/s) on its axis of what covers the lower face of a cell.
+    /// Speed (m/s) along the axis of the cover of a cell's lower face.
     fn speed(&self, corners: &Corners, tile: Coord, axis: usize, cell: [usize; 3]) -> f32 {
         let parts = self.lattice.parts;
-        // The corner next to the middle of the face.
+        // The corner nearest to the centre of the face.
         let mut middle = cell.map(|x| x * parts + parts / 2);
         middle[axis] = cell[axis] * parts;
         if !corners.moves(middle) || f64::from(corners.at(middle)) < self.deepest {

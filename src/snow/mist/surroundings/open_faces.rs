@@ -1,12 +1,11 @@
-//! Open shares of faces, from signed distances at their corners: a face is cut by the straight line through its edges' zeros
+//! Open fractions of faces, from signed distances at their corners: a face is cut by the straight line through the zeros on its edges
 //! (Batty, Bertails and Bridson 2007, section 5.1).
 
-/// Share under which a face counts as closed: what flows through so small a gap is not resolved, and would make the pressure
-/// badly conditioned.
+/// Open fraction below which a face counts as closed: flow through so small a gap is not resolved, and would make the pressure
+/// ill-conditioned.
 const LEAST: f32 = 0.05;
 
-/// Open share of a square face with these signed distances (negative inside a solid) at its corners, in the order of two nested
-/// loops.
+/// Open fraction of a square face with these signed distances (negative inside a solid) at its corners, in the order of two nested loops.
 pub fn open(corners: [f32; 4]) -> f32 {
     let [a, b, c, d] = corners;
     let (least, greatest) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
@@ -17,10 +16,10 @@ pub fn open(corners: [f32; 4]) -> f32 {
     }
 }
 
-/// The open share of a face that is cut by a surface, from its corners in their order around it.
+/// The open fraction of a face that a surface cuts, from its corners in cyclic order.
 fn cut(ring: [f32; 4]) -> f32 {
     let inside = ring.iter().filter(|x| **x < 0.0).count();
-    // The part of an edge on the side of its first end.
+    // The fraction of an edge on the side of its first end.
     let part = |from: f32, to: f32| from / (from - to);
     let first = |wanted: bool| {
         (0..4).find(|at| (ring[*at] < 0.0) == wanted && (ring[(at + 3) % 4] < 0.0) != wanted).unwrap_or(0)

@@ -1,25 +1,24 @@
 //! Topology matching (thesis 2.4): near flagged nodes, Gamma takes the topology of phi.
 //!
-//! Gamma is the signed distance from the mesh, phi that from the particles' surface, and psi = Gamma - phi (Eq. 2.2). At fixed nodes,
-//! near the mesh and not flagged, psi is what it is: the mesh's detail. Between them it is as smooth as can be, a solution of Laplace's
-//! equation (Eq. 2.3), and Gamma becomes phi + psi: it merges and splits where phi does, and is itself where nothing is flagged.
-//! Lengths are in cells.
+//! Gamma is the signed distance from the mesh, phi that from the particles' surface, and psi = Gamma - phi (Eq. 2.2). At fixed nodes, near
+//! the mesh and not flagged, psi stays as it is: the mesh's detail. Between them it is as smooth as possible, a solution of Laplace's
+//! equation (Eq. 2.3), and Gamma becomes phi + psi: it merges and splits where phi does, and is unchanged where nothing is flagged. Lengths
+//! are in cells.
 //!
-//! The thesis solves on the whole grid, which is most of its time. Here nodes within a reach of flagged ones are free, and all
-//! others keep their Gamma. What is beside a free node:
+//! The thesis solves on the whole grid, which takes most of its time. Here nodes within a reach of flagged ones are free, and all others
+//! keep their Gamma. Neighbours of a free node:
 //!
 //! | node | its psi |
 //! |---|---|
-//! | not there | counts for nothing, as at the border of the thesis' grid (Neumann, 2.4.2) |
+//! | missing | ignored, as at the border of the thesis' grid (Neumann, 2.4.2) |
 //! | fixed, within reach or not | given: Gamma - phi (Dirichlet) |
-//! | beyond reach, where phi has Gamma's sign and a size over sqrt(3) | counts for nothing |
+//! | beyond reach, where phi has Gamma's sign and a magnitude over sqrt(3) | ignored |
 //! | beyond reach, elsewhere | given: Gamma - phi |
 //!
-//! Far from the mesh Gamma and phi are cut off, each at its band, and their difference says little: taken as given all along the
-//! rim, it pulls at what flagged nodes become (between two balls by 0.1 to 0.3 at a reach of 8, by 0.02 at most with these rules).
-//! It is needed where phi alone would change a sign: without it, a drop of phi that lies across the rim would be cut in two. As a
-//! last resort a free node beside one beyond reach keeps its Gamma if its sign would change. So no edge across the rim gets or loses
-//! a crossing.
+//! Far from the mesh Gamma and phi are clamped, each at its band, and their difference means little: if it were given everywhere along the
+//! rim, it would distort the result at flagged nodes (between two balls by 0.1 to 0.3 at a reach of 8, by 0.02 at most with these rules). It
+//! is needed where phi alone would change a sign: without it, a drop of phi that lies across the rim would be cut in two. As a last resort a
+//! free node beside one beyond reach keeps its Gamma if its sign would change. So no edge across the rim gains or loses a crossing.
 
 mod nodes;
 mod solve;
@@ -29,7 +28,7 @@ use crate::error::{Error, Result};
 use nodes::Free;
 use solve::System;
 
-/// Nodes of a task.
+/// Nodes per task.
 const PIECE: usize = 2048;
 
 /// How the Laplace equation is solved.
@@ -42,18 +41,18 @@ pub enum Solver {
     Gradients,
 }
 
-/// How Gamma is matched.
+/// Settings of the matching.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Matching {
-    /// How the equation is solved.
+    /// Solver of the equation.
     pub solver: Solver,
-    /// Greatest change of psi in an iteration at which it ends (cells), over 0; the thesis' is 0.01.
+    /// The iteration ends when no psi changes by this much (cells), over 0; the thesis' is 0.01.
     pub tolerance: f64,
-    /// How far from flagged nodes, on each axis, it is solved (cells), at least 1; beyond, Gamma stays.
+    /// Distance from flagged nodes, on each axis, within which it is solved (cells), at least 1; beyond, Gamma stays.
     pub reach: i32,
-    /// Most iterations.
+    /// Maximum number of iterations.
     pub most: usize,
-    /// Relaxation factor of [`Solver::Sor`], at least 1 and less than 2; none: from how wide the space between fixed nodes is.
+    /// Relaxation factor of [`Solver::Sor`], at least 1 and less than 2; none: derived from the width of the space between fixed nodes.
     pub omega: Option<f64>,
 }
 
@@ -68,38 +67,37 @@ impl Default for Matching {
 pub struct Node {
     /// Its position (cells).
     pub position: [i32; 3],
-    /// Signed distance from the mesh (cells), negative inside; may be cut off beyond sqrt(3).
+    /// Signed distance from the mesh (cells), negative inside; may be clamped beyond sqrt(3).
     pub gamma: f32,
-    /// Signed distance from the particles' surface (cells), negative inside; where that is farther than its band is wide, the
-    /// band's width with its sign.
+    /// Signed distance from the particles' surface (cells), negative inside; clamped to the width of its band.
     pub phi: f32,
     /// Whether Gamma follows phi here.
     pub is_flagged: bool,
 }
 
-/// What a matching made.
+/// Result of a matching.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Matched {
-    /// Gamma of each node (cells), in the order in which they were given. At nodes that are not free it has the same bits as before.
+    /// Gamma of each node (cells), in the input order. At nodes that are not free it has the same bits as before.
     pub gamma: Vec<f32>,
-    /// Iterations that it took.
+    /// Count of iterations.
     pub iterations: usize,
-    /// Greatest distance of a free node's psi from the mean of those that it depends on (cells).
+    /// Maximum distance of a free node's psi from the mean of those that it depends on (cells).
     pub residual: f64,
     /// Count of fixed nodes: those not flagged, with |Gamma| <= sqrt(3).
     pub fixed: usize,
     /// Count of free nodes: flagged ones, and those within reach that are not fixed.
     pub free: usize,
-    /// Relaxation factor: the one that was asked for, else that of the space between fixed nodes, which [`Solver::Sor`] takes.
+    /// Relaxation factor: the requested one, else the one derived from the space between fixed nodes, used by [`Solver::Sor`].
     pub omega: f64,
 }
 
-/// Matches Gamma to phi near flagged nodes. The order of the nodes makes no difference to what each becomes, nor does the number of
-/// threads. When the iterations come to their limit, the residual says how far it is from done.
+/// Matches Gamma to phi near flagged nodes. The result does not depend on the order of the nodes or the number of threads. When the
+/// iterations reach their limit, the residual shows how far the solution is from converged.
 ///
-/// psi begins at 0 (thesis, algorithm 2.1): from the Gamma - phi of flagged nodes a solve that ends early would keep part of what
-/// is to go. Free nodes from which no way over free nodes leads to a given psi are left there: any constant would
-/// solve their equations, and with 0 they become phi.
+/// psi starts at 0 (thesis, algorithm 2.1): started from the Gamma - phi of flagged nodes, a solve that ends early would keep part of the
+/// detail to be removed. Free nodes that are not connected to a given psi through free nodes keep 0: any constant would solve their
+/// equations, and with 0 they become phi.
 ///
 /// # Errors
 /// Parameters out of range; two nodes at the same position; distances that are not finite; more memory than the context allows; cancel.
@@ -155,7 +153,7 @@ mod tests {
     use crate::geometry::DVec3;
 
     const SOLVERS: [Solver; 2] = [Solver::Sor, Solver::Gradients];
-    /// How far the grid of two balls reaches from the origin on each axis (cells).
+    /// Extent of the grid of two balls from the origin on each axis (cells).
     const HALF: [i32; 3] = [26, 18, 18];
 
     fn context(threads: usize) -> Context {
@@ -172,8 +170,8 @@ mod tests {
         Matching { solver, tolerance, reach, most: 5000, omega: None }
     }
 
-    /// Two balls with a radius of 8 and 1.5 between them. For phi they lie `shift` farther along y, and a neck has grown
-    /// between them; flagged within 7 of the gap.
+    /// Two balls with a radius of 8, 1.5 apart. In phi they lie `shift` farther along y, and a neck has grown between them; nodes within 7
+    /// of the gap are flagged.
     fn balls(shift: f64) -> Vec<Node> {
         let node = |position: [i32; 3]| {
             let position_of = DVec3::from(position.map(f64::from));
@@ -200,7 +198,7 @@ mod tests {
         (0..3).fold(0, |at, axis| at * (2 * HALF[axis] + 1) as usize + (position[axis] + HALF[axis]) as usize)
     }
 
-    /// Whether a way over nodes inside leads from one ball's centre to the other's.
+    /// Whether a path over nodes inside leads from one ball's centre to the other's.
     fn are_joined(gamma: &[f32]) -> bool {
         let mut is_seen = vec![false; gamma.len()];
         let mut due = vec![[-9, 0, 0]];
@@ -220,7 +218,7 @@ mod tests {
         is_seen[index([9, 0, 0])]
     }
 
-    /// Nodes in a box, some missing, with values that look random.
+    /// Pseudo-random values at nodes in a box, some missing.
     fn noise() -> Vec<Node> {
         let random = |position: [i32; 3], salt: u32| {
             let mix = |sum: u32, x: u32| (sum ^ x).wrapping_mul(0x9e37_79b1).rotate_left(13) ^ (sum >> 7);
@@ -247,7 +245,7 @@ mod tests {
         -0.25 + x as f32 / 16.0
     }
 
-    /// Nodes of two planes and between them, where Gamma says nothing.
+    /// Nodes of two planes and between them, where Gamma has no information.
     fn planes() -> Vec<Node> {
         let node = |position: [i32; 3]| {
             let is_flagged = (1..12).contains(&position[0]);
@@ -302,7 +300,7 @@ mod tests {
         assert!(outs.iter().all(|out| out.residual < 1e-6));
         let far = greatest(outs[0].gamma.iter().zip(&outs[1].gamma).map(|(a, b)| a - b));
         assert!(far < 1e-4, "they differ by {far}");
-        // Every 1009th node, around and around.
+        // Every 1009th node, modulo the count.
         let order: Vec<usize> = (0..nodes.len()).map(|n| n * 1009 % nodes.len()).collect();
         let shuffled: Vec<Node> = order.iter().map(|at| nodes[*at]).collect();
         for (solver, out) in SOLVERS.into_iter().zip(&outs) {
@@ -361,7 +359,7 @@ mod tests {
 
     #[test]
     fn no_sign_changes_at_the_rim() {
-        // A drop of phi above liquid, across the rim at x = 10; flagged within 2 of the origin.
+        // A drop of phi above liquid, across the rim at x = 10; nodes within 2 of the origin are flagged.
         let node = |position: [i32; 3]| {
             let drop = (DVec3::from(position.map(f64::from)) - DVec3::new(10.0, 0.0, 7.0)).norm() - 4.0;
             let height = f64::from(position[2]) + 0.5;
@@ -390,7 +388,7 @@ mod tests {
 
     #[test]
     fn a_free_node_beside_one_beyond_reach_keeps_its_sign() {
-        // psi is -5.5 all along.
+        // psi is -5.5 throughout.
         let values = [(-1.5, 4.0, false), (1.0, 2.0, true), (3.0, 3.5, false), (3.0, 4.0, false)];
         let node = |(x, (gamma, phi, is_flagged)): (i32, (f32, f32, bool))| Node {
             position: [x, 0, 0],

@@ -1,4 +1,4 @@
-//! Which nodes are solved for, and the equation of each (thesis 2.4, 2.4.2).
+//! Which nodes are solved for, and their equations (thesis 2.4, 2.4.2).
 
 use rayon::prelude::*;
 
@@ -8,14 +8,14 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::Coord;
 
-/// What happens to a node.
+/// Role of a node in the matching.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Role {
-    /// It is near the mesh and not flagged: psi is given.
+    /// Near the mesh and not flagged: psi is given.
     Fixed,
     /// psi is solved for.
     Free,
-    /// It is too far from all flagged nodes: it is as it was.
+    /// Too far from all flagged nodes: Gamma stays.
     Kept,
 }
 
@@ -29,11 +29,11 @@ pub struct Free {
     pub fixed: usize,
 }
 
-/// Bytes of a node while it is sorted, and more for one that is solved for.
+/// Bytes of a node while it is sorted, and additional ones if it is solved for.
 const BYTES: [usize; 2] = [28, 200];
 
 impl Free {
-    /// Those within `reach` cells, on each axis, of flagged ones.
+    /// The free nodes: those within `reach` cells, on each axis, of flagged ones.
     ///
     /// # Errors
     /// Two nodes at the same position; distances that are not finite; more memory than the context allows; cancel.
@@ -75,12 +75,12 @@ impl Free {
     }
 }
 
-/// Whether a surface so far from a node (cells) may pass through a cell at it: |d| <= sqrt(3).
+/// Whether a surface at this distance from a node (cells) may pass through a cell at it: |d| <= sqrt(3).
 fn is_near(distance: f32) -> bool {
     f64::from(distance) * f64::from(distance) <= 3.0
 }
 
-/// Whether phi itself has a node clearly on the side where Gamma has it.
+/// Whether phi alone clearly puts a node on the same side as Gamma.
 fn keeps_its_side(node: &Node) -> bool {
     (node.phi < 0.0) == (node.gamma < 0.0) && !is_near(node.phi)
 }
@@ -126,12 +126,12 @@ fn roles(ctx: &Context, nodes: &[Node], sorted: &[(Coord, u32)], reach: i32) -> 
     Ok(roles.concat())
 }
 
-/// The nodes before and behind some on x, y and z; [`NONE`]: there is none. All are indices in the order of positions; those of the
-/// piece ascend.
+/// The neighbours of some nodes, before and behind them on x, y and z; [`NONE`]: there is none. All are indices in the order of positions;
+/// those of the piece ascend.
 fn beside(sorted: &[(Coord, u32)], piece: &[u32]) -> Vec<[u32; 6]> {
     let mut out = vec![[NONE; 6]; piece.len()];
     for side in 0..6 {
-        // What is beside ascending positions ascends too: both lists are run through once.
+        // The neighbours of ascending positions ascend too: both lists are traversed once.
         let mut last: Option<usize> = None;
         for (found, at) in out.iter_mut().zip(piece) {
             let Some(wanted) = step(sorted[*at as usize].0, side) else { continue };
@@ -148,19 +148,19 @@ fn beside(sorted: &[(Coord, u32)], piece: &[u32]) -> Vec<[u32; 6]> {
     out
 }
 
-/// The position beside one: before and behind it on x, y, z.
+/// The neighbouring position: before or behind on x, y, z.
 fn step(mut position: Coord, side: usize) -> Option<Coord> {
     let axis = side / 2;
     position[axis] = position[axis].checked_add(if side.is_multiple_of(2) { -1 } else { 1 })?;
     Some(position)
 }
 
-/// Flagged nodes in a binary tree of boxes, split at medians. A leaf is a run of them on z.
+/// Flagged nodes in a binary tree of boxes, split at medians. A leaf is a run of nodes on z.
 struct Flagged {
     boxes: Vec<Part>,
 }
 
-/// Children of an inner box are the next box and `right`; that of a leaf is 0.
+/// Children of an inner box are the next box and `right`, which is 0 for a leaf.
 struct Part {
     low: Coord,
     high: Coord,
@@ -168,7 +168,7 @@ struct Part {
 }
 
 impl Flagged {
-    /// Of positions that ascend.
+    /// The tree of ascending positions.
     fn new(positions: impl Iterator<Item = Coord>) -> Self {
         let mut runs: Vec<[Coord; 2]> = Vec::new();
         for position in positions {
@@ -213,7 +213,7 @@ impl Flagged {
         index as u32
     }
 
-    /// Whether a position is within `reach` cells of one of them on each axis.
+    /// Whether a position is within `reach` cells of a flagged node on each axis.
     fn is_within(&self, position: &Coord, reach: i32) -> bool {
         !self.boxes.is_empty() && self.has_within(0, position, i64::from(reach))
     }
@@ -237,7 +237,7 @@ impl Flagged {
 mod tests {
     use super::*;
 
-    /// Positions that look random, within so many cells of the origin on each axis; ascending.
+    /// Pseudo-random positions, within `size` cells of the origin on each axis; ascending.
     fn scattered(count: u32, size: u32) -> Vec<Coord> {
         let position = |n: u32| {
             let of = |axis: u32| {
@@ -267,7 +267,7 @@ mod tests {
             }
         }
         assert!(counts.iter().all(|count| *count > 20), "{counts:?}");
-        // Distances that 32 bits do not hold.
+        // Distances that exceed 32 bits.
         let far = [i32::MIN, 0, i32::MAX - 20];
         assert!(flagged[0][0] < 0 && tree.is_within(&far, i32::MAX));
         assert!(!tree.is_within(&far, i32::MAX - 30));

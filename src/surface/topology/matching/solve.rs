@@ -1,7 +1,7 @@
 //! The Laplace equation of the topology matching, and its two solvers (thesis 2.4.1).
 //!
-//! Nodes are red or black, by the parity of x + y + z, so that all nodes beside a red one are black and the other way round: the
-//! nodes of a colour do not depend on each other, and are updated in any order, by any number of threads, to the same bits.
+//! Nodes are red or black, by the parity of x + y + z, so that all neighbours of a red node are black and the reverse: nodes of one colour
+//! do not depend on each other, and are updated in any order, by any number of threads, with the same bits as result.
 
 use rayon::prelude::*;
 
@@ -9,22 +9,21 @@ use super::PIECE;
 use crate::context::Context;
 use crate::error::Result;
 
-/// No node.
+/// Sentinel: no node.
 pub const NONE: u32 = u32::MAX;
 
-/// The equation of a free node: the count of nodes that it depends on times its psi, minus the psi of those of them that are
-/// free, is the load.
+/// The equation of a free node: the count of nodes that it depends on times its psi, minus the psi of the free ones among them, is the load.
 #[derive(Debug, Clone, Copy)]
 pub struct Row {
     /// The free nodes before and behind it on x, y and z, as indices of rows; [`NONE`]: there is none.
     pub beside: [u32; 6],
-    /// Nodes beside it whose psi is given.
+    /// Count of neighbours whose psi is given.
     pub held: u32,
     /// Sum of their psi (cells).
     pub load: f64,
     /// Whether x + y + z is odd.
     pub is_odd: bool,
-    /// Whether a node beside it is not solved for since it is too far from all flagged ones.
+    /// Whether a neighbour is not solved for because it is too far from all flagged nodes.
     pub is_rim: bool,
 }
 
@@ -34,22 +33,22 @@ type Field = [Vec<f64>; 2];
 /// The nodes of one colour.
 #[derive(Default)]
 struct Half {
-    /// Index of each one's row.
+    /// Row of each node.
     rows: Vec<u32>,
-    /// The free nodes beside each, of the other colour; [`NONE`]: there is none.
+    /// The free neighbours of each node, of the other colour; [`NONE`]: there is none.
     beside: Vec<[u32; 6]>,
-    /// Count of the nodes that each depends on: alpha_ii of the thesis.
+    /// Count of the nodes that each one depends on: alpha_ii of the thesis.
     counts: Vec<f64>,
-    /// Load of each (cells).
+    /// Load of each node (cells).
     loads: Vec<f64>,
 }
 
-/// The equations of all nodes that given values reach. Where none does, any constant would be a solution, and psi is 0.
+/// The equations of all nodes connected to given values. Where there are none, any constant would be a solution, and psi is 0.
 pub struct System {
     halves: [Half; 2],
     /// Count of rows.
     count: usize,
-    /// Most free nodes in a row on any axis.
+    /// Maximum number of consecutive free nodes on any axis.
     widest: u32,
 }
 
@@ -57,9 +56,9 @@ pub struct System {
 pub struct Solution {
     /// psi of each row (cells).
     pub psi: Vec<f64>,
-    /// Iterations that were made.
+    /// Count of iterations.
     pub iterations: usize,
-    /// Greatest distance of a psi from the mean of the nodes that it depends on (cells).
+    /// Maximum distance of a psi from the mean of the nodes that it depends on (cells).
     pub residual: f64,
 }
 
@@ -83,13 +82,13 @@ impl System {
         Self { halves, count: rows.len(), widest: widest(rows, &is_held) }
     }
 
-    /// The best relaxation factor for a cube with sides of N nodes (Yang & Gobbert 2009), N being the most free nodes in a row on
-    /// any axis: how wide the space between fixed nodes is, not how large the grid is, which would make it too great.
+    /// The best relaxation factor for a cube with sides of N nodes (Yang & Gobbert 2009), N being the maximum number of consecutive free
+    /// nodes on any axis: the width of the space between fixed nodes, not the size of the grid, which would make the factor too large.
     pub fn omega(&self) -> f64 {
         2.0 / (1.0 + libm::sin(std::f64::consts::PI / (f64::from(self.widest) + 1.0)))
     }
 
-    /// Solves by successive over-relaxation (Eq. 2.5) with a factor `omega` until no psi changes by `tolerance` (cells), or `most`
+    /// Solves by successive over-relaxation (Eq. 2.5) with a factor `omega` until no psi changes by `tolerance` (cells), or for `most`
     /// iterations.
     ///
     /// # Errors
@@ -109,10 +108,10 @@ impl System {
         Ok(self.solution(&psi, iterations))
     }
 
-    /// Solves by conjugate gradients until no psi changes by `tolerance` (cells), or `most` iterations.
+    /// Solves by conjugate gradients until no psi changes by `tolerance` (cells), or for `most` iterations.
     ///
-    /// One symmetric pass of Gauss-Seidel (SSOR with a factor of 1), red, black, red, preconditions them. The thesis' incomplete
-    /// Cholesky factors would need fewer iterations, but have to be run through node after node.
+    /// The preconditioner is one symmetric pass of Gauss-Seidel (SSOR with a factor of 1): red, black, red. The thesis' incomplete Cholesky
+    /// factors would need fewer iterations, but must be applied node by node.
     ///
     /// # Errors
     /// Cancel.
@@ -128,7 +127,7 @@ impl System {
             ctx.check()?;
             self.apply(&direction, &mut image);
             let energy = product(&direction, &image);
-            // Both are 0 where all given values are 0, or when nothing is left.
+            // Both are 0 if all given values are 0, or if the residual has vanished.
             if !(now > 0.0 && energy > 0.0) {
                 break;
             }
@@ -168,10 +167,10 @@ impl System {
         Solution { psi: all, iterations, residual: greatest(&means) }
     }
 
-    /// The preconditioner's guess of the way by which a residual comes about.
+    /// The preconditioner's estimate of the error behind a residual.
     fn precondition(&self, residual: &Field, guess: &mut Field) {
         let [red, black] = guess;
-        // The first pass knows nothing of the black nodes.
+        // The first pass ignores the black nodes.
         self.halves[0].means(&residual[0], &[], red);
         self.halves[1].means(&residual[1], red, black);
         self.halves[0].means(&residual[0], black, red);
@@ -186,13 +185,13 @@ impl System {
 }
 
 impl Half {
-    /// Sum of the other colour's values over the nodes beside one.
+    /// Sum of the other colour's values over a node's neighbours.
     fn sum(&self, node: usize, other: &[f64]) -> f64 {
-        // None is beyond every end.
+        // The index NONE is out of range.
         self.beside[node].iter().map(|at| other.get(*at as usize).copied().unwrap_or(0.0)).sum()
     }
 
-    /// Over-relaxes all nodes of the colour. Returns the greatest change (cells).
+    /// Over-relaxes all nodes of the colour. Returns the maximum change (cells).
     fn relax(&self, omega: f64, other: &[f64], psi: &mut [f64]) -> f64 {
         let piece = |(piece, psi): (usize, &mut [f64])| {
             let mut most = 0.0f64;
@@ -207,7 +206,7 @@ impl Half {
         psi.par_chunks_mut(PIECE).enumerate().map(piece).reduce(|| 0.0, f64::max)
     }
 
-    /// What each node would be by its own equation, with these loads.
+    /// The value of each node by its own equation, with these loads.
     fn means(&self, loads: &[f64], other: &[f64], out: &mut [f64]) {
         out.par_chunks_mut(PIECE).enumerate().for_each(|(piece, out)| {
             for (out, node) in out.iter_mut().zip(piece * PIECE..) {
@@ -226,7 +225,7 @@ impl Half {
     }
 }
 
-/// Whether a given value reaches each row, from free node to free node.
+/// Whether each row is connected to a given value through free nodes.
 fn held(rows: &[Row]) -> Vec<bool> {
     let mut is_held: Vec<bool> = rows.iter().map(|row| row.held > 0).collect();
     let mut due: Vec<u32> = (0..rows.len() as u32).filter(|at| is_held[*at as usize]).collect();
@@ -240,9 +239,9 @@ fn held(rows: &[Row]) -> Vec<bool> {
     is_held
 }
 
-/// Most held nodes in a row on any axis.
+/// Maximum number of consecutive held nodes on any axis.
 fn widest(rows: &[Row], is_held: &[bool]) -> u32 {
-    // How many end at each node: rows ascend by position, so that those before it are known.
+    // Length of the run that ends at each node: rows ascend by position, so that earlier ones are known.
     let mut runs = vec![[0u32; 3]; rows.len()];
     let mut most = 0u32;
     for (at, row) in rows.iter().enumerate().filter(|(at, _)| is_held[*at]) {
@@ -276,7 +275,7 @@ fn product(a: &Field, b: &Field) -> f64 {
     of_half(0) + of_half(1)
 }
 
-/// Greatest absolute value.
+/// Maximum absolute value.
 fn greatest(field: &Field) -> f64 {
     let of_piece = |piece: &[f64]| piece.iter().fold(0.0f64, |most, value| most.max(value.abs()));
     let of_half = |half: &Vec<f64>| half.par_chunks(PIECE).map(of_piece).reduce(|| 0.0, f64::max);
