@@ -2,13 +2,15 @@
 //! ([`Context`]: cancel flag, progress, warnings, phase times, memory limit).
 
 mod cancel;
+mod locking;
 mod memory;
 mod phases;
 mod pool;
 mod progress;
 
+use crate::context::locking::lock;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 pub use cancel::Running;
@@ -328,11 +330,6 @@ impl Context {
         });
         value.expect("the scope passes a panic on")
     }
-}
-
-/// Locks a mutex whose holder may have panicked: the data of these mutexes is consistent at every moment.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Whether some work has ended.

@@ -2,7 +2,7 @@
 
 use std::sync::Mutex;
 
-use super::lock;
+use crate::context::locking::lock;
 
 /// What is being done, for a progress display.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

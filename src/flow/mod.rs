@@ -28,8 +28,8 @@ pub mod tiles;
 mod vorticity;
 mod window;
 
-pub use advection::advect::Scheme;
-use advection::advect::Way;
+pub use crate::flow::advection::scheme::Scheme;
+use crate::flow::advection::scheme::Way;
 pub use advection::conserve::Keeping;
 pub use advection::paths::FARTHEST;
 pub use pressure::Solved;

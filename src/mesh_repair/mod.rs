@@ -28,6 +28,7 @@ mod fill;
 mod losses;
 mod prepare;
 mod region;
+mod source;
 mod tidy;
 
 use self::cut::Trouble;
@@ -40,6 +41,7 @@ use crate::distance::lattice::Lattice;
 use crate::error::{Error, Result};
 use crate::geometry::check::topology::Topology;
 use crate::geometry::{Coord, DVec3, TriMesh, Vec3};
+pub use source::Source;
 
 pub use self::attributes::carried as carry_attributes;
 pub use self::attributes::traced::Traced;
@@ -51,31 +53,6 @@ pub use self::losses::Losses;
 pub use self::prepare::Prepared;
 pub(super) use self::region::faulty_cells::overlaps;
 pub(super) use self::region::{CellSet, Inside};
-
-/// Where a triangle of a repaired mesh comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Source {
-    /// An unchanged triangle of the input mesh.
-    Whole(u32),
-    /// A part of one.
-    Part(u32),
-    /// Closes a hole, or was rebuilt.
-    New,
-}
-
-impl Source {
-    /// The source after two changes, of which `first` has the sources of the triangles after the first.
-    pub(super) fn after(self, first: &[Self]) -> Self {
-        match self {
-            Self::Whole(triangle) => first[triangle as usize],
-            Self::Part(triangle) => match first[triangle as usize] {
-                Self::Whole(triangle) | Self::Part(triangle) => Self::Part(triangle),
-                Self::New => Self::New,
-            },
-            Self::New => Self::New,
-        }
-    }
-}
 
 /// A repaired mesh.
 #[derive(Debug, Clone)]

@@ -1,6 +1,6 @@
 //! Cuts: a plane through a field, coloured by its values, and the lines in which surfaces meet the plane.
 
-use std::fmt;
+use crate::render::plane::Plane;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -21,31 +21,6 @@ const LINE: f64 = 1.5;
 const NEAREST: f64 = 1.0e-9;
 /// Light where there is no field.
 const EMPTY: [f32; 3] = [0.45, 0.47, 0.5];
-
-/// A plane across one of the world's axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Plane {
-    /// The axis: 0, 1 or 2 for x, y or z.
-    pub axis: usize,
-    /// Its coordinate on this axis (m).
-    pub at: f64,
-}
-
-impl Plane {
-    /// Where a ray meets the plane; none if it never does.
-    fn meets(self, eye: DVec3, toward: DVec3) -> Option<DVec3> {
-        let distance = (self.at - eye[self.axis]) / toward[self.axis];
-        let mut position = eye + toward * distance;
-        position[self.axis] = self.at;
-        (distance > 0.0 && distance.is_finite()).then_some(position)
-    }
-}
-
-impl fmt::Display for Plane {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "{}={}", ["x", "y", "z"][self.axis], self.at)
-    }
-}
 
 /// Reads the values at positions (m) into a list, which it clears first.
 type Read = dyn Fn(&Context, &[DVec3], &mut Vec<f32>) -> Result<()> + Send + Sync;

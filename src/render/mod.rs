@@ -20,6 +20,7 @@ mod liquid;
 mod model;
 mod models;
 mod picture;
+mod plane;
 mod ramp;
 mod shade;
 mod sphere_shadows;
@@ -27,8 +28,9 @@ mod spheres;
 #[cfg(feature = "vdb")]
 mod volume;
 
+pub use crate::render::plane::Plane;
 pub use camera::{Camera, Size};
-pub use cut::{Cut, Field, Plane};
+pub use cut::{Cut, Field};
 pub use fog::Fog;
 pub use gif::palette::Palette;
 pub use gif::{Gif, delays};

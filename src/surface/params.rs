@@ -1,6 +1,5 @@
 //! Parameters of a mesh that follows particles.
 
-use super::track::advect::Weighting;
 use crate::error::{Error, Result};
 
 /// Parameters of a mesh that follows particles.
@@ -61,4 +60,14 @@ impl Params {
         }
         Ok(())
     }
+}
+
+/// How the displacements of particles are combined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Weighting {
+    /// By affine maps.
+    #[default]
+    Affine,
+    /// By their mean (thesis 2.2).
+    Mean,
 }

@@ -1,5 +1,7 @@
 //! The mesh, frame by frame.
 
+use crate::surface::track::advect::validate_step;
+use crate::surface::tracked_mesh::REACH;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -57,14 +59,9 @@ pub struct Tracker {
     pub(super) ahead: Ahead,
 }
 
-/// Minimum reach of the band, and the maximum that is tried at the first frame (r).
-pub(super) const REACH: [f64; 2] = [1.5, 8.0];
 /// Successive reaches of the band around vertices that do not find the surface at the first frame (r).
 const TRIES: [f64; 2] = [5.0, REACH[1]];
-/// Factor by which the band reaches farther than the vertices did before (thesis 2.3.1).
-pub(super) const WIDER: f64 = 1.25;
-/// Maximum drift of a vertex in a frame, where nothing merges or splits (r).
-pub(super) const DRIFT: f64 = 0.25;
+
 /// Share of the vertices that determines the reach: a spike does not widen the band everywhere.
 const MOST: f64 = 0.999;
 /// If the share `MOST` would need a reach over this (r), the share `OFTEN` determines it instead, with this as the minimum; around the
@@ -444,15 +441,6 @@ impl Tracker {
             .collect::<Result<_>>()?;
         Ok((vertices, flags.into_iter().flatten().collect()))
     }
-}
-
-/// Validates the frames of a step, `dt` (s) apart.
-pub(super) fn validate_step(from: &Particles, to: &Particles, dt: f64) -> Result<()> {
-    if !(dt > 0.0 && dt.is_finite()) {
-        return Err(Error::argument(format!("dt = {dt} s must be positive and finite")));
-    }
-    from.validate()?;
-    to.validate()
 }
 
 /// The mesh after a step, before it is rebuilt.

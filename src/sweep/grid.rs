@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::chain::Window;
 use super::signed_distance::voxelise::{ALL, Band, Piece, Scratch, Voxeliser};
 use super::{Body, Settings};
 use crate::context::Context;
@@ -12,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::geometry::{DVec3, TriMesh};
 use crate::motion::{Keys, Rigid};
 use crate::numeric::blocks::{Block, BlockEdit, DIM};
+use crate::sweep::window::Window;
 use crate::vdb::FloatGrid;
 
 /// Blocks per batch added to the grid; bounds the memory in addition to the grid.

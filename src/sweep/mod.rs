@@ -33,6 +33,7 @@ mod moving_mesh;
 #[cfg(feature = "vdb")]
 mod samples;
 mod signed_distance;
+mod window;
 
 pub use crate::distance::lattice::{REACH, too_far};
 pub use moving_mesh::body::{Body, Shape};
@@ -43,7 +44,8 @@ pub use samples::{SamplesSettings, samples};
 #[doc(hidden)]
 pub use crate::distance::Face;
 pub use crate::distance::lattice::{Fixed, Lattice, UNITS};
-pub use chain::{Weights, Window, boundary};
+pub use crate::sweep::window::Window;
+pub use chain::{Weights, boundary};
 pub use moving_mesh::topology::Topology;
 pub use signed_distance::voxelise::{ALL, Band, Piece, Scratch, Voxeliser};
 

@@ -8,8 +8,8 @@ use frazil::render::{Field, SNOW};
 use frazil::vdb::level_set;
 use frazil::{Context, Error, Result};
 
-use super::sources::{Part, Wet};
 use super::tint::Tint;
+use crate::cli::preview::parts::{Part, Wet};
 use crate::cli::session::exit::Failure;
 
 /// The colour of meshes (linear red, green, blue): leather, to contrast with snow.

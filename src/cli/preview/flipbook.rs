@@ -9,8 +9,9 @@ use frazil::{Error, Result};
 
 use super::drawing::{Drawing, Look, View};
 use super::in_order::in_order;
-use super::sources::{Part, Sources};
+use super::sources::Sources;
 use crate::cli::each::Each;
+use crate::cli::preview::parts::Part;
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
 use crate::cli::shot::progress::FrameProgress;

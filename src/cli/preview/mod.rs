@@ -3,6 +3,7 @@
 mod drawing;
 mod flipbook;
 mod in_order;
+mod parts;
 #[cfg(feature = "vdb")]
 mod shot;
 mod sources;

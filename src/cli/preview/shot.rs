@@ -9,7 +9,8 @@ use frazil::scene::{Rebuild, RebuildGrains, Scene};
 use frazil::vdb::{FloatGrid, file};
 use frazil::{Context, Error, Result};
 
-use super::sources::{Part, of_vdb, points_of};
+use super::sources::{of_vdb, points_of};
+use crate::cli::preview::parts::Part;
 
 /// A shot's folder, read frame by frame.
 pub struct Shot {

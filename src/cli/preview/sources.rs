@@ -1,5 +1,6 @@
 //! The inputs of a picture: files, sequences and whole shots, read frame by frame.
 
+use crate::cli::preview::parts::Part;
 use std::path::{Path, PathBuf};
 
 use frazil::geometry::{DetailedMesh, Points, TriMesh};
@@ -14,52 +15,6 @@ use super::shot::Shot;
 use super::spill::Spill;
 #[cfg(feature = "vdb")]
 use crate::cli::vdb::model::{self, Content};
-
-/// A part of a picture, as read.
-pub enum Part {
-    /// A mesh with its arrays.
-    Mesh(DetailedMesh),
-    /// The surface of a liquid, with its opacities `alpha`, and the kind of liquid.
-    Liquid(DetailedMesh, Wet),
-    /// The ground below a liquid, with the stains on its vertices, 0 to 1, and the liquid that left them; stains are optional.
-    Ground(TriMesh, Vec<f64>, Wet),
-    /// A tool or an obstacle in a liquid.
-    Obstacle(TriMesh),
-    /// A static mesh in a liquid.
-    Cloth(TriMesh),
-    /// Points, and the file that they came from.
-    Points(PathBuf, Points),
-    /// A level set.
-    #[cfg(feature = "vdb")]
-    Surface(FloatGrid),
-    /// A fog volume, and its file.
-    #[cfg(feature = "vdb")]
-    Fog(PathBuf, FloatGrid),
-}
-
-/// The look of a liquid.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wet {
-    Water,
-    Blood,
-    Paint,
-    Honey,
-    /// Looks that only dyes have.
-    Milk,
-    Coffee,
-}
-
-impl Wet {
-    /// The liquid of a name; blood if the name is unknown.
-    pub fn of(name: &str) -> Self {
-        match name {
-            "water" => Self::Water,
-            "paint" => Self::Paint,
-            "honey" => Self::Honey,
-            _ => Self::Blood,
-        }
-    }
-}
 
 /// An input to draw.
 enum Source {

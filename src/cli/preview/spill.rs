@@ -9,7 +9,7 @@ use frazil::scene::run::Stored;
 use frazil::scene::shallow::Around;
 use frazil::{Context, Error, Result};
 
-use super::sources::{Part, Wet};
+use crate::cli::preview::parts::{Part, Wet};
 
 /// The stage, and the kind of its files.
 const LIQUID: &str = "liquid";

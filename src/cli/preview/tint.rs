@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use frazil::geometry::DetailedMesh;
 
-use super::sources::Wet;
+use crate::cli::preview::parts::Wet;
 
 /// A scalar that tints a liquid.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -7,13 +7,14 @@
 //! two cells' paths. All four fields follow these paths, one after the other: velocities in two passes each, first the guess with its
 //! bounds, then the correction.
 
+use crate::flow::advection::scheme::Scheme;
+use crate::flow::advection::scheme::Way;
 use rayon::prelude::*;
 
-use super::conserve::{self, Keeping};
+use super::conserve::{self};
 use super::paths::{At, Live, Paths, Ways, trace};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::flow::Flow;
 use crate::flow::outer_grid::Reader;
 use crate::flow::pressure::stencil::row_of;
 use crate::flow::scratch::Room;
@@ -21,31 +22,6 @@ use crate::flow::tiles::{Field, Tile, Tiles};
 use crate::flow::window::Window;
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::Lanes;
-
-/// Advection scheme.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Scheme {
-    /// First order: stable, diffusive.
-    SemiLagrangian,
-    /// MacCormack (second order) for velocities and cubic interpolation for the density; no new extrema.
-    #[default]
-    Bounded,
-    /// The same without bounds: to measure the order of convergence.
-    Unbounded,
-}
-
-/// How a step advects a flow.
-pub struct Way<'a> {
-    /// Velocity (m/s) of the air outside all tiles.
-    pub ambient: [f32; 3],
-    /// Displacement in cells of a value at 1 m/s: the time over the cell's edge (s/m).
-    pub scale: f32,
-    pub scheme: Scheme,
-    /// The surrounding air after the step.
-    pub around: Option<&'a Flow>,
-    /// How the density conserves its mass; none: only as well as the scheme does.
-    pub keeping: Option<Keeping>,
-}
 
 /// Advects velocity (m/s, at lower faces) and density for a step. The rim keeps its values, except for the upper faces of cells.
 ///

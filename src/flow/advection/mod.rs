@@ -3,3 +3,4 @@
 pub(in crate::flow) mod advect;
 pub(in crate::flow) mod conserve;
 pub(in crate::flow) mod paths;
+pub(in crate::flow) mod scheme;

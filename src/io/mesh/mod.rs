@@ -7,6 +7,7 @@ pub(in crate::io) mod ply;
 mod ply_header;
 mod ply_write;
 mod stl;
+mod stl_solids;
 mod stl_text;
 
 use std::path::Path;

@@ -1,16 +1,16 @@
 //! STL, binary and text: triangles whose corners are joined if they have the same position.
 
-use std::collections::HashMap;
+use crate::io::mesh::stl_solids::HEADER;
+use crate::io::mesh::stl_solids::Joined;
 use std::io::Write;
 
 use super::stl_text;
-use crate::geometry::{PolygonMesh, TriMesh, Vec3};
+use crate::geometry::{PolygonMesh, TriMesh};
 use crate::io::files::{source, text};
 
 /// Triangles between two checks of the stop flag.
 const PIECE: usize = 1 << 14;
-/// Bytes of a binary file before its triangles, of each triangle, and of the normal at its start.
-pub(in crate::io) const HEADER: usize = 84;
+
 const TRIANGLE: usize = 50;
 const NORMAL: usize = 12;
 
@@ -57,26 +57,6 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMes
 
 fn less(value: f32, origin: f64) -> f32 {
     if origin == 0.0 { value } else { (f64::from(value) - origin) as f32 }
-}
-
-/// A mesh whose corners are joined if they have the same position.
-#[derive(Default)]
-pub(in crate::io) struct Joined {
-    pub mesh: PolygonMesh,
-    known: HashMap<[u32; 3], u32>,
-}
-
-impl Joined {
-    /// The vertex at a position.
-    pub fn corner(&mut self, position: [f32; 3]) -> u32 {
-        // Adding zero turns -0 into 0.
-        let position = position.map(|value| value + 0.0);
-        let positions = &mut self.mesh.positions;
-        *self.known.entry(position.map(f32::to_bits)).or_insert_with(|| {
-            positions.push(Vec3::from(position));
-            positions.len() as u32 - 1
-        })
-    }
 }
 
 /// Writes binary STL.

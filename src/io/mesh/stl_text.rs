@@ -4,11 +4,11 @@
 //! comment. Normals are ignored, whatever they are. A facet may have more than three corners. The last solid may lack its `endsolid`; the
 //! caller then warns that the file may be cut short.
 
-use super::stl::Joined;
 use crate::geometry::PolygonMesh;
 use crate::io::files::source;
 use crate::io::files::text;
 use crate::io::files::text::Words;
+use crate::io::mesh::stl_solids::Joined;
 
 /// Facets between two checks of the stop flag.
 const PIECE: usize = 1 << 14;
@@ -18,7 +18,7 @@ const NORMAL: usize = 4;
 /// Whether a file, without its byte order mark, begins like a text STL.
 pub(in crate::io) fn is_one(bytes: &[u8]) -> bool {
     // A binary file may begin with any word, but its triangle count is followed by a zero byte, which no text contains.
-    let head = &bytes[..bytes.len().min(super::stl::HEADER)];
+    let head = &bytes[..bytes.len().min(super::stl_solids::HEADER)];
     let first = Words::new(bytes).next();
     !head.contains(&0) && first.is_some_and(|word| is(word, "solid") || is(word, "facet"))
 }

@@ -3,8 +3,11 @@
 pub mod materials;
 pub mod points;
 pub mod primvars;
+pub mod text;
 
 use std::fmt::Write;
+pub(super) use text::list;
+pub use text::prim_name;
 
 use materials::Look;
 
@@ -94,16 +97,6 @@ pub struct StageTime {
     pub last: i32,
     /// Frames per second.
     pub fps: f64,
-}
-
-/// A name that USD allows, made from any text: letters, digits, underscores.
-pub fn prim_name(text: &str) -> String {
-    let mut name: String =
-        text.chars().map(|letter| if letter.is_ascii_alphanumeric() { letter } else { '_' }).collect();
-    if !name.starts_with(|letter: char| letter.is_ascii_alphabetic() || letter == '_') {
-        name.insert(0, '_');
-    }
-    name
 }
 
 /// A text in quotes, or an asset path between `@`.
@@ -402,19 +395,6 @@ pub(super) fn vector(out: &mut String, parts: [f32; 3]) {
         primvars::number(out, Number::F32, part.into());
     }
     out.push(')');
-}
-
-pub(super) fn list<T>(items: impl ExactSizeIterator<Item = T>, write: impl Fn(&mut String, T)) -> String {
-    let mut out = String::with_capacity(items.len() * 32);
-    out.push('[');
-    for (index, item) in items.enumerate() {
-        if index > 0 {
-            out.push_str(", ");
-        }
-        write(&mut out, item);
-    }
-    out.push(']');
-    out
 }
 
 /// Positions as 32-bit floats.

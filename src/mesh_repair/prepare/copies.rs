@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::rotated;
 use crate::geometry::Vec3;
 use crate::geometry::check::duplicates;
 use crate::geometry::check::edges::{edge_uses, imbalance, is_same_edge, parts_of};
@@ -58,4 +57,9 @@ pub(in crate::mesh_repair) fn copies(positions: &[Vec3], triangles: &[[u32; 3]],
         [p.x + 0.0, p.y + 0.0, p.z + 0.0].map(f32::to_bits)
     };
     duplicates::copies(parts, |_| true, |triangle| rotated(triangles[triangle].map(position)))
+}
+
+/// Corners of a triangle, starting with the smallest, so that triangles of the same orientation compare equal.
+pub(in crate::mesh_repair) fn rotated<T: Ord + Copy>([a, b, c]: [T; 3]) -> [T; 3] {
+    [a, b, c].min([b, c, a]).min([c, a, b])
 }

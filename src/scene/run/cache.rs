@@ -6,7 +6,6 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, Made};
-use super::pass::Kept;
 use super::settings::{self, Settings};
 use super::stage::Stage;
 use super::stored::Stored;
@@ -16,6 +15,7 @@ use crate::io::records::checksummed;
 use crate::io::records::input_hashes::Seen;
 use crate::io::records::manifest::Manifest;
 use crate::scene::FrameChoice;
+use crate::scene::run::stored::Kept;
 
 /// The settings of all frames from `from` on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -10,6 +10,7 @@ mod cache;
 mod chain;
 mod own_files;
 mod pass;
+mod plan;
 mod runner;
 mod settings;
 mod stage;
@@ -17,11 +18,13 @@ mod stored;
 mod usd;
 pub mod verify;
 
+pub use crate::scene::run::plan::Plan;
+pub use crate::scene::run::stage::{Clip, Volume};
+pub use crate::scene::run::stage::{MovingMesh, Prims};
 pub use pass::AnyStage;
-pub use runner::{Plan, Run};
+pub use runner::Run;
 #[cfg(test)]
 pub(in crate::scene) use settings::changed;
 pub use settings::{CONTENT, Settings};
 pub use stage::{FrameFiles, Kind, Reads, Report, Stage, Stepped, Stepping, To};
 pub use stored::Stored;
-pub use usd::{Clip, MovingMesh, Prims, Volume};

@@ -5,14 +5,13 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::runner::Plan;
 use super::stage::Stage;
 use super::stored::record_of;
-use super::usd;
 use crate::error::{Error, Result};
 use crate::io::files::{atomic, hash};
 use crate::io::records::checksummed;
 use crate::scene::FrameChoice;
+use crate::scene::run::plan::Plan;
 
 /// The scene with its defaults.
 pub(super) const SCENE: &str = "scene.toml";
@@ -115,7 +114,7 @@ impl Own {
         }
         if scene.output.usd {
             let of_stages = plan.stages().flat_map(|stage| stage.loose_files().iter().copied());
-            std::iter::once(usd::SHOT)
+            std::iter::once(SHOT)
                 .chain(of_stages)
                 .try_for_each(|name| self.refuse_changed(name, None))?;
         }
@@ -223,7 +222,7 @@ impl Own {
     /// Whether runs write files of this name into a folder.
     fn is_own(&self, folder: &str, name: &str) -> bool {
         let alone = match folder {
-            "" => [SCENE, usd::SHOT].contains(&name),
+            "" => [SCENE, SHOT].contains(&name),
             "state" => name == FILES || name.strip_suffix(".json").is_some_and(|name| self.has_stage(name)),
             kind => self.known.files.contains_key(&format!("{kind}/{name}")),
         };
@@ -345,6 +344,9 @@ fn is_same(a: &Path, b: &Path) -> bool {
     let there = |path| std::fs::canonicalize(path).ok();
     there(a).is_some_and(|a| there(b) == Some(a))
 }
+
+/// The shot for programs that read USD.
+pub(in crate::scene::run) const SHOT: &str = "shot.usda";
 
 #[cfg(test)]
 mod tests {

@@ -1,5 +1,6 @@
 //! A stage's pass over the frames: while one frame is computed, the files of the previous one are written.
 
+use crate::scene::run::stored::Kept;
 use std::panic::resume_unwind;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -38,17 +39,6 @@ pub struct Shared<'a> {
     pub stop: &'a AtomicBool,
     /// Called for each frame.
     pub done: Done<'a>,
-}
-
-/// What a stage can resume from.
-#[derive(Clone, Copy)]
-pub struct Kept<'a> {
-    /// The shot's first frame.
-    pub first: i32,
-    /// First frame that was made with the current settings.
-    pub own_from: i32,
-    /// The frames that are done.
-    pub done: &'a Stored,
 }
 
 /// Any stage, with the pass that makes it.

@@ -1,12 +1,17 @@
 //! What a part of a shot must provide so that the frame loop can make it.
 
+use crate::geometry::Points;
+use crate::geometry::Uvs;
+use crate::io::usd::Field;
+use crate::io::usd::materials::Look;
+use crate::io::usd::primvars::Primvar;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value};
 
 use super::settings::Settings;
 use super::stored::Stored;
-use super::usd::{Clip, Volume};
+
 use crate::context::{Context, PhaseTime};
 use crate::error::Result;
 use crate::io::files::atomic;
@@ -240,4 +245,49 @@ impl<'a> FrameFiles<'a> {
     pub(super) fn written(self) -> (Vec<Written>, Option<Written>) {
         (self.files, self.state)
     }
+}
+
+/// A kind of files with one .usda file for each frame.
+pub struct Clip<'a> {
+    /// The kind.
+    pub kind: &'static str,
+    /// What the frames have in common: a file that belongs to no frame.
+    pub manifest: &'static str,
+    /// Contents of the frames.
+    pub prims: Prims<'a>,
+}
+
+/// A volume in the files of a kind.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Volume {
+    /// The kind.
+    pub kind: &'static str,
+    /// Name of the prim.
+    pub prim: &'static str,
+    /// Its fields, each a grid of the files.
+    pub fields: &'static [Field],
+    /// Whether it is a guide: to be viewed, not rendered.
+    pub is_guide: bool,
+}
+
+/// Contents of the frames of a [`Clip`].
+pub enum Prims<'a> {
+    /// Moving meshes.
+    Meshes(Vec<MovingMesh<'a>>),
+    /// A surface that is a different mesh at each frame, without velocities: name of its prim.
+    Surface(&'static str),
+    /// Points, in a prim named after the kind; these have their attributes.
+    Points(Points),
+}
+
+/// What the frames of a moving mesh have in common.
+pub struct MovingMesh<'a> {
+    /// Name of its prim.
+    pub name: String,
+    /// Its material.
+    pub look: Look,
+    /// Its texture coordinates.
+    pub uvs: Option<&'a Uvs>,
+    /// Its other arrays.
+    pub primvars: Vec<Primvar>,
 }

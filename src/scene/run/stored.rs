@@ -213,3 +213,14 @@ pub(super) fn record_of(name: &str) -> Option<(&str, i32)> {
     let (stage, number) = name.strip_suffix(".json")?.split_once('.')?;
     Some((stage, number.parse().ok()?))
 }
+
+/// What a stage can resume from.
+#[derive(Clone, Copy)]
+pub struct Kept<'a> {
+    /// The shot's first frame.
+    pub first: i32,
+    /// First frame that was made with the current settings.
+    pub own_from: i32,
+    /// The frames that are done.
+    pub done: &'a Stored,
+}

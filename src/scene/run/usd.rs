@@ -1,62 +1,17 @@
 //! `shot.usda`: the whole shot for programs that read USD.
 
 use super::own_files::Own;
-use super::runner::Plan;
 use super::stage::Stage;
 use super::stored::Stored;
 use crate::error::Result;
-use crate::geometry::{Points, Uvs};
 use crate::io::usd::materials::Look;
-use crate::io::usd::primvars::Primvar;
-use crate::io::usd::{self, Field};
-
-/// The shot for programs that read USD.
-pub(super) const SHOT: &str = "shot.usda";
-
-/// A volume in the files of a kind.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Volume {
-    /// The kind.
-    pub kind: &'static str,
-    /// Name of the prim.
-    pub prim: &'static str,
-    /// Its fields, each a grid of the files.
-    pub fields: &'static [Field],
-    /// Whether it is a guide: to be viewed, not rendered.
-    pub is_guide: bool,
-}
-
-/// A kind of files with one .usda file for each frame.
-pub struct Clip<'a> {
-    /// The kind.
-    pub kind: &'static str,
-    /// What the frames have in common: a file that belongs to no frame.
-    pub manifest: &'static str,
-    /// Contents of the frames.
-    pub prims: Prims<'a>,
-}
-
-/// What the frames of a moving mesh have in common.
-pub struct MovingMesh<'a> {
-    /// Name of its prim.
-    pub name: String,
-    /// Its material.
-    pub look: Look,
-    /// Its texture coordinates.
-    pub uvs: Option<&'a Uvs>,
-    /// Its other arrays.
-    pub primvars: Vec<Primvar>,
-}
-
-/// Contents of the frames of a [`Clip`].
-pub enum Prims<'a> {
-    /// Moving meshes.
-    Meshes(Vec<MovingMesh<'a>>),
-    /// A surface that is a different mesh at each frame, without velocities: name of its prim.
-    Surface(&'static str),
-    /// Points, in a prim named after the kind; these have their attributes.
-    Points(Points),
-}
+use crate::io::usd::{self};
+use crate::scene::run::own_files::SHOT;
+use crate::scene::run::plan::Plan;
+use crate::scene::run::stage::Clip;
+use crate::scene::run::stage::MovingMesh;
+use crate::scene::run::stage::Prims;
+use crate::scene::run::stage::Volume;
 
 /// Writes the description of the existing frames, by relative paths.
 ///

@@ -9,7 +9,6 @@ use serde::Serialize;
 use super::own_files;
 use super::own_files::Own;
 use super::stored::record_of;
-use super::usd;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::records::checksummed;
@@ -72,7 +71,7 @@ pub fn verify(ctx: &Context, folder: &Path) -> Result<Verified> {
     }
     let (own_files, faults) = own.faults();
     damaged.extend(faults.into_iter().map(|(file, what)| Damage { file, what }));
-    known.extend([own_files::SCENE, usd::SHOT, FILES].map(String::from));
+    known.extend([own_files::SCENE, own_files::SHOT, FILES].map(String::from));
     known.extend(own.loose().map(String::from));
     let files: Vec<&Written> = manifests
         .iter()

@@ -1,12 +1,12 @@
 //! Checks every input of every frame of a scene, without simulating.
 
+pub use crate::scene::snow::inspect::object_path::ObjectReport;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Serialize;
 
 use super::estimate::{disk, memory};
-use super::inspect::foot_slip::Walk;
 use super::inspect::object_path::Course;
 use super::inspect::relief::Relief;
 use super::{Forecast, Inputs, MistForecast, has_grains, has_mist};
@@ -41,50 +41,6 @@ pub struct Report {
     pub warnings: Vec<String>,
     /// Every setting, defaults filled in: `snow.cell`, `object[1].scale`.
     pub settings: BTreeMap<String, Value>,
-}
-
-/// Summary of an object over the shot.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ObjectReport {
-    /// Its file.
-    pub file: String,
-    /// collide, base or grains.
-    pub role: &'static str,
-    /// Its triangles.
-    pub triangles: usize,
-    /// Open loops that are closed; loops that share a vertex count once.
-    pub closed_loops: usize,
-    /// Holes at the first frame, counted as in `frazil mesh check`.
-    pub holes: usize,
-    /// Edges where its triangles disagree on inside and outside.
-    pub contradictions: usize,
-    /// Width, height and depth at the first frame (m).
-    pub size_m: [f64; 3],
-    /// Minimum and maximum position over the shot (m).
-    pub bounds_m: [[f64; 3]; 2],
-    /// Maximum speed of a vertex between two frames (m/s), and the frame that ends that step.
-    pub fastest_m_per_s: f64,
-    /// See [`ObjectReport::fastest_m_per_s`].
-    pub fastest_frame: i32,
-    /// First and last frame at which its bounds touch the snow's.
-    pub touches: Option<[i32; 2]>,
-    /// Its depth, if the ground is known and the object comes over it.
-    pub deepest: Option<Deepest>,
-    /// How its clip must be carried.
-    pub walk: Option<Walk>,
-}
-
-/// The lowest position of an object relative to the ground.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Deepest {
-    /// Frame of that position.
-    pub frame: i32,
-    /// Its y (m).
-    pub y_m: f64,
-    /// Height above the ground (m); negative below it.
-    pub above_ground_m: f64,
-    /// Depth below the snow's top (m); negative above it.
-    pub below_top_m: f64,
 }
 
 /// Checks a scene whose inputs are open; `folder` is its output folder: the base there tells how many grains there will be, and the mist

@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use super::inputs::Inputs;
 use super::stages::grain_files::{changes_since, partial};
-use super::stages::grains::params;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::points::Values;
@@ -17,6 +16,7 @@ use crate::io::particles::ply;
 use crate::io::records::input_hashes::Seen;
 use crate::scene::Scene;
 use crate::scene::schema::rounded;
+use crate::scene::snow::grain_params::params;
 use crate::snow::grains::{FASTEST, Grains, Params};
 use crate::vdb::{FloatGrid, points};
 

@@ -6,6 +6,7 @@
 pub mod check;
 #[cfg(feature = "vdb")]
 mod estimate;
+mod grain_params;
 #[cfg(feature = "vdb")]
 mod initial_grains;
 #[cfg(feature = "vdb")]

@@ -1,6 +1,7 @@
 //! Cells seen from above, and heights as integers.
 
 use crate::error::{Error, Result};
+use std::ops::Range;
 
 /// The maximum integer height; heights lie from 0 to this, so that sums of two of them fit 32 bits.
 pub const TOP: i32 = 1 << 30;
@@ -109,3 +110,6 @@ impl Heights {
         units * self.unit
     }
 }
+
+/// A box of cells: ranges of x and of z.
+pub type Cells = [Range<usize>; 2];

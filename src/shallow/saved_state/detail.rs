@@ -15,9 +15,10 @@ use super::{LAST, MOST_FLUX, Put, SEAL, SUMS, Saved, is_over, part, parts, refus
 use crate::error::{Error, Result};
 use crate::numeric::bytes::Reader;
 use crate::shallow::Shallow;
+use crate::shallow::columns::grid::Cells;
 use crate::shallow::scalars::MOST;
 use crate::shallow::two_level::rests::Load;
-use crate::shallow::two_level::{Cells, Detail, check_near};
+use crate::shallow::two_level::{Detail, check_near};
 
 const MAGIC: [u8; 8] = *b"frz shld";
 const VERSION: u32 = 1;

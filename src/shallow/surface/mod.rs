@@ -25,6 +25,7 @@
 
 pub(in crate::shallow) mod buffers;
 pub mod heights;
+pub mod layout;
 pub(in crate::shallow) mod quartets;
 pub mod rim;
 mod self_check;
@@ -35,124 +36,18 @@ use crate::error::{Error, Result};
 pub use buffers::capacity::bound;
 use buffers::normals::Normals;
 use buffers::vertices::Vertices;
+pub use layout::Counts;
+pub use layout::Depths;
+pub use layout::Indices;
+pub use layout::Layout;
+pub use layout::Target;
+pub use layout::Up;
 use quartets::links::Scene;
 use quartets::odd::Search;
 use quartets::strips::Found;
 use rim::boundary::{Around, Walls};
-use rim::ledges::Ledges;
 use rim::skirts::Skirts;
 pub use self_check::{Check, check};
-
-/// The liquid in columns.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Depths<'a> {
-    /// Depth of each index (units), at most from base to ceiling; 0 or less is dry, and so are indices without a column.
-    pub depth: &'a [i32],
-    /// Mean velocity of each index along x and z (m/s); may be empty.
-    pub velocity: &'a [[f32; 2]],
-    /// Whether each strip may have a wet column; if absent, all strips are searched.
-    pub active: Option<&'a [bool]>,
-    /// Minimum depth at which each index is shown where it is wet (units), at most from base to ceiling; replaces [`Layout::least_depth`].
-    /// May be empty. See [`heights::minimum_heights::Lifts`].
-    pub least: &'a [i32],
-    /// How far below its base each index is shown where it is dry (units), at most down to the underside of its solid; replaces
-    /// [`Layout::least_depth`]. May be empty.
-    pub sunk: &'a [i32],
-    /// One number per index for each array of [`Target::carried`]: concentrations of scalars. May be empty.
-    pub carried: [&'a [f32]; MOST],
-    /// Where the surface ends above nothing and is extended down to the ground's edge; if absent, it ends in the middle of the last cell.
-    pub ledges: Option<&'a Ledges>,
-}
-
-/// The axis that points up.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Up {
-    /// Y: x to the east, z to the south.
-    #[default]
-    Y,
-    /// Z: x to the east, y to the north.
-    Z,
-}
-
-/// How the mesh is written. Triangles are counter-clockwise seen from above, or clockwise with `left_handed`. In both cases the cross
-/// product of a triangle's edges points along its normals.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Layout {
-    /// The caller's units per metre: 1, or 100 for centimetres. For positions, depths and velocities.
-    pub scale: f64,
-    /// The axis that points up.
-    pub up: Up,
-    /// Left-handed axes: the horizontal axis that is not x points the other way (Y up: z to the north; Z up: y to the south).
-    pub left_handed: bool,
-    /// Minimum height of a wet vertex above its base (m), against flicker where the terrain is drawn too (thesis 4.2.4: 0.05 of a cell). A
-    /// dry vertex is at least as far below its base, and further where the liquid around is lower.
-    pub least_depth: f64,
-    /// Depth (m) from which a wet vertex is at its full height. Below it, the thinner the liquid, the closer its vertex is to that of a dry
-    /// column, so that no vertex jumps as its column wets or dries. 0: at once; 0.02 of a cell works well.
-    pub fade_depth: f64,
-    /// Depth from which the liquid is opaque (m), for [`Target::opacities`].
-    pub opaque_depth: f64,
-}
-
-impl Default for Layout {
-    fn default() -> Self {
-        Self {
-            scale: 1.0,
-            up: Up::Y,
-            left_handed: false,
-            least_depth: 0.0,
-            fade_depth: 0.0,
-            opaque_depth: 0.01,
-        }
-    }
-}
-
-/// Where vertex indices are written.
-#[derive(Debug, Default)]
-pub enum Indices<'a> {
-    /// Nowhere.
-    #[default]
-    None,
-    /// 16 bits: for at most 65,536 vertices.
-    U16(&'a mut [u16]),
-    /// 32 bits.
-    U32(&'a mut [u32]),
-}
-
-/// Buffers of the caller. They are written from the start, in order, and never read; they may be longer than the mesh. Those that are
-/// absent are not wanted. Vertices are in the order of their columns' indices, followed by extras.
-#[derive(Debug, Default)]
-pub struct Target<'a> {
-    /// Three numbers per vertex (m x scale).
-    pub positions: Option<&'a mut [f32]>,
-    /// Three numbers per vertex: a unit vector.
-    pub normals: Option<&'a mut [f32]>,
-    /// One number per vertex (m x scale); 0 for dry vertices and extras.
-    pub depths: Option<&'a mut [f32]>,
-    /// One number per vertex: depth / [`Layout::opaque_depth`], at most 1 (thesis 4.2.2).
-    pub opacities: Option<&'a mut [f32]>,
-    /// Three numbers per vertex (m/s x scale): velocity at the surface, 1.5 times the mean (Eq. 4.4); the upward component is 0.
-    pub velocities: Option<&'a mut [f32]>,
-    /// One number per vertex for each array of [`Depths::carried`]; for a dry vertex or an extra, the mean of the wet columns around.
-    pub carried: [Option<&'a mut [f32]>; MOST],
-    /// Layer of each vertex's column; for an extra, the lowest layer of the wet columns around whose surface ends there.
-    pub layers: Option<&'a mut [u32]>,
-    /// Index of each vertex's column; [`NONE`] for an extra.
-    pub columns: Option<&'a mut [u32]>,
-    /// Three per triangle.
-    pub indices: Indices<'a>,
-}
-
-/// Size of a mesh.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Count of vertices.
-    pub vertices: usize,
-    /// Of these, extras.
-    pub extras: usize,
-    /// Count of vertex indices: three for each triangle.
-    pub indices: usize,
-}
 
 /// Builds surfaces; reuses its memory.
 #[derive(Debug, Default)]
@@ -280,72 +175,5 @@ impl Surface {
         self.skirts.write_hems(&vertices, target);
         self.normals.clear(found);
         Ok(counts)
-    }
-}
-
-impl Layout {
-    pub(super) fn validate(&self) -> Result<()> {
-        let positive = |name: &str, value: f64| {
-            if value > 0.0 && value.is_finite() {
-                Ok(())
-            } else {
-                Err(Error::argument(format!("{name} = {value} is not positive and finite")))
-            }
-        };
-        positive("scale", self.scale)?;
-        positive("opaque_depth", self.opaque_depth)?;
-        for (name, value) in [("least_depth", self.least_depth), ("fade_depth", self.fade_depth)] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(Error::argument(format!("{name} = {value} is not finite and 0 or more")));
-            }
-        }
-        Ok(())
-    }
-}
-
-impl Target<'_> {
-    /// Checks that everything wanted is given.
-    pub(in crate::shallow) fn check_wanted(&self, depths: &Depths<'_>) -> Result<()> {
-        if self.velocities.is_some() && depths.velocity.is_empty() && !depths.depth.is_empty() {
-            return Err(Error::argument("velocities of the surface are wanted, and the liquid has none"));
-        }
-        let is_bare = |(to, from): (&Option<&mut [f32]>, &&[f32])| to.is_some() && from.is_empty();
-        if !depths.depth.is_empty() && self.carried.iter().zip(&depths.carried).any(is_bare) {
-            return Err(Error::argument("concentrations of the surface are wanted, and the liquid has none"));
-        }
-        Ok(())
-    }
-
-    /// Checks that the mesh fits the buffers.
-    pub(in crate::shallow) fn check(&self, counts: &Counts) -> Result<()> {
-        let fits = |name: &str, room: Option<usize>, needed: usize| match room {
-            Some(room) if room < needed => Err(Error::argument(format!(
-                "{name} has room for {room} numbers, and the surface has {needed}"
-            ))),
-            _ => Ok(()),
-        };
-        let count = counts.vertices;
-        fits("positions", self.positions.as_ref().map(|out| out.len()), 3 * count)?;
-        fits("normals", self.normals.as_ref().map(|out| out.len()), 3 * count)?;
-        fits("depths", self.depths.as_ref().map(|out| out.len()), count)?;
-        fits("opacities", self.opacities.as_ref().map(|out| out.len()), count)?;
-        fits("velocities", self.velocities.as_ref().map(|out| out.len()), 3 * count)?;
-        for carried in &self.carried {
-            fits("carried", carried.as_ref().map(|out| out.len()), count)?;
-        }
-        fits("layers", self.layers.as_ref().map(|out| out.len()), count)?;
-        fits("columns", self.columns.as_ref().map(|out| out.len()), count)?;
-        let room = match &self.indices {
-            Indices::None => None,
-            Indices::U16(out) => Some(out.len()),
-            Indices::U32(out) => Some(out.len()),
-        };
-        fits("indices", room, counts.indices)?;
-        if matches!(self.indices, Indices::U16(_)) && count > 1 << 16 {
-            return Err(Error::argument(format!(
-                "{count} vertices are too many for indices of 16 bits: take those of 32"
-            )));
-        }
-        Ok(())
     }
 }

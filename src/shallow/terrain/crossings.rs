@@ -5,9 +5,7 @@
 
 use super::lines::{LANES, ROUNDOFF, WHOLE, greater, integer_of, lesser, whole};
 use crate::shallow::columns::grid::{Heights, TOP};
-
-/// Corner of a triangle (m).
-pub type Corner = [f64; 3];
+use crate::shallow::terrain::lines::Corner;
 
 /// A triangle that lines may cross.
 pub struct Facet {

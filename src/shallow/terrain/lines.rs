@@ -1,7 +1,5 @@
 //! The vertical lines through the cells of a grid, and which of them a triangle may cross.
 
-use super::crossings::Corner;
-
 /// Positions that are tested together.
 pub const LANES: usize = 4;
 
@@ -159,3 +157,6 @@ pub(super) fn lesser(a: f64, b: f64) -> f64 {
 pub(super) fn greater(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
+
+/// Corner of a triangle (m).
+pub type Corner = [f64; 3];

@@ -1,6 +1,6 @@
 //! The ground of both sizes of cells.
 
-use super::Cells;
+use crate::shallow::columns::grid::Cells;
 use crate::shallow::columns::grid::{BOTTOMLESS, Grid};
 use crate::shallow::pipes::pipe_rules::Apart;
 use crate::shallow::terrain::Solids;

@@ -16,6 +16,7 @@ mod seam;
 mod shift;
 pub mod surface;
 
+use crate::shallow::columns::grid::Cells;
 use std::ops::Range;
 
 use super::Shallow;
@@ -33,9 +34,6 @@ use momentum::Momentum;
 use rests::Rests;
 use seam::Seam;
 use shift::Shift;
-
-/// A box of cells: ranges of x and of z.
-pub type Cells = [Range<usize>; 2];
 
 /// Tolerance for a side of a box to count as a side of cells (coarse cells).
 const ROUNDING: f64 = 1e-6;

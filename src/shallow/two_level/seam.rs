@@ -5,10 +5,11 @@
 //! the side, with the slope given by the coarse columns along the edge: otherwise a film that runs along the edge would oscillate across
 //! it.
 
+use super::FINE;
 use super::rests::{Load, Rests, change, of_column};
-use super::{Cells, FINE};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::Shallow;
+use crate::shallow::columns::grid::Cells;
 use crate::shallow::columns::grid::TOP;
 use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::scalars::MOST;

@@ -4,10 +4,11 @@
 //! liquid is level, and along the ground where a film runs. What four columns cannot share equally waits in their cell, and returns to the
 //! coarse column later.
 
+use super::Detail;
 use super::rests::{Load, change, of_column};
-use super::{Cells, Detail};
 use crate::error::Result;
 use crate::shallow::Shallow;
+use crate::shallow::columns::grid::Cells;
 use crate::shallow::remap::Parcel;
 
 /// Scratch buffers.

@@ -4,6 +4,9 @@
 //! untouched snow. The current height is computed from the snow itself, so that a layer resumed from its grids has the same numbers as one
 //! that never stopped.
 
+use crate::numeric::blocks::BlockEdit;
+use crate::numeric::blocks::Mask;
+use crate::snow::base_layer::removed_volume::filled;
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
@@ -67,11 +70,6 @@ impl Column {
 
 /// Column blocks that were touched, by x and z of their origin.
 pub type Columns = HashMap<[i32; 2], Column>;
-
-/// Fraction of a cell that a level set's solid fills, from the distance at its centre (both in metres).
-pub(in crate::snow) fn filled(distance: f32, cell: f32) -> f32 {
-    (0.5 - distance / cell).clamp(0.0, 1.0)
-}
 
 /// Adds a value of each voxel of a block to its column's sum, upwards.
 pub fn add_by_cell(sums: &mut [f32; CELLS], number: impl Fn(usize) -> f32) {
@@ -146,6 +144,14 @@ pub fn volume(surface: &FloatGrid, low: [i32; 3], high: [i32; 3]) -> Result<f64>
         cells += along(0) * along(1) * along(2);
     }
     Ok(cells * surface.voxel_size().powi(3))
+}
+
+/// The new snow of one block, and where it differs from the old snow.
+pub struct Mark<'a> {
+    /// The snow.
+    pub surface: &'a BlockEdit,
+    /// Voxels whose value changed.
+    pub changed: &'a Mask,
 }
 
 #[cfg(test)]

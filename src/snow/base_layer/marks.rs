@@ -1,5 +1,6 @@
 //! Data on the snow besides its shape: when its surface last changed, and how far its columns are compressed.
 
+use crate::snow::base_layer::columns::Mark;
 use std::collections::{BTreeSet, HashMap};
 
 use rayon::prelude::*;
@@ -10,14 +11,6 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::numeric::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::vdb::Probe;
-
-/// The new snow of one block, and where it differs from the old snow.
-pub struct Mark<'a> {
-    /// The snow.
-    pub surface: &'a BlockEdit,
-    /// Voxels whose value changed.
-    pub changed: &'a Mask,
-}
 
 impl BaseLayer {
     /// Heights of the column blocks that these changed blocks touch for the first time.

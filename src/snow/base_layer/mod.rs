@@ -19,7 +19,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
 
-pub(in crate::snow) use columns::filled;
+pub(in crate::snow) use crate::snow::base_layer::removed_volume::filled;
 pub use far_bodies::Reach;
 pub use grids::{Changes, Grids};
 pub use noise::displace;
@@ -29,12 +29,12 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::numeric::blocks::{BlockEdit, DIM, Origin};
 use crate::snow::NoiseParams;
+use crate::snow::base_layer::columns::Mark;
 use crate::sweep::{
     Band, Body, Face, Lattice, Piece, Scratch, Settings, TOLERANCE, UNITS, Voxeliser, Window,
 };
 use crate::vdb::{FloatGrid, GridClass, MetaValue, Probe, distances};
 use columns::Columns;
-use marks::Mark;
 use noise::Displacement;
 use press::{Edit, Scale};
 use sweep_region::snow_masks;

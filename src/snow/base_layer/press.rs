@@ -3,9 +3,10 @@
 //! The intersection is taken before the subtraction: base(t) minus base(t + dt) would leave a ghost surface of zero thickness wherever
 //! nothing moved.
 
-use super::columns::{CELLS, add_by_cell, filled};
+use super::columns::{CELLS, add_by_cell};
 use super::removed_volume;
 use crate::numeric::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
+use crate::snow::base_layer::removed_volume::filled;
 use crate::sweep::Piece;
 use crate::vdb::Probe;
 

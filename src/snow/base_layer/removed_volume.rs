@@ -4,7 +4,6 @@
 //! There the level set is reconstructed inside the voxel, on each axis in turn: between two voxels it is extrapolated from either side with
 //! that side's slope up to where both meet (subcell resolution: Harten 1989). This is exact where two planes meet.
 
-use super::columns::filled;
 use crate::numeric::blocks::Values;
 
 /// Distance (cells) from the centre beyond which a surface with an edge fills a negligible part of a voxel.
@@ -175,6 +174,11 @@ pub fn direction(values: &Values, index: usize) -> Option<[f32; 3]> {
     let slopes = [slope(0), slope(1), slope(2)];
     let norm = slopes.iter().map(|slope| slope * slope).sum::<f32>().sqrt();
     (norm > 0.0).then(|| slopes.map(|slope| slope / norm))
+}
+
+/// Fraction of a cell that a level set's solid fills, from the distance at its centre (both in metres).
+pub(in crate::snow) fn filled(distance: f32, cell: f32) -> f32 {
+    (0.5 - distance / cell).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]

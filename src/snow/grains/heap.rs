@@ -1,5 +1,6 @@
 //! Grains and their motion: sub-steps of [`super::solver::solve`]; pairs are found again where grains have moved.
 
+use crate::snow::grains::params::Division;
 use rayon::prelude::*;
 
 use super::colliders::field::{Field, Seen};
@@ -8,15 +9,16 @@ pub use super::colliders::shell::Shell;
 use super::colliders::touch;
 use super::colliders::touch::Touch;
 use super::solver::contacts::{Held, MOST as MOST_GRAINS};
-use super::solver::crowd::{MOST, MOST_BEFORE};
+
 use super::solver::layout::{At, Layout, NONE, SUB_STEPS_AHEAD, holds, locate, order, settle, world};
 use super::solver::rest;
 use super::solver::rows::{Row, Shared, V, norm};
-use super::solver::solve::{Coefficients, Motion, sub_step};
+use super::solver::solve::{Motion, sub_step};
 use super::solver::trapped;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
+use crate::snow::grains::solver::collide::Coefficients;
 
 /// A level plane that grains lie on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,15 +57,6 @@ pub struct Heap {
     pub(super) touches: Vec<Touch>,
     /// Identities of the grains trapped at the end of the last step, ascending.
     pub(super) trapped: Vec<u32>,
-}
-
-/// How a step is divided.
-#[derive(Debug, Clone, Copy)]
-pub struct Division {
-    /// Length of the step (s).
-    pub dt: f64,
-    /// Count of sub-steps.
-    pub sub_steps: usize,
 }
 
 impl Heap {
@@ -375,3 +368,41 @@ impl Floor {
         near.map(touch).collect()
     }
 }
+
+/// Maximum number of grains in a cell that is not crowded; a random packing fits ten.
+pub const MOST: usize = 14;
+
+/// The same before a step: only a cell with more than this, for example from a file with many grains at one position, would give grains too
+/// many neighbours. Grains that the last step could not move out are not tried again.
+pub const MOST_BEFORE: usize = 64;
+
+/// The grains at the beginning of the last step.
+#[derive(Clone, Default)]
+pub(in crate::snow::grains) struct Starts {
+    /// By identity, ascending.
+    pub grains: Vec<(u32, Start)>,
+    /// Identities of the grains that the step created: first and end (exclusive).
+    pub born: [u32; 2],
+}
+
+impl Starts {
+    /// The state at the beginning of a step, given the next identity to be assigned.
+    pub fn of(heap: &Heap, next_id: u32) -> Self {
+        let all = heap.ids().iter().copied().zip(heap.positions().zip(heap.velocities()));
+        let mut grains: Vec<(u32, Start)> = all.collect();
+        grains.par_sort_unstable_by_key(|(id, _)| *id);
+        Self { grains, born: [next_id; 2] }
+    }
+
+    /// Records the end of the step, given the next identity to be assigned.
+    pub fn end(&mut self, next_id: u32) {
+        self.born[1] = next_id;
+    }
+
+    pub fn find(&self, id: u32) -> Option<Start> {
+        self.grains.binary_search_by_key(&id, |(id, _)| *id).ok().map(|index| self.grains[index].1)
+    }
+}
+
+/// Position (m) and velocity (m/s) at the beginning of a step.
+pub type Start = (DVec3, [f32; 3]);

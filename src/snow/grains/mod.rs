@@ -39,17 +39,19 @@ use crate::geometry::DVec3;
 use crate::geometry::points::{Attribute, Column, Points, Values};
 use crate::numeric::blocks::{DIM, Origin};
 
+use crate::snow::grains::heap::Starts;
+use crate::snow::grains::params::Division;
 use birth::claims::Claims;
 use birth::sourcing::Sourcing;
-use heap::{Division, Heap};
+use heap::Heap;
 use solver::layout::locate;
-use start_positions::Starts;
 use surroundings::{Bounds, Obstacles, TIES, have_stayed};
 
-pub use birth::sourcing::{Base, PACKING, Removal, removals};
+pub use crate::snow::grains::birth::removal::{Base, Removal, removals};
+pub use crate::snow::grains::heap::Start;
+pub use birth::sourcing::PACKING;
 pub use colliders::ground::Ground;
 pub use params::Params;
-pub use start_positions::Start;
 pub(super) use surroundings::HOLES;
 pub use surroundings::{FASTEST_OBJECT, Object, Surroundings};
 

@@ -1,12 +1,11 @@
 //! Parameters of grains.
 
-use super::heap::Division;
 use super::solver::density;
 use super::solver::rest::Rest;
-use super::solver::solve::Coefficients;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::snow::grain_friction;
+use crate::snow::grains::solver::collide::Coefficients;
 
 /// How snow becomes grains and how they behave.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -166,3 +165,12 @@ const SLIDES: f64 = 0.01;
 const BOUNCING: f64 = 4.0;
 /// Maximum gap (diameters) at which grains attract each other.
 const BAND: f32 = 0.05;
+
+/// How a step is divided.
+#[derive(Debug, Clone, Copy)]
+pub struct Division {
+    /// Length of the step (s).
+    pub dt: f64,
+    /// Count of sub-steps.
+    pub sub_steps: usize,
+}

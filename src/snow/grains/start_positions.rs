@@ -1,41 +1,10 @@
 //! State of grains at the beginning of the last step: mist is raised along their paths from there.
 
+use crate::snow::grains::heap::Start;
 use rayon::prelude::*;
 
 use super::Grains;
-use super::heap::Heap;
 use crate::geometry::DVec3;
-
-/// Position (m) and velocity (m/s) at the beginning of a step.
-pub type Start = (DVec3, [f32; 3]);
-
-/// The grains at the beginning of the last step.
-#[derive(Clone, Default)]
-pub(super) struct Starts {
-    /// By identity, ascending.
-    grains: Vec<(u32, Start)>,
-    /// Identities of the grains that the step created: first and end (exclusive).
-    born: [u32; 2],
-}
-
-impl Starts {
-    /// The state at the beginning of a step, given the next identity to be assigned.
-    pub fn of(heap: &Heap, next_id: u32) -> Self {
-        let all = heap.ids().iter().copied().zip(heap.positions().zip(heap.velocities()));
-        let mut grains: Vec<(u32, Start)> = all.collect();
-        grains.par_sort_unstable_by_key(|(id, _)| *id);
-        Self { grains, born: [next_id; 2] }
-    }
-
-    /// Records the end of the step, given the next identity to be assigned.
-    pub fn end(&mut self, next_id: u32) {
-        self.born[1] = next_id;
-    }
-
-    fn find(&self, id: u32) -> Option<Start> {
-        self.grains.binary_search_by_key(&id, |(id, _)| *id).ok().map(|index| self.grains[index].1)
-    }
-}
 
 impl Grains {
     /// Position and velocity of each grain at the beginning of the last step; for grains that the step created, the position of birth, at

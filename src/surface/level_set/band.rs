@@ -14,7 +14,6 @@ use crate::error::Result;
 use crate::geometry::Coord;
 use crate::numeric::blocks::{DIM, VOXELS, Values, offset};
 use crate::numeric::lanes::LANES;
-use crate::surface::track::deep_detail::reach_in;
 
 /// Signed distances in blocks of 8 x 8 x 8 nodes.
 pub struct Distances {
@@ -225,4 +224,9 @@ fn distances(
         }
     }
     Some(out)
+}
+
+/// Reach of the band in a block; none if it is the same as elsewhere.
+pub fn reach_in(deep: &[(Coord, f32)], block: Coord) -> Option<f32> {
+    deep.binary_search_by_key(&block, |(block, _)| *block).ok().map(|at| deep[at].1)
 }

@@ -27,46 +27,6 @@ const SOME_MISSED: [f64; 2] = [0.05, 4.0];
 const FACTORS: [f64; 10] =
     [0.3048, 1.0 / 0.3048, 0.1, 10.0, 0.0254, 1.0 / 0.0254, 0.01, 100.0, 0.001, 1000.0];
 
-/// Displacements of the particles of a frame by their ids and by their velocities (m, medians over the particles).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mismatch {
-    /// Length of the displacements by ids.
-    pub by_ids: f64,
-    /// Length of the displacements by velocities.
-    pub by_velocities: f64,
-    /// Distance between their end points.
-    pub apart: f64,
-    /// Cosine of the angle between both.
-    pub cosine: f64,
-}
-
-impl Mismatch {
-    /// Displacements shorter than this (spacings) are jitter of particles at rest.
-    const STILL: f64 = 0.5;
-    /// Minimum cosine at which both have the same direction.
-    const ALIGNED: f64 = 0.9;
-
-    /// A warning for particles of a spacing (m); none if both agree closely enough.
-    pub fn sentence(&self, spacing: f64) -> Option<String> {
-        if self.apart <= Self::STILL * spacing {
-            return None;
-        }
-        let [ids, velocities] = [self.by_ids, self.by_velocities].map(|length| length / spacing);
-        let why = if self.cosine > Self::ALIGNED {
-            format!(
-                "velocities are {:.3} times as large as they should be: is their unit, or the frame rate, another?",
-                self.by_velocities / self.by_ids.max(f64::MIN_POSITIVE)
-            )
-        } else {
-            "are ids row numbers, which name other particles in each frame?".to_string()
-        };
-        Some(format!(
-            "ids and velocities contradict each other: in the median particles go {ids:.2} spacings in a frame by their ids, and \
-             {velocities:.2} by their velocities; {why}"
-        ))
-    }
-}
-
 /// A sentence that describes how the particles, of a spacing (m), of two frames that are `dt` (s) apart contradict each other. None if they
 /// do not, or if a frame has no particles.
 ///

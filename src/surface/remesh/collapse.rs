@@ -2,8 +2,8 @@
 
 use super::fans::{Collapse, Fans};
 use super::shape::{is_upright, normal, quality};
-use super::{between, mean};
 use crate::geometry::DVec3;
+use crate::surface::remesh::improvable::{between, mean};
 
 /// Minimum spread of normals on a ridge or in a corner: that of two planes of the same area that meet at 30 degrees.
 const SPREAD: f64 = 0.0625;

@@ -17,10 +17,15 @@ mod collapse;
 pub(in crate::surface) mod drift;
 mod fans;
 mod flip;
+mod improvable;
 mod relax;
 mod shape;
 mod strain;
 
+use crate::surface::remesh::improvable::is_long;
+use crate::surface::remesh::improvable::is_short;
+pub use improvable::Improvable;
+pub use improvable::Size;
 use rayon::prelude::*;
 
 use crate::context::Context;
@@ -29,10 +34,6 @@ use crate::geometry::DVec3;
 use crate::mesh_repair::Source;
 use fans::Fans;
 
-/// Longest edge that is left alone (targets). The halves of one that is split have 0.75: far from being collapsed.
-const TOO_LONG: f64 = 1.5;
-/// Shortest edge that is left alone (targets).
-const TOO_SHORT: f64 = 0.5;
 /// How often an edge and its parts may be halved in a frame: a stray vertex may make it arbitrarily long.
 const ROUNDS: usize = 5;
 /// Sweeps in a frame: the changes of one are checked in the next.
@@ -43,30 +44,6 @@ const RELAXED: usize = 3;
 const GRAIN: usize = 4096;
 /// Operations between two checks for a cancel.
 const LOOK: usize = 256;
-
-/// A mesh that is improved, lengths in any unit: closed and 2-manifold by index. Arrays have one value for each vertex, or triangle.
-pub struct Improvable<'a> {
-    /// Positions of vertices.
-    pub positions: &'a mut Vec<DVec3>,
-    /// Triangles, counter-clockwise seen from outside.
-    pub triangles: &'a mut Vec<[u32; 3]>,
-    /// For each vertex, the lengths of the shortest and of the longest edge around it at its birth: at birth no edge is out of range. Edges
-    /// between vertices of size 0 are never out of range.
-    pub sizes: &'a mut Vec<Size>,
-    /// For each vertex, its vertex before the frame; none: it was created in this frame.
-    pub origins: &'a mut Vec<Option<u32>>,
-    /// Displacement of each vertex since a reference some frames ago; not finite: unknown.
-    pub drifts: &'a mut Vec<[f32; 3]>,
-    /// For each triangle, where it comes from.
-    pub sources: &'a mut Vec<Source>,
-    /// For each vertex, whether its triangles are left alone: what is broken is rebuilt in the next frame.
-    pub flags: &'a mut Vec<bool>,
-    /// Change of lengths where the liquid only jitters.
-    pub tremble: f64,
-}
-
-/// Lengths of the shortest and of the longest edge around a vertex.
-pub type Size = [f32; 2];
 
 /// Counts of the operations that improved a mesh.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -111,62 +88,6 @@ pub fn sizes(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<Size> {
         }
     }
     sizes.into_iter().map(|size| if size[0].is_finite() { size } else { [0.0; 2] }).collect()
-}
-
-impl Improvable<'_> {
-    /// The range of lengths of an edge: shortest and longest.
-    fn target(&self, [a, b]: [u32; 2]) -> [f64; 2] {
-        between(self.sizes[a as usize], self.sizes[b as usize])
-    }
-
-    /// Square of an edge's length over its target; 1 if it is within the range, or has none.
-    fn stretch(&self, ends: [u32; 2]) -> f64 {
-        let [p, q] = ends.map(|end| self.positions[end as usize]);
-        let [shortest, longest] = self.target(ends);
-        let square = (p - q).norm_squared();
-        let stretch = if square > longest * longest {
-            square / (longest * longest)
-        } else if square < shortest * shortest {
-            square / (shortest * shortest)
-        } else {
-            1.0
-        };
-        if stretch.is_finite() { stretch } else { 1.0 }
-    }
-
-    /// Whether an edge is out of range, and not at rest.
-    fn needs(&self, ends: [u32; 2], is_out: fn(f64) -> bool) -> bool {
-        is_out(self.stretch(ends)) && self.is_strained(ends)
-    }
-
-    /// Whether a triangle may be due: if none of it was created or changed in this frame, only its edges are checked.
-    fn is_due(&self, [a, b, c]: [u32; 3], source: Source) -> bool {
-        if [a, b, c].into_iter().any(|corner| self.flags[corner as usize]) {
-            return false;
-        }
-        let is_out = |ends: [u32; 2]| self.needs(ends, is_long) || self.needs(ends, is_short);
-        !matches!(source, Source::Whole(_)) || [[a, b], [b, c], [c, a]].into_iter().any(is_out)
-    }
-}
-
-/// The range of lengths of an edge between vertices of two sizes: shortest and longest.
-fn between(one: Size, two: Size) -> [f64; 2] {
-    let [shortest, longest] = [f64::from(one[0].max(two[0])), f64::from(one[1].min(two[1]))];
-    // If the sizes do not overlap, since the vertices were not born as neighbours, the mean is taken.
-    if shortest <= longest { [shortest, longest] } else { [0.5 * (shortest + longest); 2] }
-}
-
-/// The size of a vertex between two others.
-fn mean(one: Size, two: Size) -> Size {
-    [0, 1].map(|end| 0.5 * (one[end] + two[end]))
-}
-
-fn is_long(stretch: f64) -> bool {
-    stretch > TOO_LONG * TOO_LONG
-}
-
-fn is_short(stretch: f64) -> bool {
-    stretch < TOO_SHORT * TOO_SHORT
 }
 
 /// Triangles that may be due, ascending.

@@ -1,8 +1,9 @@
 //! Which edges have changed recently. An edge that is out of range is left alone while it rests: improvement was tried when it left the
 //! range, and an edge that jitters around a limit would be remeshed in every frame.
 
-use super::{Improvable, TOO_LONG, TOO_SHORT};
+use super::Improvable;
 use crate::geometry::DVec3;
+use crate::surface::remesh::improvable::{TOO_LONG, TOO_SHORT};
 
 /// Change of a length since the reference from which on an edge is not at rest (targets, and [`Improvable::tremble`]). Particles at rest
 /// that jitter by 0.02 spacings change lengths by up to 0.02 targets, and by 0.01 spacings.

@@ -7,6 +7,8 @@
 //!
 //! If particles move farther than their spacing, a frame is divided, and the parts of their paths are followed one after the other.
 
+use crate::error::Error;
+use crate::surface::params::Weighting;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -19,17 +21,6 @@ use crate::surface::params::Params;
 use crate::surface::particles::affine_fit::{Map, Near, Sums, sums};
 use crate::surface::particles::grid::Cells;
 use crate::surface::particles::paths::Paths;
-use crate::surface::tracker::validate_step;
-
-/// How the displacements of particles are combined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Weighting {
-    /// By affine maps.
-    #[default]
-    Affine,
-    /// By their mean (thesis 2.2).
-    Mean,
-}
 
 /// Radius within which particles count for a mean (spacings; thesis 2.2).
 const MEAN_RADIUS: f32 = 2.0;
@@ -269,6 +260,15 @@ fn blended(maps: &[Option<Map>; 8], at: DVec3) -> Option<DVec3> {
         all += share;
     }
     (all > 0.0).then(|| sum / all)
+}
+
+/// Validates the frames of a step, `dt` (s) apart.
+pub(in crate::surface) fn validate_step(from: &Particles, to: &Particles, dt: f64) -> Result<()> {
+    if !(dt > 0.0 && dt.is_finite()) {
+        return Err(Error::argument(format!("dt = {dt} s must be positive and finite")));
+    }
+    from.validate()?;
+    to.validate()
 }
 
 #[cfg(test)]

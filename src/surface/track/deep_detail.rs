@@ -1,13 +1,15 @@
 //! Where the band of distances must reach farther than elsewhere: around the few vertices whose detail is deeper than that of nearly all
 //! others. A band that wide over the whole surface would take many times as long.
 
+use crate::surface::level_set::band::reach_in;
 use std::collections::BTreeMap;
 
 use crate::geometry::Coord;
 use crate::geometry::DVec3;
 use crate::numeric::blocks::DIM;
 use crate::surface::particles::grid::cell_of;
-use crate::surface::tracker::{DRIFT, REACH, Tracker, WIDER};
+use crate::surface::tracked_mesh::{DRIFT, REACH, WIDER};
+use crate::surface::tracker::Tracker;
 
 /// Blocks of the band, ascending, and its reach in each (cells).
 pub type Deep = Vec<(Coord, f32)>;
@@ -57,11 +59,6 @@ pub fn sorted(mut blocks: Deep) -> Deep {
     blocks.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
     blocks.dedup_by_key(|(block, _)| *block);
     blocks
-}
-
-/// Reach of the band in a block; none if it is the same as elsewhere.
-pub fn reach_in(deep: &[(Coord, f32)], block: Coord) -> Option<f32> {
-    deep.binary_search_by_key(&block, |(block, _)| *block).ok().map(|at| deep[at].1)
 }
 
 /// Whether the band reaches at least as far in all blocks of `deep` as in those of `other`.

@@ -27,7 +27,7 @@ impl Tracker {
             lasting: Vec::new(),
             flags: Vec::new(),
             bare: Vec::new(),
-            reach: crate::surface::tracker::REACH[0],
+            reach: crate::surface::tracked_mesh::REACH[0],
             // Its state includes its own triangles: none.
             is_rebuilt: true,
             sizes: Vec::new(),

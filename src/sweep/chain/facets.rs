@@ -5,6 +5,8 @@
 //! the volume, so one sample decides for a face unless its neighbourhood disagrees; then its corners are sampled too, and the face is
 //! clipped where it enters the volume.
 
+use crate::sweep::chain::facet::Corners;
+use crate::sweep::chain::facet::Facet;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use rayon::prelude::*;
@@ -16,25 +18,12 @@ use crate::distance::lattice::{Fixed, UNITS};
 use crate::distance::region::extent;
 use crate::distance::vectors::{cross, difference, dot, sub};
 use crate::error::Result;
-use crate::sweep::signed_distance::bins::{Bins, Point, each_voxel, voxel_of};
+use crate::sweep::chain::prism::Point;
+use crate::sweep::signed_distance::bins::{Bins, each_voxel, voxel_of};
 use crate::sweep::signed_distance::exposure::{BURIED, Exposure, OPEN, THIN};
-
-/// A triangle that bounds the volume.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Facet {
-    /// Corners, counter-clockwise seen from outside.
-    pub v: Corners,
-    /// The chain's face that it is a part of.
-    pub face: u32,
-    /// Whether it is known to be open throughout; otherwise it is open where it was sampled, and buried sheets pass nearby.
-    pub sure: bool,
-}
 
 /// A part of a face, and whether it is sure.
 type Part = (Corners, bool);
-
-/// Corners of a triangle.
-pub type Corners = [Fixed; 3];
 
 /// Depth (fixed-point units) up to which a sheet counts as surface: the sides of a sweep are folds of many sheets that are closer together
 /// than the sweep's own tolerance.

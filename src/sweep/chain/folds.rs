@@ -11,7 +11,6 @@ use std::collections::HashSet;
 
 use rayon::prelude::*;
 
-use super::Window;
 use crate::context::Context;
 use crate::distance::Face;
 use crate::distance::lattice::{Fixed, UNITS};
@@ -21,6 +20,7 @@ use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::sweep::moving_mesh::passages::{Change, Passage, Place, Poses, Step, Still, face, to_f64};
 use crate::sweep::moving_mesh::topology::{Simplex, Topology};
+use crate::sweep::window::Window;
 
 /// Intervals of negative winding number on a line that are shorter than this (cells) are ignored.
 const SHORT: f64 = 1e-3;

@@ -6,11 +6,13 @@
 //! the swept volume. Only the boundary of the chain is built: faces between two tetrahedra that are both in the chain, or both not in it,
 //! cancel and are never made.
 
+pub(in crate::sweep) mod facet;
 pub(in crate::sweep) mod facets;
 mod folds;
 mod patch;
 pub(in crate::sweep) mod prism;
 
+use crate::sweep::window::Window;
 use rayon::prelude::*;
 
 use super::moving_mesh::topology::Topology;
@@ -28,23 +30,6 @@ pub struct Weights {
     pub solid: i32,
     /// Weight of the part that is swept outward (normally 1).
     pub swept: i32,
-}
-
-/// Fixed-point box in which a sweep is wanted. Faces are made wherever a line along z (the axis of the scan lines) through it may meet
-/// them: which voxels are inside depends on everything that a line meets, above and below the box too.
-#[derive(Debug, Clone, Copy)]
-pub struct Window {
-    /// Minimum corner.
-    pub min: Fixed,
-    /// Maximum corner.
-    pub max: Fixed,
-}
-
-impl Window {
-    /// Whether a triangle with this bounding box can matter: it overlaps the window in x and y.
-    pub fn wants(&self, low: Fixed, high: Fixed) -> bool {
-        high[0] >= self.min[0] && low[0] <= self.max[0] && high[1] >= self.min[1] && low[1] <= self.max[1]
-    }
 }
 
 /// Outward motion below this (fixed-point units) counts as none: otherwise its sign would be decided by rounding.

@@ -6,13 +6,14 @@
 
 use rayon::prelude::*;
 
-use super::facets::Facet;
 use super::prism::Prisms;
 use crate::context::Context;
 use crate::distance::lattice::{Fixed, UNITS};
 use crate::distance::vectors::{cross, difference, dot};
 use crate::error::Result;
-use crate::sweep::signed_distance::bins::{Bins, Point};
+use crate::sweep::chain::facet::Facet;
+use crate::sweep::chain::prism::Point;
+use crate::sweep::signed_distance::bins::Bins;
 use crate::sweep::signed_distance::exposure::{Exposure, Spot};
 
 /// Maximum distance (cells) of the surface from a patch's plane.

@@ -4,7 +4,6 @@
 use crate::distance::lattice::{Fixed, UNITS};
 use crate::distance::vectors::{cross, difference, dot, sub};
 use crate::numeric::cpu::dispatch;
-use crate::sweep::signed_distance::bins::Point;
 
 /// Prisms tested at once.
 const LANES: usize = 8;
@@ -200,6 +199,9 @@ fn pass(
     }
     dispatch!(body(groups: &[Group], begin: [f32; 3], end: [f32; 3], beside: [f32; 3], unclear: &mut Vec<u32>) -> [i32; 2])
 }
+
+/// A position or direction in fixed-point units.
+pub type Point = [f64; 3];
 
 #[cfg(test)]
 mod tests {

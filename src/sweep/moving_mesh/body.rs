@@ -16,7 +16,8 @@ use crate::geometry::check::orientation::{Closing, Orientation};
 use crate::geometry::mesh::weld::{Boundary, STEPS, Weld};
 use crate::geometry::mesh::{coincident, spacing};
 use crate::motion::Motion;
-use crate::sweep::chain::{Weights, Window, boundary};
+use crate::sweep::chain::{Weights, boundary};
+use crate::sweep::window::Window;
 
 /// Length of a step's path relative to the pieces that edges are split into; by measurement, this value gave the fewest faces and the
 /// shortest time.

@@ -1,5 +1,6 @@
 //! Faces sorted by the unit cubes (bins) around voxels that they may pass through, and the winding number at any point.
 
+use crate::sweep::chain::prism::Point;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
@@ -11,9 +12,6 @@ use crate::distance::region::{Region, each_block, extent};
 use crate::distance::vectors::{cross, difference, dot, sub};
 use crate::distance::winding::Lines;
 use crate::sweep::chain::prism::{Prism, Prisms};
-
-/// A position or direction in fixed-point units.
-pub type Point = [f64; 3];
 
 /// Faces per task: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 1024;

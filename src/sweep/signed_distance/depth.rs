@@ -11,7 +11,9 @@ use crate::distance::lattice::UNITS;
 use crate::distance::nearest::Group;
 use crate::distance::triangle::{Offsets, Points, Triangle, to_each};
 use crate::distance::vectors::gap;
-use crate::sweep::chain::facets::{Corners, Facet, halves, is_open, is_small, open_parts};
+use crate::sweep::chain::facet::Corners;
+use crate::sweep::chain::facet::Facet;
+use crate::sweep::chain::facets::{halves, is_open, is_small, open_parts};
 use crate::sweep::chain::prism::Prisms;
 
 /// Two query points on a facet that are closer than this (cells) share one result.

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU16, Ordering};
 
 use rayon::prelude::*;
 
-use super::bins::{Bins, Point};
+use super::bins::Bins;
 use crate::distance::Face;
 use crate::distance::lattice::floor;
 use crate::distance::lists::Lists;
@@ -17,6 +17,7 @@ use crate::distance::scanlines::Columns;
 use crate::distance::vectors::dot;
 use crate::distance::winding::{Axis, each_crossing};
 use crate::numeric::blocks::offset;
+use crate::sweep::chain::prism::Point;
 
 /// Flag of a face that is, somewhere, exposed or less than [`THIN`] below an exposed face.
 pub const OPEN: u8 = 1;

@@ -19,7 +19,8 @@ use crate::distance::winding::Lines;
 use crate::error::Result;
 use crate::numeric::blocks::{Mask, Origin, Values};
 use crate::numeric::lanes::LANES;
-use crate::sweep::chain::facets::{Facet, facets};
+use crate::sweep::chain::facet::Facet;
+use crate::sweep::chain::facets::facets;
 use crate::sweep::chain::prism::Prisms;
 
 /// Distance from the surface up to which values are wanted, on each side (cells).

@@ -10,6 +10,7 @@ use crate::cli::output;
 use crate::cli::points::points_of_vdb;
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::vdb::from_particles::colliders::of_frame;
 use colliders::Colliders;
 use frazil::geometry::mesh::attributes::{Number, On};
 use frazil::geometry::points::{Attribute, Values};
@@ -149,11 +150,6 @@ struct Made {
     particles: usize,
     specks: usize,
     triangles: usize,
-}
-
-/// The file of a frame, from one file or a sequence.
-fn of_frame(path: &Path, frame: i32) -> PathBuf {
-    Pattern::parse(path).map_or_else(|| path.to_path_buf(), |pattern| pattern.path(frame))
 }
 
 /// Ratio of a given spacing to the estimate, up or down, from which it looks like a mistake.

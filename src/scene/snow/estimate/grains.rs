@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::scene::run::Stored;
 use crate::scene::snow::Inputs;
-use crate::scene::snow::stages::grains::params;
+use crate::scene::snow::grain_params::params;
 use crate::snow::grains::PACKING;
 
 /// Relative error that an estimate of the grains may have.

@@ -1,8 +1,8 @@
 //! Memory of a scene, estimated before any is allocated.
 
 use crate::error::{Error, Result};
+use crate::scene::snow::grain_params::params;
 use crate::scene::snow::keys::volumes::Needs;
-use crate::scene::snow::stages::grains::params;
 use crate::scene::snow::{Inputs, has_grains};
 use crate::scene::{BaseMode, Layer, Scene};
 use crate::snow;

@@ -1,6 +1,8 @@
 //! The path of an object over a shot, and warnings about it.
 
+use crate::scene::snow::inspect::foot_slip::Walk;
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::foot_slip::walk;
 use super::relief::Relief;
@@ -10,7 +12,7 @@ use crate::geometry::DVec3;
 use crate::geometry::check::faults;
 use crate::motion::{Motion, Poses, span};
 use crate::scene::snow::Inputs;
-use crate::scene::snow::check::{Deepest, ObjectReport};
+
 use crate::scene::{Object, Scene};
 use crate::snow::base_layer::Reach;
 use crate::snow::grains::FASTEST_OBJECT;
@@ -313,6 +315,50 @@ fn likely_scale(size: f64) -> Option<f64> {
         size if size < SMALL => [100.0, 1000.0].into_iter().find(|factor| plausible(*factor)),
         _ => None,
     }
+}
+
+/// The lowest position of an object relative to the ground.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Deepest {
+    /// Frame of that position.
+    pub frame: i32,
+    /// Its y (m).
+    pub y_m: f64,
+    /// Height above the ground (m); negative below it.
+    pub above_ground_m: f64,
+    /// Depth below the snow's top (m); negative above it.
+    pub below_top_m: f64,
+}
+
+/// Summary of an object over the shot.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ObjectReport {
+    /// Its file.
+    pub file: String,
+    /// collide, base or grains.
+    pub role: &'static str,
+    /// Its triangles.
+    pub triangles: usize,
+    /// Open loops that are closed; loops that share a vertex count once.
+    pub closed_loops: usize,
+    /// Holes at the first frame, counted as in `frazil mesh check`.
+    pub holes: usize,
+    /// Edges where its triangles disagree on inside and outside.
+    pub contradictions: usize,
+    /// Width, height and depth at the first frame (m).
+    pub size_m: [f64; 3],
+    /// Minimum and maximum position over the shot (m).
+    pub bounds_m: [[f64; 3]; 2],
+    /// Maximum speed of a vertex between two frames (m/s), and the frame that ends that step.
+    pub fastest_m_per_s: f64,
+    /// See [`ObjectReport::fastest_m_per_s`].
+    pub fastest_frame: i32,
+    /// First and last frame at which its bounds touch the snow's.
+    pub touches: Option<[i32; 2]>,
+    /// Its depth, if the ground is known and the object comes over it.
+    pub deepest: Option<Deepest>,
+    /// How its clip must be carried.
+    pub walk: Option<Walk>,
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! The stage `base`: objects press into the layer of snow.
 
+use crate::scene::snow::stages::frames::grids;
+use crate::scene::snow::stages::frames::metadata;
 use serde_json::json;
 
 use super::settings;
@@ -14,8 +16,8 @@ use crate::scene::snow::inputs::Inputs;
 use crate::scene::{BaseMode, Scene, moving};
 use crate::snow::base_layer::{BaseLayer, Changes, Grids, Params, StepReport};
 use crate::sweep::{Body, TOLERANCE};
-use crate::vdb::file::{self, WriteOptions, to_bytes};
-use crate::vdb::{FloatGrid, MetaValue};
+use crate::vdb::file::{WriteOptions, to_bytes};
+use crate::vdb::FloatGrid;
 
 /// The layer of a scene, pressed by its objects.
 pub struct Base<'a> {
@@ -215,62 +217,10 @@ impl Writer {
     }
 }
 
-/// The layer after a frame: from its own file, or from the last whole one and the changes since.
-///
-/// # Errors
-/// A missing frame; a file that is not what was written.
-pub(in crate::scene::snow) fn grids(ctx: &Context, done: &Stored, frame: i32) -> Result<Grids> {
-    let mut frames = done.frames_to(frame)?;
-    let whole = frames.next().unwrap_or(frame);
-    let mut grids = read_grids(done, whole)?;
-    for later in frames {
-        follow(ctx, done, &mut grids, later)?;
-    }
-    Ok(grids)
-}
-
-/// Updates a layer from the frame before to a frame that stores its changes.
-pub(in crate::scene::snow) fn follow(
-    ctx: &Context,
-    done: &Stored,
-    grids: &mut Grids,
-    frame: i32,
-) -> Result<()> {
-    ctx.check()?;
-    grids.apply_delta(ctx, &read_grids(done, frame)?)
-}
-
-fn read_grids(done: &Stored, frame: i32) -> Result<Grids> {
-    let path = done.state_file(frame)?;
-    Grids::from_named(file::read_own(&path)?).map_err(|error| match error {
-        Error::Argument(what) => Error::file(path, what),
-        other => other,
-    })
-}
-
 /// A frame's .vdb file.
 fn vdb_bytes(scene: &Scene, frame: i32, grids: &[&FloatGrid], made_from: &str) -> Result<Vec<u8>> {
     let metadata = metadata(scene, frame, made_from);
     to_bytes(grids, &WriteOptions { metadata, half: scene.output.half, ..WriteOptions::default() })
-}
-
-/// Metadata of every .vdb file of a shot.
-pub(in crate::scene::snow) fn metadata(
-    scene: &Scene,
-    frame: i32,
-    made_from: &str,
-) -> Vec<(String, MetaValue)> {
-    let fps = scene.shot.fps;
-    let text = |text: &str| MetaValue::Text(text.into());
-    vec![
-        ("frazil:frame".into(), MetaValue::Int(frame.into())),
-        ("frazil:fps".into(), MetaValue::Double(fps)),
-        ("frazil:seconds".into(), MetaValue::Double(f64::from(frame) / fps)),
-        ("frazil:units".into(), text("metres")),
-        ("frazil:up".into(), text("y")),
-        ("frazil:version".into(), text(env!("CARGO_PKG_VERSION"))),
-        ("frazil:inputs".into(), text(made_from)),
-    ]
 }
 
 fn told(report: StepReport) -> Report {

@@ -7,7 +7,7 @@
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use super::base;
+use super::frames;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::points::{Column, Points, Values};
@@ -94,7 +94,7 @@ pub(in crate::scene::snow) fn write(
     points: &Points,
     before: Option<&Points>,
 ) -> Result<()> {
-    let mut metadata = base::metadata(scene, files.frame, files.made_from);
+    let mut metadata = frames::metadata(scene, files.frame, files.made_from);
     let bytes = |points: &Points, metadata| {
         points::to_bytes(ctx, NAME, points, &WriteOptions { metadata, ..WriteOptions::default() })
     };

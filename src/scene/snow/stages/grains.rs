@@ -1,15 +1,16 @@
 //! The stage `grains`: snow removed from the base is pushed, piled and thrown.
 
+use crate::scene::snow::grain_params::params;
 use std::path::Path;
 use std::sync::OnceLock;
 
 use serde_json::json;
 
-use super::base;
+use super::frames;
 use super::grain_files::{self, WHOLE_EVERY, ordered, told_apart};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::geometry::{DVec3, Points, TriMesh};
+use crate::geometry::{Points, TriMesh};
 use crate::io::particles::ply;
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::points;
@@ -21,10 +22,9 @@ use crate::scene::schema::keys::{first_of, settings_of};
 use crate::scene::snow::estimate::grains::Forecast;
 use crate::scene::snow::initial_grains;
 use crate::scene::snow::inputs::Inputs;
-use crate::scene::snow::keys::grains::material;
 use crate::scene::{self, Role, Scene, System, moving};
 use crate::snow::base_layer::Grids;
-use crate::snow::grains::{self, Base, Ground, Object, Params, StepReport, Surroundings};
+use crate::snow::grains::{self, Base, Ground, Object, StepReport, Surroundings};
 use crate::sweep::Body;
 
 /// The stage for a scene.
@@ -132,10 +132,10 @@ impl<'a> Grains<'a> {
         match before {
             Some(before) if stored.keeps_changes(frame) => {
                 let mut layer = before.deep_copy()?;
-                base::follow(ctx, stored, &mut layer, frame)?;
+                frames::follow(ctx, stored, &mut layer, frame)?;
                 Ok(layer)
             }
-            _ => base::grids(ctx, stored, frame),
+            _ => frames::grids(ctx, stored, frame),
         }
     }
 
@@ -174,34 +174,6 @@ impl<'a> Grains<'a> {
             );
         }
         Ok(report)
-    }
-}
-
-/// Parameters of the grains of a scene with cells of `cell` m.
-pub(in crate::scene::snow) fn params(scene: &Scene, cell: f64) -> Params {
-    let values = &scene.values;
-    let number = |name: &str| values.number(&format!("grains.{name}"));
-    let whole = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.whole());
-    let usual = Params::for_cell(cell);
-    let radius = number("radius").unwrap_or(usual.radius);
-    let [friction, attraction] = material(values, radius);
-    let keep_box = values.get("grains.keep_box").and_then(|value| value.numbers());
-    Params {
-        radius,
-        compression: values.settled("grains", None, "compression"),
-        friction,
-        attraction,
-        restitution: values.settled("grains", None, "restitution"),
-        air: values.settled("grains", None, "air"),
-        air_by_density: values.settled("grains", None, "air_by_density"),
-        gravity: values.settled("grains", None, "gravity"),
-        rests: values.settled("grains", None, "rest"),
-        active_distance: number("active_distance"),
-        lifetime: number("lifetime"),
-        keep_box: keep_box.map(|[a, b, c, d, e, f]| [DVec3::new(a, b, c), DVec3::new(d, e, f)]),
-        sub_steps: whole("substeps").map(|count| count as u32),
-        most: values.settled::<i64>("grains", None, "max") as usize,
-        seed: values.settled::<i64>("grains", None, "seed") as u64,
     }
 }
 

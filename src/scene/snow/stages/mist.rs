@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::base;
+use super::frames;
 use super::grain_files::Whole;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -173,10 +173,10 @@ impl<'a> Mist<'a> {
     fn go_to(&self, ctx: &Context, state: &mut State, base: &Stored, frame: i32) -> Result<()> {
         let layer = match state.layer.take() {
             Some((at, mut layer)) if at == frame - 1 && base.keeps_changes(frame) => {
-                base::follow(ctx, base, &mut layer, frame)?;
+                frames::follow(ctx, base, &mut layer, frame)?;
                 layer
             }
-            _ => base::grids(ctx, base, frame)?,
+            _ => frames::grids(ctx, base, frame)?,
         };
         state.layer = Some((frame, layer));
         Ok(())
@@ -345,7 +345,7 @@ impl Stepping for Mist<'_> {
         let (Some(mist), Some(files)) = (step.0, files) else { return Ok(()) };
         if self.scene.output.mist {
             let grids = Grids::of(&writer.ctx, &mist)?;
-            let metadata = base::metadata(self.scene, files.frame, files.made_from);
+            let metadata = frames::metadata(self.scene, files.frame, files.made_from);
             let grids = [GridRef::Floats(&grids.density), GridRef::Vectors(&grids.velocity)];
             let options = WriteOptions { metadata, ..WriteOptions::default() };
             files.save(NAME, "vdb", &any_to_bytes(&grids, &options)?)?;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::base;
+use super::frames;
 use crate::context::Context;
 use crate::error::Result;
 use crate::scene::run::Stored;
@@ -39,10 +39,10 @@ impl Rebuild {
         let grids = match self.at.take() {
             Some((before, mut grids)) if follows(before) => {
                 (before + 1..=frame)
-                    .try_for_each(|next| base::follow(ctx, &self.stored, &mut grids, next))?;
+                    .try_for_each(|next| frames::follow(ctx, &self.stored, &mut grids, next))?;
                 grids
             }
-            _ => base::grids(ctx, &self.stored, frame)?,
+            _ => frames::grids(ctx, &self.stored, frame)?,
         };
         Ok(&self.at.insert((frame, grids)).1)
     }

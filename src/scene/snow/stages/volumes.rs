@@ -3,8 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::grain_files::Whole;
-use super::grains::params;
-use super::{base, mist};
+use super::{frames, mist};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::points::Values;
@@ -18,6 +17,7 @@ use crate::scene::run::{
 use crate::scene::schema::keys::settings_of;
 use crate::scene::snow::Inputs;
 use crate::scene::snow::estimate::memory;
+use crate::scene::snow::grain_params::params;
 use crate::scene::snow::keys::volumes::Needs;
 use crate::scene::{Scene, VolumesOutput};
 use crate::snow::base_layer::Grids;
@@ -80,10 +80,10 @@ impl<'a> Volumes<'a> {
             let stored = self.stored(to.upstream, "base")?;
             let grids = match layer.take() {
                 Some((before, mut grids)) if before == to.frame - 1 && stored.keeps_changes(to.frame) => {
-                    base::follow(ctx, stored, &mut grids, to.frame)?;
+                    frames::follow(ctx, stored, &mut grids, to.frame)?;
                     grids
                 }
-                _ => base::grids(ctx, stored, to.frame)?,
+                _ => frames::grids(ctx, stored, to.frame)?,
             };
             source.base = Some(&layer.insert((to.frame, grids)).1.surface);
         }
@@ -143,7 +143,7 @@ impl<'a> Volumes<'a> {
     ) -> Result<(Files, Map<String, Value>)> {
         let (mut files, mut results) = (Files::new(), Map::new());
         let options = WriteOptions {
-            metadata: base::metadata(self.scene, source.frame, made_from),
+            metadata: frames::metadata(self.scene, source.frame, made_from),
             ..WriteOptions::default()
         };
         if self.asked.fog() {

@@ -1,6 +1,7 @@
 //! The mesh from frame to frame: it steps with the liquid, keeps its arrays through changes, and is replaced by an edited mesh if there is
 //! one. Some frames are computed ahead, for velocities and for changes that show before they happen.
 
+use crate::scene::surface::track::vertex_paths::Way;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -62,15 +63,6 @@ pub struct At {
     pub(in crate::scene::surface) source: Source,
     /// Whether the frame has no particles: its files then hold no mesh.
     pub(in crate::scene::surface) is_dry: bool,
-}
-
-/// The motion of vertices from the previous frame to this one.
-#[derive(Default)]
-pub(in crate::scene::surface) struct Way {
-    /// Velocities over the step (m/s) of the previous frame's vertices; empty at the first frame.
-    pub of_before: Vec<Vec3>,
-    /// Velocities over the step of the vertices at its end.
-    pub of_after: Vec<Vec3>,
 }
 
 impl<'a> Walk<'a> {

@@ -1,6 +1,5 @@
 //! The motion of vertices from one frame to the next, through changes of the mesh.
 
-use super::tracked_shot::Way;
 use crate::geometry::check::topology::around;
 use crate::geometry::{DVec3, Vec3};
 use crate::surface::Change;
@@ -63,4 +62,13 @@ impl Trail {
         let of_after = known.into_iter().map(Option::unwrap_or_default).collect();
         Way { of_before, of_after }
     }
+}
+
+/// The motion of vertices from the previous frame to this one.
+#[derive(Default)]
+pub(in crate::scene::surface) struct Way {
+    /// Velocities over the step (m/s) of the previous frame's vertices; empty at the first frame.
+    pub of_before: Vec<Vec3>,
+    /// Velocities over the step of the vertices at its end.
+    pub of_after: Vec<Vec3>,
 }

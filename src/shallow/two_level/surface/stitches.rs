@@ -4,7 +4,8 @@ use crate::shallow::Shallow;
 use crate::shallow::columns::NONE;
 use crate::shallow::surface::Counts;
 use crate::shallow::surface::quartets::cells::Entry;
-use crate::shallow::surface::quartets::odd::{OTHERS, add_triangles};
+use crate::shallow::surface::quartets::divide::OTHERS;
+use crate::shallow::surface::quartets::odd::add_triangles;
 use crate::shallow::two_level::Detail;
 
 /// The cell at each corner of a piece of the strip, north-west, north-east, south-west and south-east: whether it is coarse, and its

@@ -3,6 +3,7 @@
 //! The front of a solid is its outside. A sheet is oriented as in the base layer: faces that disagree with their neighbours follow the
 //! larger part, and the sheet as a whole faces up. Beyond its rim a sheet has no front: grains may fall past it.
 
+use crate::snow::grains::colliders::shell::RIM_CORNER;
 use rayon::prelude::*;
 
 use super::shell::Shell;
@@ -17,10 +18,6 @@ pub struct Ground {
 
 /// Friction of grains against the floor, ground and static meshes.
 pub const FRICTION: f32 = 0.5;
-
-/// Bits of a triangle's sides and corners that belong to the rim of a sheet: bit k is the side opposite to corner k, bit
-/// 3 + k the corner.
-pub const RIM_CORNER: u8 = 3;
 
 impl Ground {
     /// The ground formed by a mesh (m).

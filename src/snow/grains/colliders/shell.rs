@@ -7,7 +7,6 @@
 
 use rayon::prelude::*;
 
-use super::ground::RIM_CORNER;
 use super::touch::{FIRST_SHELL, Touch};
 use crate::geometry::DVec3;
 use crate::numeric::lanes::LANES;
@@ -468,3 +467,7 @@ fn nearest_weights(position: DVec3, a: DVec3, b: DVec3, c: DVec3) -> [f64; 3] {
     let sum = va + vb + vc;
     if sum <= 0.0 { [1.0, 0.0, 0.0] } else { [va / sum, vb / sum, vc / sum] }
 }
+
+/// Bits of a triangle's sides and corners that belong to the rim of a sheet: bit k is the side opposite to corner k, bit
+/// 3 + k the corner.
+pub const RIM_CORNER: u8 = 3;

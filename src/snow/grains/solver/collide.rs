@@ -1,9 +1,12 @@
 //! One correction of eight pairs of grains: impulses, pushes, and which grains are supported or woken.
 
 use super::contacts::Batch;
-use super::rest;
 use super::rows::{Part, Row, SUPPORTED, Shared};
-use super::solve::Coefficients;
+use crate::snow::grains::solver::density::SURROUNDED;
+use crate::snow::grains::solver::rest;
+use crate::snow::grains::solver::rest::Rest;
+use crate::snow::grains::solver::rows::V;
+
 use crate::numeric::lanes::{LaneMask, Lanes};
 
 /// Share of an overlap that a sub-step removes.
@@ -242,13 +245,51 @@ impl Contact {
     }
 }
 
+/// Constants of a sub-step.
+#[derive(Debug, Clone, Copy)]
+pub struct Coefficients {
+    /// Length of the sub-step (s).
+    pub dt: f32,
+    /// Diameter (m).
+    pub diameter: f32,
+    /// Gravity (m/s2).
+    pub gravity: V,
+    /// Direction opposite to gravity; 0 without gravity.
+    pub up: V,
+    /// Share of the velocity that drag removes in a sub-step: 1 - beta^dt.
+    pub air: f32,
+    /// The same by the number of neighbours that shelter a grain; none: neighbours do not shelter it.
+    pub air_by_neighbours: Option<[f32; SURROUNDED + 1]>,
+    /// Friction between grains that do not yet slide over each other.
+    pub friction: f32,
+    /// Friction between grains that slide.
+    pub friction_of_sliding: f32,
+    /// Square of the speed (m2/s2) above which a grain slides over another, or over a collider.
+    pub slides: f32,
+    /// Maximum impulse of attraction in a sub-step (m/s).
+    pub attraction: f32,
+    /// Speed that gravity adds in a sub-step (m/s).
+    pub weight: f32,
+    /// Share of its speed that a grain keeps in a bounce.
+    pub restitution: f32,
+    /// Minimum approach speed of a bounce (m/s): contacts that carry weight do not bounce.
+    pub bouncing: f32,
+    /// Maximum gap (diameters) at which grains attract each other.
+    pub band: f32,
+    /// When grains come to rest; none: never.
+    pub rest: Option<Rest>,
+    /// Whether all contacts are visited, even where all grains rest: the result is the same.
+    pub visits_all: bool,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::context::{Context, Pool};
     use crate::geometry::DVec3;
     use crate::snow::grains::Params;
-    use crate::snow::grains::heap::{Colliders, Division, Heap};
+    use crate::snow::grains::heap::{Colliders, Heap};
+    use crate::snow::grains::params::Division;
 
     /// Velocities (m/s) of a grain and of another that lands on it at 1 m/s, both supported.
     fn met(attraction: f32) -> [f32; 2] {

@@ -25,11 +25,7 @@ use crate::snow::grains::heap::{Colliders, Heap};
 const CELL: f32 = 2.0;
 /// Cells along a block's edge.
 const PER_BLOCK: i32 = (EDGE / CELL) as i32;
-/// Maximum number of grains in a cell that is not crowded; a random packing fits ten.
-pub const MOST: usize = 14;
-/// The same before a step: only a cell with more than this, for example from a file with many grains at one position, would give grains too
-/// many neighbours. Grains that the last step could not move out are not tried again.
-pub const MOST_BEFORE: usize = 64;
+
 /// Grains that a crowded cell keeps in addition to one for each octant that is clear of surfaces.
 const KEPT: usize = 2;
 /// A cell with fewer grains than this has free space.

@@ -1,6 +1,6 @@
 //! Grains in motion: pairs, contacts, rest, and corrections at the end of a step.
 
-mod collide;
+pub(in crate::snow) mod collide;
 pub(in crate::snow::grains) mod contacts;
 pub(in crate::snow::grains) mod crowd;
 pub(in crate::snow::grains) mod density;

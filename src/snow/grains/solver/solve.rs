@@ -11,56 +11,19 @@
 //! Columns are swept upward in a fixed order, in four sets within which they share no grain: any number of threads gives the same bytes.
 //! Eight pairs are solved at a time (`contacts`).
 
+use crate::snow::grains::solver::collide::Coefficients;
 use rayon::prelude::*;
 
 use super::collide::{Contact, Eight, FARTHEST, STEEP, TOUCHING, collide};
 use super::contacts::Batch;
-use super::density::SURROUNDED;
 use super::layout::{Block, Layout};
-use super::rest::{self, Rest};
+use super::rest::{self};
 use super::rows::{Part, Row, Shared, V, add, dot, norm, scaled, sub};
 use crate::context::Context;
 use crate::error::Result;
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::Lanes;
 use crate::snow::grains::colliders::touch::Touch;
-
-/// Constants of a sub-step.
-#[derive(Debug, Clone, Copy)]
-pub struct Coefficients {
-    /// Length of the sub-step (s).
-    pub dt: f32,
-    /// Diameter (m).
-    pub diameter: f32,
-    /// Gravity (m/s2).
-    pub gravity: V,
-    /// Direction opposite to gravity; 0 without gravity.
-    pub up: V,
-    /// Share of the velocity that drag removes in a sub-step: 1 - beta^dt.
-    pub air: f32,
-    /// The same by the number of neighbours that shelter a grain; none: neighbours do not shelter it.
-    pub air_by_neighbours: Option<[f32; SURROUNDED + 1]>,
-    /// Friction between grains that do not yet slide over each other.
-    pub friction: f32,
-    /// Friction between grains that slide.
-    pub friction_of_sliding: f32,
-    /// Square of the speed (m2/s2) above which a grain slides over another, or over a collider.
-    pub slides: f32,
-    /// Maximum impulse of attraction in a sub-step (m/s).
-    pub attraction: f32,
-    /// Speed that gravity adds in a sub-step (m/s).
-    pub weight: f32,
-    /// Share of its speed that a grain keeps in a bounce.
-    pub restitution: f32,
-    /// Minimum approach speed of a bounce (m/s): contacts that carry weight do not bounce.
-    pub bouncing: f32,
-    /// Maximum gap (diameters) at which grains attract each other.
-    pub band: f32,
-    /// When grains come to rest; none: never.
-    pub rest: Option<Rest>,
-    /// Whether all contacts are visited, even where all grains rest: the result is the same.
-    pub visits_all: bool,
-}
 
 /// Limits of the motion of grains in a sub-step.
 #[derive(Debug, Clone, Copy)]
@@ -408,7 +371,7 @@ mod tests {
     use super::*;
     use crate::numeric::cpu::FlushDenormals;
     use crate::snow::grains::Params;
-    use crate::snow::grains::heap::Division;
+    use crate::snow::grains::params::Division;
 
     #[test]
     fn a_push_of_any_length_leaves_a_finite_velocity() {

@@ -2,7 +2,7 @@
 
 use super::layout::At;
 use super::rows::{V, dot};
-use super::trapped::DEEP;
+
 use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::snow::grains::colliders::field::Window;
@@ -169,3 +169,6 @@ impl<'a> Surfaces<'a> {
         }
     }
 }
+
+/// Depth (diameters) beyond which a grain counts as inside a surface.
+pub const DEEP: f64 = 0.1;

@@ -2,6 +2,7 @@
 //! the surfaces around it, one after another, repeatedly. A grain that reaches no free position within a diameter and a half stays where it
 //! was, except that it is moved out of ground: it is *trapped*.
 
+use crate::snow::grains::solver::surfaces::DEEP;
 use rayon::prelude::*;
 
 use super::layout::{At, Layout, world};
@@ -14,8 +15,6 @@ use crate::snow::grains::colliders::search::around;
 use crate::snow::grains::colliders::touch::Touch;
 use crate::snow::grains::heap::Colliders;
 
-/// Depth (diameters) beyond which a grain counts as inside a surface.
-pub const DEEP: f64 = 0.1;
 /// A grain that is awake and this near (diameters) to the plane of a surface may be inside the surface itself.
 const NEAR: f32 = 0.1;
 /// Margin around a block (cells of a level set) for grains that left it or are moved.

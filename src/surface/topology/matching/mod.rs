@@ -20,12 +20,13 @@
 //! is needed where phi alone would change a sign: without it, a drop of phi that lies across the rim would be cut in two. As a last resort a
 //! free node beside one beyond reach keeps its Gamma if its sign would change. So no edge across the rim gains or loses a crossing.
 
-mod nodes;
+pub(in crate::surface) mod nodes;
 mod solve;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
 use nodes::Free;
+pub use nodes::Node;
 use solve::System;
 
 /// Nodes per task.
@@ -60,19 +61,6 @@ impl Default for Matching {
     fn default() -> Self {
         Self { solver: Solver::default(), tolerance: 0.01, reach: 12, most: 1000, omega: None }
     }
-}
-
-/// A node of the grid.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Node {
-    /// Its position (cells).
-    pub position: [i32; 3],
-    /// Signed distance from the mesh (cells), negative inside; may be clamped beyond sqrt(3).
-    pub gamma: f32,
-    /// Signed distance from the particles' surface (cells), negative inside; clamped to the width of its band.
-    pub phi: f32,
-    /// Whether Gamma follows phi here.
-    pub is_flagged: bool,
 }
 
 /// Result of a matching.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::solve::{NONE, Row};
-use super::{Node, PIECE};
+use super::PIECE;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::Coord;
@@ -231,6 +231,19 @@ impl Flagged {
         }
         self.has_within(index + 1, position, reach) || self.has_within(part.right as usize, position, reach)
     }
+}
+
+/// A node of the grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Node {
+    /// Its position (cells).
+    pub position: [i32; 3],
+    /// Signed distance from the mesh (cells), negative inside; may be clamped beyond sqrt(3).
+    pub gamma: f32,
+    /// Signed distance from the particles' surface (cells), negative inside; clamped to the width of its band.
+    pub phi: f32,
+    /// Whether Gamma follows phi here.
+    pub is_flagged: bool,
 }
 
 #[cfg(test)]

@@ -1,0 +1,87 @@
+//! The stages of a scene, and what they have in common.
+
+use crate::error::Error;
+use crate::error::Result;
+use crate::io::records::input_hashes::Seen;
+use crate::scene::Scene;
+use crate::scene::run::cache::Cache;
+use crate::scene::run::pass::AnyStage;
+use crate::scene::run::stage::Stage;
+use crate::scene::run::stored::Stored;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A scene with its stages, upstream stages first.
+pub struct Plan<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Contents of its files when they were read.
+    pub seen: &'a Arc<Seen>,
+    /// Its stages.
+    pub stages: Vec<Box<dyn AnyStage + 'a>>,
+}
+
+impl Plan<'_> {
+    /// The stages, as descriptions.
+    pub fn stages(&self) -> impl Iterator<Item = &dyn Stage> {
+        self.stages.iter().map(|stage| stage.as_stage())
+    }
+
+    /// Names of all stages, in their order.
+    pub fn names(&self) -> Vec<&'static str> {
+        self.stages().map(|stage| stage.name()).collect()
+    }
+
+    /// The stages with these names, by index; all if there are no names.
+    pub fn chosen(&self, only: &[String]) -> Result<Vec<usize>> {
+        if let Some(unknown) = only.iter().find(|name| !self.names().contains(&&name[..])) {
+            let names = self.names().join(", ");
+            let what = format!("has no stage \"{unknown}\": its stages are {names}");
+            return Err(Error::file(&self.scene.path, what));
+        }
+        let wanted = |stage: &dyn Stage| only.is_empty() || only.iter().any(|name| name == stage.name());
+        Ok(self
+            .stages()
+            .enumerate()
+            .filter(|(_, stage)| wanted(*stage))
+            .map(|(position, _)| position)
+            .collect())
+    }
+
+    /// The stages that depend on these, directly or indirectly, by index.
+    pub fn downstream(&self, of: &[usize]) -> Vec<usize> {
+        let mut names: Vec<&str> = of.iter().map(|position| self.stages[*position].name()).collect();
+        let mut out = Vec::new();
+        for (position, stage) in self.stages().enumerate() {
+            if stage.upstream().iter().any(|upstream| names.contains(upstream)) {
+                names.push(stage.name());
+                out.push(position);
+            }
+        }
+        out
+    }
+
+    /// Refuses frames that the chosen stages read from other stages, if this scene would not make them as they are.
+    pub fn refuse_stale(&self, chosen: &[usize], folder: &Path) -> Result<()> {
+        for reader in chosen.iter().map(|position| self.stages[*position].as_stage()) {
+            let is_read = |position: &usize| reader.upstream().contains(&self.stages[*position].name());
+            for position in
+                (0..self.stages.len()).filter(|position| is_read(position) && !chosen.contains(position))
+            {
+                let stage = self.stages[position].as_stage();
+                let upstream = stage.upstream().iter().map(|name| Stored::read(folder, name));
+                let upstream: Vec<Stored> = upstream.collect::<Result<_>>()?;
+                let upstream: Vec<&Stored> = upstream.iter().collect();
+                Cache::refuse_stale(stage, self.seen, folder, reader.name(), &upstream)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the exact states of all frames of a stage are kept: the stage itself, or another one, reads them.
+    pub fn keeps_states_of(&self, of: &dyn Stage) -> bool {
+        let reads =
+            |stage: &dyn Stage| stage.upstream().contains(&of.name()) && stage.reads_state_of(of.name());
+        of.keeps_every_state() || self.stages().any(reads)
+    }
+}
