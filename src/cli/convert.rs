@@ -3,6 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use serde_json::json;
+
+use super::each::Each;
+use super::options::{Axis, MeshSpace, positive, warn_if_far};
+use super::session::Session;
+use super::session::exit::{Failure, Phase};
+use super::{output, points};
 use frazil::geometry::mesh::attributes::On;
 use frazil::geometry::{MeshArray, TriMesh, Uvs, Vec3};
 use frazil::io;
@@ -13,14 +20,6 @@ use frazil::io::usd;
 use frazil::io::usd::points::VELOCITIES;
 use frazil::motion::{Character, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs};
 use frazil::scene::{FrameChoice, Frames};
-use serde_json::json;
-
-use super::each::Each;
-use super::options::{Axis, MeshSpace, positive, warn_if_far};
-use super::output;
-use super::points;
-use super::session::Session;
-use super::session::exit::{Failure, Phase};
 
 /// Convert meshes, sequences of meshes, characters and points to other files.
 ///

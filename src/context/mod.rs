@@ -8,10 +8,11 @@ mod phases;
 mod pool;
 mod progress;
 
-use crate::context::locking::lock;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
+
+use locking::lock;
 
 pub use cancel::Running;
 pub use memory::{machine_memory, peak_memory};

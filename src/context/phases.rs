@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
-use crate::context::locking::lock;
+use super::locking::lock;
 
 /// How long one phase took, over all its runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use std::sync::Mutex;
 
-use crate::context::locking::lock;
+use super::locking::lock;
 
 /// What is being done, for a progress display.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -29,7 +29,6 @@ mod vorticity;
 mod window;
 
 pub use crate::flow::advection::scheme::Scheme;
-use crate::flow::advection::scheme::Way;
 pub use advection::conserve::Keeping;
 pub use advection::paths::FARTHEST;
 pub use pressure::Solved;
@@ -37,10 +36,11 @@ pub use solids::{Faces, Solids};
 pub use state::Kept;
 pub use tiles::{Coord, Field, Tile, Tiles};
 
+use rayon::prelude::*;
+
 use crate::context::Context;
 use crate::error::{Error, Result};
 use pressure::multigrid::Multigrid;
-use rayon::prelude::*;
 use scratch::Room;
 
 /// A velocity, a density and a pressure on sparse tiles.
@@ -167,37 +167,6 @@ impl Flow {
                 }
             });
         }
-    }
-
-    /// Advects velocity and density for a time (s). Paths longer than [`FARTHEST`] cells are clamped.
-    ///
-    /// # Errors
-    /// Cancel; the fields are then invalid.
-    pub fn advect(&mut self, ctx: &Context, dt: f64, scheme: Scheme) -> Result<()> {
-        self.carry(ctx, dt, scheme, None)
-    }
-
-    /// The same with [`Scheme::Bounded`], with mass conservation: a density that is not negative keeps the requested share of its mass, to
-    /// rounding, and what the scheme loses or gains is restored within two tiles. Some is lost only where density would have to grow by
-    /// more than a tenth: of the last mist that is thinner than `least`.
-    ///
-    /// # Errors
-    /// Cancel; the fields are then invalid.
-    pub fn advect_keeping(&mut self, ctx: &Context, dt: f64, keeping: Keeping) -> Result<()> {
-        self.carry(ctx, dt, Scheme::Bounded, Some(keeping))
-    }
-
-    fn carry(&mut self, ctx: &Context, dt: f64, scheme: Scheme, keeping: Option<Keeping>) -> Result<()> {
-        if let Some(around) = &mut self.around {
-            std::mem::swap(&mut around.room, &mut self.room);
-            let done = around.advect(ctx, dt, scheme);
-            std::mem::swap(&mut around.room, &mut self.room);
-            done?;
-        }
-        let Self { tiles, velocity, density, ambient, around, room, .. } = self;
-        let (scale, around) = (dt as f32 / self.cell, around.as_deref());
-        let way = Way { ambient: *ambient, scale, scheme, around, keeping };
-        advection::advect::advect(ctx, tiles, (velocity, density), &way, room)
     }
 
     /// Makes the velocity divergence-free: the remaining divergence, times the cell, is at most `tolerance` times the largest speed.

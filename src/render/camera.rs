@@ -1,8 +1,8 @@
 //! The camera: given, or placed so that everything is in the picture.
 
+use super::plane::Plane;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
-use crate::render::plane::Plane;
 
 /// Maximum edge of a picture (pixels).
 const LONGEST: u32 = 16_384;

@@ -1,12 +1,12 @@
 //! Cuts: a plane through a field, coloured by its values, and the lines in which surfaces meet the plane.
 
-use crate::render::plane::Plane;
 use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::camera::{Camera, Lens, Size};
 use super::picture::Picture;
+use super::plane::Plane;
 use super::ramp::ramp;
 use super::shade::{Colour, to_bytes};
 use crate::context::Context;

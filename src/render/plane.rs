@@ -1,7 +1,8 @@
 //! A plane of a picture that cuts a field.
 
-use crate::geometry::DVec3;
 use std::fmt;
+
+use crate::geometry::DVec3;
 
 /// A plane across one of the world's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,5 @@
 //! The mesh, frame by frame.
 
-use crate::surface::track::advect::validate_step;
-use crate::surface::tracked_mesh::REACH;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -22,11 +20,12 @@ use super::topology::coverage::Cover;
 use super::topology::lost_vertices::gather;
 use super::topology::particle_count::Crowd;
 use super::topology::uncovered_parts::{Apart, Lacking, Parts, Wanted};
-use super::track::advect::advect;
+use super::track::advect::{advect, validate_step};
 use super::track::deep_detail::{Deep, covers, sorted};
 use super::track::fade::fade;
 use super::track::prefetch::Ahead;
 use super::track::project::foot;
+use super::tracked_mesh::REACH;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::check::topology::Topology;

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::signed_distance::voxelise::{ALL, Band, Piece, Scratch, Voxeliser};
+use super::window::Window;
 use super::{Body, Settings};
 use crate::context::Context;
 use crate::distance::Face;
@@ -11,7 +12,6 @@ use crate::error::{Error, Result};
 use crate::geometry::{DVec3, TriMesh};
 use crate::motion::{Keys, Rigid};
 use crate::numeric::blocks::{Block, BlockEdit, DIM};
-use crate::sweep::window::Window;
 use crate::vdb::FloatGrid;
 
 /// Blocks per batch added to the grid; bounds the memory in addition to the grid.

@@ -2,11 +2,6 @@
 
 use std::path::Path;
 
-use frazil::io::files::atomic;
-use frazil::io::files::sequence::Pattern;
-use frazil::render::{Gif, Palette, Picture, delays};
-use frazil::{Error, Result};
-
 use super::drawing::{Drawing, Look, View};
 use super::in_order::in_order;
 use super::sources::Sources;
@@ -15,6 +10,10 @@ use crate::cli::preview::parts::Part;
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
 use crate::cli::shot::progress::FrameProgress;
+use frazil::io::files::atomic;
+use frazil::io::files::sequence::Pattern;
+use frazil::render::{Gif, Palette, Picture, delays};
+use frazil::{Error, Result};
 
 /// Maximum number of frames made at once: each holds its snow as triangles, and a memory limit applies to each of them.
 const MOST_AT_ONCE: usize = 4;

@@ -12,18 +12,17 @@ mod tint;
 
 use std::path::{Path, PathBuf};
 
+use super::session::Session;
+use super::session::exit::{Failure, Phase};
+use super::{options, output};
+use drawing::Look;
+use flipbook::Flipbook;
 use frazil::geometry::DVec3;
 use frazil::io::files::atomic;
 use frazil::io::files::sequence::Pattern;
 use frazil::io::mesh::extension;
 use frazil::render::{Camera, Light, Plane, Size};
 use frazil::scene::FrameChoice;
-
-use super::session::Session;
-use super::session::exit::{Failure, Phase};
-use super::{options, output};
-use drawing::Look;
-use flipbook::Flipbook;
 use sources::Sources;
 use tint::Tint;
 

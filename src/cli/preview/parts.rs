@@ -1,10 +1,12 @@
 //! What a picture shows.
 
-use frazil::geometry::DetailedMesh;
-use frazil::geometry::Points;
-use frazil::geometry::TriMesh;
+use std::path::{Path, PathBuf};
+
+use crate::cli::vdb::model;
+use crate::cli::vdb::model::Content;
+use frazil::geometry::{DetailedMesh, Points, TriMesh};
 use frazil::vdb::FloatGrid;
-use std::path::PathBuf;
+use frazil::{Error, Result, io};
 
 /// A part of a picture, as read.
 pub enum Part {
@@ -50,4 +52,28 @@ impl Wet {
             _ => Self::Blood,
         }
     }
+}
+
+/// Reads a .vdb file.
+///
+/// # Errors
+/// A file that cannot be read, or that holds nothing to draw.
+#[cfg(feature = "vdb")]
+pub fn of_vdb(path: &Path) -> Result<Vec<Part>> {
+    Ok(match model::read(path)? {
+        Content::Surface(grid) => vec![Part::Surface(grid)],
+        Content::Fogs(grids) => grids.into_iter().map(|grid| Part::Fog(path.to_path_buf(), grid)).collect(),
+        Content::Points(points) => vec![Part::Points(path.to_path_buf(), points)],
+    })
+}
+
+/// Reads points of a file other than .vdb.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn points_of(path: &Path) -> Result<Part> {
+    let cloud = io::particles::read(path)?;
+    let voxel = cloud.voxel_size.unwrap_or(0.01);
+    let points = cloud.into_points(Some(voxel)).map_err(|error| Error::file(path, error.to_string()))?;
+    Ok(Part::Points(path.to_path_buf(), points))
 }

@@ -3,14 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use crate::cli::preview::parts::{Part, of_vdb, points_of};
 use frazil::io::mesh::{self, extension};
 use frazil::scene::run::Stored;
 use frazil::scene::{Rebuild, RebuildGrains, Scene};
 use frazil::vdb::{FloatGrid, file};
 use frazil::{Context, Error, Result};
-
-use super::sources::{of_vdb, points_of};
-use crate::cli::preview::parts::Part;
 
 /// A shot's folder, read frame by frame.
 pub struct Shot {

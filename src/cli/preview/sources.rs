@@ -1,20 +1,16 @@
 //! The inputs of a picture: files, sequences and whole shots, read frame by frame.
 
-use crate::cli::preview::parts::Part;
 use std::path::{Path, PathBuf};
 
-use frazil::geometry::{DetailedMesh, Points, TriMesh};
+use crate::cli::preview::parts::{Part, of_vdb, points_of};
+use frazil::geometry::{DetailedMesh, TriMesh};
 use frazil::io::files::sequence::Pattern;
 use frazil::motion::{Character, Play, is_gltf};
-#[cfg(feature = "vdb")]
-use frazil::vdb::FloatGrid;
 use frazil::{Context, Error, Result, io};
 
 #[cfg(feature = "vdb")]
 use super::shot::Shot;
 use super::spill::Spill;
-#[cfg(feature = "vdb")]
-use crate::cli::vdb::model::{self, Content};
 
 /// An input to draw.
 enum Source {
@@ -200,28 +196,4 @@ fn of_file(path: &Path, clip: Option<&str>, frame: Option<f64>, fps: f64) -> Res
         _ => io::mesh::read_any(path)?.into_detailed().without_unused(),
     };
     Ok(vec![Part::Mesh(mesh)])
-}
-
-/// Reads points of a file other than .vdb.
-///
-/// # Errors
-/// A file that cannot be read.
-pub fn points_of(path: &Path) -> Result<Part> {
-    let cloud = io::particles::read(path)?;
-    let voxel = cloud.voxel_size.unwrap_or(0.01);
-    let points = cloud.into_points(Some(voxel)).map_err(|error| Error::file(path, error.to_string()))?;
-    Ok(Part::Points(path.to_path_buf(), points))
-}
-
-/// Reads a .vdb file.
-///
-/// # Errors
-/// A file that cannot be read, or that holds nothing to draw.
-#[cfg(feature = "vdb")]
-pub fn of_vdb(path: &Path) -> Result<Vec<Part>> {
-    Ok(match model::read(path)? {
-        Content::Surface(grid) => vec![Part::Surface(grid)],
-        Content::Fogs(grids) => grids.into_iter().map(|grid| Part::Fog(path.to_path_buf(), grid)).collect(),
-        Content::Points(points) => vec![Part::Points(path.to_path_buf(), points)],
-    })
 }

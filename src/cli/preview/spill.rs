@@ -2,14 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::cli::preview::parts::{Part, Wet};
 use frazil::geometry::TriMesh;
 use frazil::io::mesh;
 use frazil::scene::Scene;
 use frazil::scene::run::Stored;
 use frazil::scene::shallow::Around;
 use frazil::{Context, Error, Result};
-
-use crate::cli::preview::parts::{Part, Wet};
 
 /// The stage, and the kind of its files.
 const LIQUID: &str = "liquid";

@@ -2,9 +2,8 @@
 
 use std::str::FromStr;
 
-use frazil::geometry::DetailedMesh;
-
 use crate::cli::preview::parts::Wet;
+use frazil::geometry::DetailedMesh;
 
 /// A scalar that tints a liquid.
 #[derive(Clone, Debug, PartialEq, Eq)]

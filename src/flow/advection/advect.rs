@@ -7,14 +7,14 @@
 //! two cells' paths. All four fields follow these paths, one after the other: velocities in two passes each, first the guess with its
 //! bounds, then the correction.
 
-use crate::flow::advection::scheme::Scheme;
-use crate::flow::advection::scheme::Way;
 use rayon::prelude::*;
 
-use super::conserve::{self};
+use super::conserve::{self, Keeping};
 use super::paths::{At, Live, Paths, Ways, trace};
+use super::scheme::{Scheme, Way};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::flow::Flow;
 use crate::flow::outer_grid::Reader;
 use crate::flow::pressure::stencil::row_of;
 use crate::flow::scratch::Room;
@@ -22,6 +22,39 @@ use crate::flow::tiles::{Field, Tile, Tiles};
 use crate::flow::window::Window;
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::Lanes;
+
+impl Flow {
+    /// Advects velocity and density for a time (s). Paths longer than [`FARTHEST`] cells are clamped.
+    ///
+    /// # Errors
+    /// Cancel; the fields are then invalid.
+    pub fn advect(&mut self, ctx: &Context, dt: f64, scheme: Scheme) -> Result<()> {
+        self.carry(ctx, dt, scheme, None)
+    }
+
+    /// The same with [`Scheme::Bounded`], with mass conservation: a density that is not negative keeps the requested share of its mass, to
+    /// rounding, and what the scheme loses or gains is restored within two tiles. Some is lost only where density would have to grow by
+    /// more than a tenth: of the last mist that is thinner than `least`.
+    ///
+    /// # Errors
+    /// Cancel; the fields are then invalid.
+    pub fn advect_keeping(&mut self, ctx: &Context, dt: f64, keeping: Keeping) -> Result<()> {
+        self.carry(ctx, dt, Scheme::Bounded, Some(keeping))
+    }
+
+    fn carry(&mut self, ctx: &Context, dt: f64, scheme: Scheme, keeping: Option<Keeping>) -> Result<()> {
+        if let Some(around) = &mut self.around {
+            std::mem::swap(&mut around.room, &mut self.room);
+            let done = around.advect(ctx, dt, scheme);
+            std::mem::swap(&mut around.room, &mut self.room);
+            done?;
+        }
+        let Self { tiles, velocity, density, ambient, around, room, .. } = self;
+        let (scale, around) = (dt as f32 / self.cell, around.as_deref());
+        let way = Way { ambient: *ambient, scale, scheme, around, keeping };
+        advect(ctx, tiles, (velocity, density), &way, room)
+    }
+}
 
 /// Advects velocity (m/s, at lower faces) and density for a step. The rim keeps its values, except for the upper faces of cells.
 ///

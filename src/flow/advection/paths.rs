@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::scheme::Way;
 use crate::context::Context;
 use crate::error::Result;
-use crate::flow::advection::scheme::Way;
 use crate::flow::tiles::{FACES, Field, Tile, Tiles};
 use crate::flow::window::{Span, Window, max, min};
 use crate::numeric::cpu::dispatch;

@@ -1,7 +1,7 @@
 //! How values are advected.
 
+use super::conserve::Keeping;
 use crate::flow::Flow;
-use crate::flow::advection::conserve::Keeping;
 
 /// Advection scheme.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -1,9 +1,8 @@
 //! STL, binary and text: triangles whose corners are joined if they have the same position.
 
-use crate::io::mesh::stl_solids::HEADER;
-use crate::io::mesh::stl_solids::Joined;
 use std::io::Write;
 
+use super::stl_solids::{HEADER, Joined};
 use super::stl_text;
 use crate::geometry::{PolygonMesh, TriMesh};
 use crate::io::files::{source, text};
@@ -79,6 +78,7 @@ pub(in crate::io) fn write(out: &mut dyn Write, mesh: &TriMesh) -> std::io::Resu
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Vec3;
 
     fn read(bytes: &[u8]) -> Result<TriMesh, String> {
         parse(bytes, [0.0; 3]).map(|(mesh, _)| mesh.into_triangles())

@@ -1,8 +1,8 @@
 //! Solids of an .stl file, joined to one mesh.
 
-use crate::geometry::PolygonMesh;
-use crate::geometry::Vec3;
 use std::collections::HashMap;
+
+use crate::geometry::{PolygonMesh, Vec3};
 
 /// Bytes of a binary file before its triangles, of each triangle, and of the normal at its start.
 pub(in crate::io) const HEADER: usize = 84;

@@ -4,11 +4,10 @@
 //! comment. Normals are ignored, whatever they are. A facet may have more than three corners. The last solid may lack its `endsolid`; the
 //! caller then warns that the file may be cut short.
 
+use super::stl_solids::Joined;
 use crate::geometry::PolygonMesh;
-use crate::io::files::source;
-use crate::io::files::text;
 use crate::io::files::text::Words;
-use crate::io::mesh::stl_solids::Joined;
+use crate::io::files::{source, text};
 
 /// Facets between two checks of the stop flag.
 const PIECE: usize = 1 << 14;

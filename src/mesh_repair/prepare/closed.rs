@@ -1,10 +1,8 @@
 //! Triangles that are closed as a chain, and what was done to close them.
 
-use crate::geometry::DVec3;
-use crate::geometry::Vec3;
-use crate::geometry::check::edges::Use;
-use crate::geometry::check::edges::agree;
+use crate::geometry::check::edges::{Use, agree};
 use crate::geometry::mesh::weld::Weld;
+use crate::geometry::{DVec3, Vec3};
 
 /// Triangles that are closed as a chain and turned outward: along every edge as many run in one direction as in the other.
 #[derive(Debug)]

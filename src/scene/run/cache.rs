@@ -8,14 +8,13 @@ use serde::{Deserialize, Serialize};
 use super::chain::{Chain, Made};
 use super::settings::{self, Settings};
 use super::stage::Stage;
-use super::stored::Stored;
+use super::stored::{Kept, Stored};
 use crate::error::{Error, Result};
 use crate::io::files::hash::Hasher;
 use crate::io::records::checksummed;
 use crate::io::records::input_hashes::Seen;
 use crate::io::records::manifest::Manifest;
 use crate::scene::FrameChoice;
-use crate::scene::run::stored::Kept;
 
 /// The settings of all frames from `from` on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::plan::Plan;
 use super::stage::Stage;
 use super::stored::record_of;
 use crate::error::{Error, Result};
 use crate::io::files::{atomic, hash};
 use crate::io::records::checksummed;
 use crate::scene::FrameChoice;
-use crate::scene::run::plan::Plan;
 
 /// The scene with its defaults.
 pub(super) const SCENE: &str = "scene.toml";
@@ -114,9 +114,7 @@ impl Own {
         }
         if scene.output.usd {
             let of_stages = plan.stages().flat_map(|stage| stage.loose_files().iter().copied());
-            std::iter::once(SHOT)
-                .chain(of_stages)
-                .try_for_each(|name| self.refuse_changed(name, None))?;
+            std::iter::once(SHOT).chain(of_stages).try_for_each(|name| self.refuse_changed(name, None))?;
         }
         self.refuse_changed(SCENE, Some(&new))?;
         let asked = frames.first()..=frames.last();

@@ -1,6 +1,5 @@
 //! A stage's pass over the frames: while one frame is computed, the files of the previous one are written.
 
-use crate::scene::run::stored::Kept;
 use std::panic::resume_unwind;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,7 +10,7 @@ use serde_json::json;
 use super::cache::Cache;
 use super::chain::Made;
 use super::stage::{FrameFiles, Report, Stage, Stepped, Stepping, To};
-use super::stored::Stored;
+use super::stored::{Kept, Stored};
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::io::files::atomic;

@@ -1,15 +1,15 @@
 //! The stages of a scene, and what they have in common.
 
-use crate::error::Error;
-use crate::error::Result;
-use crate::io::records::input_hashes::Seen;
-use crate::scene::Scene;
-use crate::scene::run::cache::Cache;
-use crate::scene::run::pass::AnyStage;
-use crate::scene::run::stage::Stage;
-use crate::scene::run::stored::Stored;
 use std::path::Path;
 use std::sync::Arc;
+
+use super::cache::Cache;
+use super::pass::AnyStage;
+use super::stage::Stage;
+use super::stored::Stored;
+use crate::error::{Error, Result};
+use crate::io::records::input_hashes::Seen;
+use crate::scene::Scene;
 
 /// A scene with its stages, upstream stages first.
 pub struct Plan<'a> {

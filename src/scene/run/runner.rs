@@ -1,6 +1,5 @@
 //! Runs the stages of a scene into a folder, resuming where an earlier run stopped.
 
-use crate::scene::run::plan::Plan;
 use std::fs::File;
 use std::panic::resume_unwind;
 use std::path::Path;
@@ -8,13 +7,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::ScopedJoinHandle;
 
 use super::cache::{Asked, Cache, refuse_asked};
-use super::chain;
-use super::own_files;
 use super::own_files::Own;
 use super::pass::{AnyStage, Pass, Shared};
+use super::plan::Plan;
 use super::stage::{Report, Stage};
 use super::stored::Stored;
-use super::usd;
+use super::{chain, own_files, usd};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::io::records::manifest::Manifest;

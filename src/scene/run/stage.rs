@@ -1,21 +1,19 @@
 //! What a part of a shot must provide so that the frame loop can make it.
 
-use crate::geometry::Points;
-use crate::geometry::Uvs;
-use crate::io::usd::Field;
-use crate::io::usd::materials::Look;
-use crate::io::usd::primvars::Primvar;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value};
 
 use super::settings::Settings;
 use super::stored::Stored;
-
 use crate::context::{Context, PhaseTime};
 use crate::error::Result;
+use crate::geometry::{Points, Uvs};
 use crate::io::files::atomic;
 use crate::io::records::manifest::{Keeps, Written};
+use crate::io::usd::Field;
+use crate::io::usd::materials::Look;
+use crate::io::usd::primvars::Primvar;
 
 /// A folder of a stage's files: `base/base.0012.vdb`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

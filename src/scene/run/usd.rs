@@ -1,17 +1,12 @@
 //! `shot.usda`: the whole shot for programs that read USD.
 
-use super::own_files::Own;
-use super::stage::Stage;
+use super::own_files::{Own, SHOT};
+use super::plan::Plan;
+use super::stage::{Clip, MovingMesh, Prims, Stage, Volume};
 use super::stored::Stored;
 use crate::error::Result;
+use crate::io::usd;
 use crate::io::usd::materials::Look;
-use crate::io::usd::{self};
-use crate::scene::run::own_files::SHOT;
-use crate::scene::run::plan::Plan;
-use crate::scene::run::stage::Clip;
-use crate::scene::run::stage::MovingMesh;
-use crate::scene::run::stage::Prims;
-use crate::scene::run::stage::Volume;
 
 /// Writes the description of the existing frames, by relative paths.
 ///

@@ -1,5 +1,9 @@
 //! Reads a scene file: its tables, the values of their keys, and the typed data of its system.
 
+use std::path::{Path, PathBuf};
+
+use toml::de::DeTable;
+
 use super::key::{Fallback, Key, heading, is_many};
 use super::keys::{self, tables};
 use super::overrides::Override;
@@ -7,8 +11,6 @@ use super::toml_table::{Document, Table};
 use super::values::Values;
 use crate::error::{Error, Result};
 use crate::scene::{Object, Output, Scene, Shallow, Shot, Snow, Surface, System, snow};
-use std::path::{Path, PathBuf};
-use toml::de::DeTable;
 
 impl Scene {
     /// Reads a scene file. Relative paths in it are taken from its own folder.
@@ -185,9 +187,4 @@ fn inner_tables(keys: &[Key], table: &str) -> Vec<&'static str> {
 fn folder_of(path: &Path) -> Result<PathBuf> {
     let absolute = std::path::absolute(path).map_err(|error| Error::io(path, "find", error))?;
     Ok(absolute.parent().unwrap_or(Path::new("/")).to_path_buf())
-}
-
-/// A file's name without its folder.
-pub(in crate::scene) fn name(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }

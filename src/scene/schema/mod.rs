@@ -17,7 +17,7 @@ pub use overrides::Override;
 pub use template::{reference, template};
 pub use values::{Value, Values};
 
-pub(super) use file::name;
+pub(super) use crate::scene::schema::values::name;
 pub(super) use keys::{FAR, NO_ORIGIN, ORIGIN, ORIGIN_MEANS};
 pub(super) use template::rounded;
 pub(super) use toml_table::Table;

@@ -436,3 +436,8 @@ fn default(
         Fallback::Is(text) => with_value(key.name, text, |table| read(key, table, cell)),
     }
 }
+
+/// A file's name without its folder.
+pub(in crate::scene) fn name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}

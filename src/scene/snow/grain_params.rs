@@ -1,8 +1,8 @@
 //! The parameters of grains that a scene asks for.
 
+use super::keys::grains::material;
 use crate::geometry::DVec3;
 use crate::scene::Scene;
-use crate::scene::snow::keys::grains::material;
 use crate::snow::grains::Params;
 
 /// Parameters of the grains of a scene with cells of `cell` m.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use super::grain_params::params;
 use super::inputs::Inputs;
 use super::stages::grain_files::{changes_since, partial};
 use crate::context::Context;
@@ -16,7 +17,6 @@ use crate::io::particles::ply;
 use crate::io::records::input_hashes::Seen;
 use crate::scene::Scene;
 use crate::scene::schema::rounded;
-use crate::scene::snow::grain_params::params;
 use crate::snow::grains::{FASTEST, Grains, Params};
 use crate::vdb::{FloatGrid, points};
 

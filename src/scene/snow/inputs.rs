@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::initial_grains::Drift;
 use super::inspect::warnings::{replaced, too_small};
-use super::stages::mist;
+use super::wind;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::check::orientation::{Closing, Orientation};
@@ -124,12 +124,12 @@ impl Inputs {
         }
         warnings.extend(replaced(&scene.values));
         let drift = Drift::of(scene, snow.cell, &seen, &mut warnings)?;
-        let wind = match mist::wind_file(scene) {
+        let wind = match wind::wind_file(scene) {
             None => None,
             Some(path) => {
                 // OpenVDB reads the file itself: its content must be the same before and after.
                 seen.hash(path)?;
-                let wind = mist::wind(path)?;
+                let wind = wind::wind(path)?;
                 seen.note(path, hash::of_file(path)?)?;
                 Some(wind)
             }

@@ -18,6 +18,7 @@ mod keys;
 mod plan;
 #[cfg(feature = "vdb")]
 mod stages;
+mod wind;
 
 pub(super) use keys::grains::{GRAIN_KEYS, check_grains, has_grains};
 pub(super) use keys::mist::{MIST_KEYS, check_mist, has_mist};

@@ -1,7 +1,8 @@
 //! Cells seen from above, and heights as integers.
 
-use crate::error::{Error, Result};
 use std::ops::Range;
+
+use crate::error::{Error, Result};
 
 /// The maximum integer height; heights lie from 0 to this, so that sums of two of them fit 32 bits.
 pub const TOP: i32 = 1 << 30;

@@ -1,9 +1,8 @@
 //! What a surface is made of, how it is laid out, and where it is written.
 
-use crate::error::Error;
-use crate::error::Result;
+use super::rim::ledges::Ledges;
+use crate::error::{Error, Result};
 use crate::shallow::scalars::MOST;
-use crate::shallow::surface::rim::ledges::Ledges;
 
 /// The liquid in columns.
 #[derive(Debug, Clone, Copy, Default)]

@@ -3,9 +3,8 @@
 //! Each line is shifted by a symbolic (e, e^2) in (x, z), e infinitesimal, so that it meets no edge and no vertex. Nothing but the shift
 //! prefers a side: mirroring the scene or rotating it by 90 degrees gives the same bits unless a line meets an edge exactly.
 
-use super::lines::{LANES, ROUNDOFF, WHOLE, greater, integer_of, lesser, whole};
+use super::lines::{Corner, LANES, ROUNDOFF, WHOLE, greater, integer_of, lesser, whole};
 use crate::shallow::columns::grid::{Heights, TOP};
-use crate::shallow::terrain::lines::Corner;
 
 /// A triangle that lines may cross.
 pub struct Facet {

@@ -1,7 +1,6 @@
 //! The ground of both sizes of cells.
 
-use crate::shallow::columns::grid::Cells;
-use crate::shallow::columns::grid::{BOTTOMLESS, Grid};
+use crate::shallow::columns::grid::{BOTTOMLESS, Cells, Grid};
 use crate::shallow::pipes::pipe_rules::Apart;
 use crate::shallow::terrain::Solids;
 use crate::shallow::terrain::solids::{Solid, unite};

@@ -16,10 +16,10 @@ mod seam;
 mod shift;
 pub mod surface;
 
-use crate::shallow::columns::grid::Cells;
 use std::ops::Range;
 
 use super::Shallow;
+pub use super::columns::grid::Cells;
 use super::columns::grid::Grid;
 use super::params::Params;
 use super::remap::Moved;

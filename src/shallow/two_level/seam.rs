@@ -8,16 +8,14 @@
 use super::FINE;
 use super::rests::{Load, Rests, change, of_column};
 use crate::numeric::cpu::dispatch;
-use crate::shallow::Shallow;
-use crate::shallow::columns::grid::Cells;
-use crate::shallow::columns::grid::TOP;
+use crate::shallow::columns::grid::{Cells, TOP};
 use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::scalars::MOST;
 use crate::shallow::scalars::shares::level;
 use crate::shallow::solver::fast_films;
 use crate::shallow::solver::flux::{Kind, Of, Step, flux_of, split};
-use crate::shallow::time_step;
 use crate::shallow::time_step::Measures;
+use crate::shallow::{Shallow, time_step};
 
 /// Fine cells between the middles of a fine and a coarse cell.
 const APART: f32 = 1.5;

@@ -4,16 +4,14 @@
 //! untouched snow. The current height is computed from the snow itself, so that a layer resumed from its grids has the same numbers as one
 //! that never stopped.
 
-use crate::numeric::blocks::BlockEdit;
-use crate::numeric::blocks::Mask;
-use crate::snow::base_layer::removed_volume::filled;
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
 
 use super::removed_volume;
+use super::removed_volume::filled;
 use crate::error::Result;
-use crate::numeric::blocks::{Origin, Values};
+use crate::numeric::blocks::{BlockEdit, Mask, Origin, Values};
 use crate::vdb::{FloatGrid, Probe};
 
 /// Cells of a column block, at `x << 3 | z`.

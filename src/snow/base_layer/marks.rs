@@ -1,12 +1,11 @@
 //! Data on the snow besides its shape: when its surface last changed, and how far its columns are compressed.
 
-use crate::snow::base_layer::columns::Mark;
 use std::collections::{BTreeSet, HashMap};
 
 use rayon::prelude::*;
 
 use super::BaseLayer;
-use super::columns::{self, Column, Columns, Heights};
+use super::columns::{self, Column, Columns, Heights, Mark};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::numeric::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};

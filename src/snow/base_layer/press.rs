@@ -5,8 +5,8 @@
 
 use super::columns::{CELLS, add_by_cell};
 use super::removed_volume;
+use super::removed_volume::filled;
 use crate::numeric::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
-use crate::snow::base_layer::removed_volume::filled;
 use crate::sweep::Piece;
 use crate::vdb::Probe;
 

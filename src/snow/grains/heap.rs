@@ -1,13 +1,14 @@
 //! Grains and their motion: sub-steps of [`super::solver::solve`]; pairs are found again where grains have moved.
 
-use crate::snow::grains::params::Division;
 use rayon::prelude::*;
 
-use super::colliders::field::{Field, Seen};
+use super::colliders::field::Seen;
 use super::colliders::search::{Scratch, Search, Travel};
+pub use super::colliders::set::{Colliders, Floor, Pose};
 pub use super::colliders::shell::Shell;
 use super::colliders::touch;
 use super::colliders::touch::Touch;
+pub use super::params::Division;
 use super::solver::contacts::{Held, MOST as MOST_GRAINS};
 
 use super::solver::layout::{At, Layout, NONE, SUB_STEPS_AHEAD, holds, locate, order, settle, world};
@@ -19,29 +20,6 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::snow::grains::solver::collide::Coefficients;
-
-/// A level plane that grains lie on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Floor {
-    /// Height (m).
-    pub height: f64,
-    /// Friction against it.
-    pub friction: f32,
-}
-
-/// Writes the positions (m) of a mesh's vertices at a share 0..=1 of a step.
-pub type Pose<'a> = Box<dyn Fn(f64, &mut Vec<DVec3>) -> Result<()> + Send + Sync + 'a>;
-
-/// Colliders: grains cannot move them.
-#[derive(Default)]
-pub struct Colliders<'a> {
-    /// A level plane.
-    pub floor: Option<Floor>,
-    /// A level set that does not move during the step.
-    pub field: Option<Field<'a>>,
-    /// Meshes, each with its pose (m) at a share 0..=1 of the step, which ground ignores.
-    pub shells: Vec<(Shell, Pose<'a>)>,
-}
 
 /// Grains between two steps.
 #[derive(Clone)]
@@ -338,35 +316,6 @@ fn follow(shells: &mut [(Shell, Pose<'_>)], share: f64, pose: &mut Vec<DVec3>) -
         shell.follow(pose);
     }
     Ok(())
-}
-
-impl Floor {
-    /// Touches of a block's members near the floor.
-    fn touches(
-        &self,
-        block: &super::solver::layout::Block,
-        rows: &[Row],
-        diameter: f64,
-        reach: f32,
-    ) -> Vec<Touch> {
-        // Height of the floor above the bottom of the block (diameters).
-        let height =
-            (self.height / diameter - f64::from(block.at[1]) * f64::from(super::solver::layout::EDGE)) as f32;
-        let near = block.members.iter().filter(|slot| {
-            let row = &rows[**slot as usize];
-            row.position[1] - height - 0.5 < super::solver::contacts::SKIN + norm(row.velocity) * reach
-        });
-        let touch = |&grain: &u32| Touch {
-            grain,
-            collider: touch::FLOOR,
-            normal: [0.0, 1.0, 0.0],
-            offset: height + 0.5,
-            friction: self.friction,
-            is_ground: true,
-            ..Touch::default()
-        };
-        near.map(touch).collect()
-    }
 }
 
 /// Maximum number of grains in a cell that is not crowded; a random packing fits ten.

@@ -38,12 +38,10 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::geometry::points::{Attribute, Column, Points, Values};
 use crate::numeric::blocks::{DIM, Origin};
-
-use crate::snow::grains::heap::Starts;
-use crate::snow::grains::params::Division;
 use birth::claims::Claims;
 use birth::sourcing::Sourcing;
-use heap::Heap;
+use heap::{Heap, Starts};
+use params::Division;
 use solver::layout::locate;
 use surroundings::{Bounds, Obstacles, TIES, have_stayed};
 

@@ -1,11 +1,11 @@
 //! Parameters of grains.
 
+use super::solver::collide::Coefficients;
 use super::solver::density;
 use super::solver::rest::Rest;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::snow::grain_friction;
-use crate::snow::grains::solver::collide::Coefficients;
 
 /// How snow becomes grains and how they behave.
 #[derive(Debug, Clone, Copy, PartialEq)]

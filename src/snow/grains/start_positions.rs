@@ -1,9 +1,7 @@
 //! State of grains at the beginning of the last step: mist is raised along their paths from there.
 
-use crate::snow::grains::heap::Start;
-use rayon::prelude::*;
-
 use super::Grains;
+use super::heap::Start;
 use crate::geometry::DVec3;
 
 impl Grains {

@@ -2,8 +2,8 @@
 
 use super::colliders::field::Field;
 use super::colliders::ground::{FRICTION, Ground};
+use super::colliders::set::{Colliders, Floor};
 use super::colliders::shell::Shell;
-use super::heap::{Colliders, Floor};
 use super::{Base, Params};
 use crate::error::Result;
 use crate::geometry::{DVec3, TriMesh};

@@ -6,8 +6,7 @@ use std::collections::{HashMap, HashSet};
 use super::grid::cell_of;
 use super::paths::Paths;
 use crate::error::Result;
-use crate::geometry::Coord;
-use crate::geometry::DVec3;
+use crate::geometry::{Coord, DVec3};
 use crate::surface::Particles;
 use crate::surface::report::StepReport;
 

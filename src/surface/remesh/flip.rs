@@ -1,8 +1,8 @@
 //! Whether an edge should be flipped.
 
 use super::fans::{Edge, Fans, flipped};
+use super::improvable::TOO_LONG;
 use super::shape::{is_upright, least_angle, normal};
-use crate::surface::remesh::improvable::TOO_LONG;
 
 /// Triangles whose smallest angle (degrees) is at least this are left alone.
 const LEAST: f64 = 20.0;

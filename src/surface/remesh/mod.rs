@@ -22,10 +22,9 @@ mod relax;
 mod shape;
 mod strain;
 
-use crate::surface::remesh::improvable::is_long;
-use crate::surface::remesh::improvable::is_short;
 pub use improvable::Improvable;
 pub use improvable::Size;
+use improvable::{is_long, is_short};
 use rayon::prelude::*;
 
 use crate::context::Context;

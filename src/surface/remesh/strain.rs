@@ -2,8 +2,8 @@
 //! range, and an edge that jitters around a limit would be remeshed in every frame.
 
 use super::Improvable;
+use super::improvable::{TOO_LONG, TOO_SHORT};
 use crate::geometry::DVec3;
-use crate::surface::remesh::improvable::{TOO_LONG, TOO_SHORT};
 
 /// Change of a length since the reference from which on an edge is not at rest (targets, and [`Improvable::tremble`]). Particles at rest
 /// that jitter by 0.02 spacings change lengths by up to 0.02 targets, and by 0.01 spacings.

@@ -7,17 +7,14 @@
 //!
 //! If particles move farther than their spacing, a frame is divided, and the parts of their paths are followed one after the other.
 
-use crate::error::Error;
-use crate::surface::params::Weighting;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::context::Context;
-use crate::error::Result;
-use crate::geometry::Coord;
-use crate::geometry::DVec3;
+use crate::error::{Error, Result};
+use crate::geometry::{Coord, DVec3};
 use crate::surface::Particles;
-use crate::surface::params::Params;
+use crate::surface::params::{Params, Weighting};
 use crate::surface::particles::affine_fit::{Map, Near, Sums, sums};
 use crate::surface::particles::grid::Cells;
 use crate::surface::particles::paths::Paths;

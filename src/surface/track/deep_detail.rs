@@ -1,12 +1,11 @@
 //! Where the band of distances must reach farther than elsewhere: around the few vertices whose detail is deeper than that of nearly all
 //! others. A band that wide over the whole surface would take many times as long.
 
-use crate::surface::level_set::band::reach_in;
 use std::collections::BTreeMap;
 
-use crate::geometry::Coord;
-use crate::geometry::DVec3;
+use crate::geometry::{Coord, DVec3};
 use crate::numeric::blocks::DIM;
+use crate::surface::level_set::band::reach_in;
 use crate::surface::particles::grid::cell_of;
 use crate::surface::tracked_mesh::{DRIFT, REACH, WIDER};
 use crate::surface::tracker::Tracker;

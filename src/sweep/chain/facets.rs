@@ -5,20 +5,18 @@
 //! the volume, so one sample decides for a face unless its neighbourhood disagrees; then its corners are sampled too, and the face is
 //! clipped where it enters the volume.
 
-use crate::sweep::chain::facet::Corners;
-use crate::sweep::chain::facet::Facet;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use rayon::prelude::*;
 
+use super::facet::{Corners, Facet};
 use super::patch::patches;
-use super::prism::Prisms;
+use super::prism::{Point, Prisms};
 use crate::context::Context;
 use crate::distance::lattice::{Fixed, UNITS};
 use crate::distance::region::extent;
 use crate::distance::vectors::{cross, difference, dot, sub};
 use crate::error::Result;
-use crate::sweep::chain::prism::Point;
 use crate::sweep::signed_distance::bins::{Bins, each_voxel, voxel_of};
 use crate::sweep::signed_distance::exposure::{BURIED, Exposure, OPEN, THIN};
 

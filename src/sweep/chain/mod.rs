@@ -12,10 +12,10 @@ mod folds;
 mod patch;
 pub(in crate::sweep) mod prism;
 
-use crate::sweep::window::Window;
 use rayon::prelude::*;
 
 use super::moving_mesh::topology::Topology;
+use super::window::Window;
 use crate::context::Context;
 use crate::distance::Face;
 use crate::distance::lattice::{Fixed, UNITS};

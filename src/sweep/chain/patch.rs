@@ -6,13 +6,12 @@
 
 use rayon::prelude::*;
 
-use super::prism::Prisms;
+use super::facet::Facet;
+use super::prism::{Point, Prisms};
 use crate::context::Context;
 use crate::distance::lattice::{Fixed, UNITS};
 use crate::distance::vectors::{cross, difference, dot};
 use crate::error::Result;
-use crate::sweep::chain::facet::Facet;
-use crate::sweep::chain::prism::Point;
 use crate::sweep::signed_distance::bins::Bins;
 use crate::sweep::signed_distance::exposure::{Exposure, Spot};
 

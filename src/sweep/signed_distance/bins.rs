@@ -1,6 +1,5 @@
 //! Faces sorted by the unit cubes (bins) around voxels that they may pass through, and the winding number at any point.
 
-use crate::sweep::chain::prism::Point;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
@@ -11,7 +10,7 @@ use crate::distance::lists::Lists;
 use crate::distance::region::{Region, each_block, extent};
 use crate::distance::vectors::{cross, difference, dot, sub};
 use crate::distance::winding::Lines;
-use crate::sweep::chain::prism::{Prism, Prisms};
+use crate::sweep::chain::prism::{Point, Prism, Prisms};
 
 /// Faces per task: fixed, so that nothing depends on the number of threads.
 const GRAIN: usize = 1024;

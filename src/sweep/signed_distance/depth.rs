@@ -11,8 +11,7 @@ use crate::distance::lattice::UNITS;
 use crate::distance::nearest::Group;
 use crate::distance::triangle::{Offsets, Points, Triangle, to_each};
 use crate::distance::vectors::gap;
-use crate::sweep::chain::facet::Corners;
-use crate::sweep::chain::facet::Facet;
+use crate::sweep::chain::facet::{Corners, Facet};
 use crate::sweep::chain::facets::{halves, is_open, is_small, open_parts};
 use crate::sweep::chain::prism::Prisms;
 

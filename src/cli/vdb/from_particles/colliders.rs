@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::cli::session::Session;
+use crate::cli::vdb::far_mesh;
 use frazil::geometry::TriMesh;
 use frazil::io::files::sequence::Pattern;
 use frazil::surface::HALF_WIDTH;
@@ -9,9 +11,6 @@ use frazil::sweep::{Settings, voxelise_within};
 use frazil::vdb::level_set::{difference, to_mesh};
 use frazil::vdb::{FloatGrid, file};
 use frazil::{Context, Error, Result};
-
-use crate::cli::session::Session;
-use crate::cli::vdb::far_mesh;
 
 /// Relative tolerance for two lengths to be taken as equal.
 const ROUNDING: f64 = 1e-6;

@@ -3,6 +3,10 @@
 mod colliders;
 mod shape;
 
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
 use super::{Packing, check_name};
 use crate::cli::each::Each;
 use crate::cli::options::{MeshSpace, positive, triple};
@@ -15,7 +19,6 @@ use colliders::Colliders;
 use frazil::geometry::mesh::attributes::{Number, On};
 use frazil::geometry::points::{Attribute, Values};
 use frazil::geometry::{DVec3, MeshArray, TriMesh};
-use frazil::io;
 use frazil::io::files::sequence::Pattern;
 use frazil::io::mesh::extension;
 use frazil::io::particles::{self, Cloud};
@@ -23,10 +26,8 @@ use frazil::scene::{FrameChoice, Frames};
 use frazil::surface::{TOO_FAR, estimate_spacing, rough_spacing, specks, transfer};
 use frazil::vdb::file;
 use frazil::vdb::level_set::to_mesh;
-use frazil::{Context, Error, Result};
-use serde_json::json;
+use frazil::{Context, Error, Result, io};
 use shape::{Method, Recipe};
-use std::path::{Path, PathBuf};
 
 /// Make the surface of a liquid from its particles: a level set, a mesh, or both
 ///

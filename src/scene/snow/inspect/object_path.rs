@@ -1,10 +1,9 @@
 //! The path of an object over a shot, and warnings about it.
 
-use crate::scene::snow::inspect::foot_slip::Walk;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::foot_slip::walk;
+use super::foot_slip::{Walk, walk};
 use super::relief::Relief;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -12,7 +11,6 @@ use crate::geometry::DVec3;
 use crate::geometry::check::faults;
 use crate::motion::{Motion, Poses, span};
 use crate::scene::snow::Inputs;
-
 use crate::scene::{Object, Scene};
 use crate::snow::base_layer::Reach;
 use crate::snow::grains::FASTEST_OBJECT;

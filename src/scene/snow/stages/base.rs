@@ -1,9 +1,8 @@
 //! The stage `base`: objects press into the layer of snow.
 
-use crate::scene::snow::stages::frames::grids;
-use crate::scene::snow::stages::frames::metadata;
 use serde_json::json;
 
+use super::frames::{grids, metadata};
 use super::settings;
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
@@ -16,8 +15,8 @@ use crate::scene::snow::inputs::Inputs;
 use crate::scene::{BaseMode, Scene, moving};
 use crate::snow::base_layer::{BaseLayer, Changes, Grids, Params, StepReport};
 use crate::sweep::{Body, TOLERANCE};
-use crate::vdb::file::{WriteOptions, to_bytes};
 use crate::vdb::FloatGrid;
+use crate::vdb::file::{WriteOptions, to_bytes};
 
 /// The layer of a scene, pressed by its objects.
 pub struct Base<'a> {

@@ -1,13 +1,11 @@
 //! Base layers of frames that are done, and what files say of their frame.
 
 use crate::context::Context;
-use crate::error::Error;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::scene::run::Stored;
 use crate::snow::base_layer::Grids;
-use crate::vdb::MetaValue;
-use crate::vdb::file;
+use crate::vdb::{MetaValue, file};
 
 /// The layer after a frame: from its own file, or from the last whole one and the changes since.
 ///

@@ -1,6 +1,5 @@
 //! The stage `grains`: snow removed from the base is pushed, piled and thrown.
 
-use crate::scene::snow::grain_params::params;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -20,6 +19,7 @@ use crate::scene::run::{
 use crate::scene::schema::key::OBJECT;
 use crate::scene::schema::keys::{first_of, settings_of};
 use crate::scene::snow::estimate::grains::Forecast;
+use crate::scene::snow::grain_params::params;
 use crate::scene::snow::initial_grains;
 use crate::scene::snow::inputs::Inputs;
 use crate::scene::{self, Role, Scene, System, moving};

@@ -1,7 +1,5 @@
 //! The stage `mist`: fast grains raise powder into the air.
 
-use std::path::Path;
-
 use serde_json::json;
 
 use super::frames;
@@ -20,12 +18,13 @@ use crate::scene::run::{
 use crate::scene::schema::keys::{first_of, settings_of};
 use crate::scene::snow::inputs::Inputs;
 use crate::scene::snow::keys::mist::mist_params;
+use crate::scene::snow::wind::wind_file;
 use crate::scene::{Role, Scene, System, moving};
 use crate::snow::base_layer;
 use crate::snow::mist::{self, Around, Grids, Params, Source, Start, StepReport, Surroundings, Wind};
 use crate::sweep::Body;
 use crate::vdb::file::{WriteOptions, any_to_bytes};
-use crate::vdb::{AnyGrid, FloatGrid, GridRef, VectorGrid, file};
+use crate::vdb::{FloatGrid, GridRef, file};
 
 /// Name of the stage, and of the kind of its files.
 const NAME: &str = "mist";
@@ -60,35 +59,12 @@ pub struct Writer {
     ctx: Context,
 }
 
-/// The file of a scene's wind, if it is a grid.
-pub(in crate::scene::snow) fn wind_file(scene: &Scene) -> Option<&Path> {
-    scene.values.get("mist.wind").and_then(|value| value.path())
-}
-
 /// The density of the mist after a frame.
 ///
 /// # Errors
 /// A frame that does not exist; a file that was changed since it was written, or that has no such grid.
 pub(in crate::scene::snow) fn density(stored: &Stored, frame: i32) -> Result<FloatGrid> {
     file::read_own_named(&stored.file(frame, NAME)?, DENSITY)
-}
-
-/// The wind of a file: its first grid of vectors.
-///
-/// # Errors
-/// A file that cannot be read, or that has no such grid.
-pub(in crate::scene::snow) fn wind(path: &Path) -> Result<VectorGrid> {
-    let grids = file::describe(path)?;
-    let vectors = grids.iter().find(|grid| grid.value_type.starts_with("Tree_vec3s"));
-    let name = vectors.map(|grid| grid.name.clone()).ok_or_else(|| {
-        let names: Vec<String> =
-            grids.iter().map(|grid| format!("\"{}\" ({})", grid.name, grid.value_type)).collect();
-        Error::file(path, format!("has no grid of vectors for the wind, only {}", names.join(", ")))
-    })?;
-    match file::read_any(path, Some(&name))? {
-        AnyGrid::Vectors(grid) => Ok(grid),
-        AnyGrid::Floats(_) => Err(Error::file(path, format!("grid \"{name}\" is not one of vectors"))),
-    }
 }
 
 impl<'a> Mist<'a> {

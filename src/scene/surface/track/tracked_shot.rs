@@ -1,14 +1,13 @@
 //! The mesh from frame to frame: it steps with the liquid, keeps its arrays through changes, and is replaced by an edited mesh if there is
 //! one. Some frames are computed ahead, for velocities and for changes that show before they happen.
 
-use crate::scene::surface::track::vertex_paths::Way;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::frame_report::told;
 use super::saved_arrays::Kept;
-use super::vertex_paths::Trail;
+use super::vertex_paths::{Trail, Way};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::check::deviation::NearestTree;

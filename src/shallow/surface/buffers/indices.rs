@@ -198,7 +198,7 @@ mod tests {
     #[test]
     fn runs_follow_each_other() {
         let all = |positions| runs(positions).collect::<Vec<Range<usize>>>();
-        assert_eq!(all(0), []);
+        assert!(all(0).is_empty());
         assert_eq!(all(0xffff).first(), Some(&(0..16)));
         assert_eq!(all(0b1100_0000_0001_0110), [1..3, 4..5, 14..16]);
     }

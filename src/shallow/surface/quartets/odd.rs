@@ -1,12 +1,10 @@
 //! Odd quartets: groups of four and of three linked columns, whatever their layers (thesis 4.2.2).
 
 use super::cells::{Cells, Entry};
+use super::divide::{OTHERS, divide, three};
 use super::links::Scene;
 use super::strips::{Found, positions};
 use super::wall::Walled;
-use crate::shallow::surface::quartets::divide::OTHERS;
-use crate::shallow::surface::quartets::divide::divide;
-use crate::shallow::surface::quartets::divide::three;
 use crate::shallow::surface::rim::boundary::Walls;
 
 /// Scratch buffers of a search for groups.

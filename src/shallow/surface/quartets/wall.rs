@@ -1,8 +1,8 @@
 //! Odd quartets in which a surface ends at a wall: several entries of a cell may be linked with the same entry there.
 
 use super::cells::{Cells, Entry};
+use super::divide::{OTHERS, divide, three};
 use crate::shallow::surface::NONE;
-use crate::shallow::surface::quartets::divide::{OTHERS, divide, three};
 use crate::shallow::surface::rim::boundary::Wall;
 
 /// Entries of a quartet, and their links.

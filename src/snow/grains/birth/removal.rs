@@ -1,18 +1,14 @@
 //! Removed snow: how much of it is gone from each voxel.
 
+use std::collections::BTreeSet;
+
 use rayon::prelude::*;
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::numeric::blocks::BlockEdit;
-use crate::numeric::blocks::DIM;
-use crate::numeric::blocks::Origin;
-use crate::numeric::blocks::VOXELS;
-use crate::snow::base_layer::filled;
-use crate::snow::base_layer::removed_volume;
-use crate::vdb::FloatGrid;
-use crate::vdb::Probe;
-use std::collections::BTreeSet;
+use crate::numeric::blocks::{BlockEdit, DIM, Origin, VOXELS};
+use crate::snow::base_layer::{filled, removed_volume};
+use crate::vdb::{FloatGrid, Probe};
 
 /// Snow that a step removed from a block.
 #[derive(Debug, Clone, Copy, PartialEq)]

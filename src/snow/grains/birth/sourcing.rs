@@ -4,18 +4,17 @@
 //! many sites become grains as its removed volume pays for. Grains paid for beyond the available sites are owed and carried over, so that
 //! no snow is lost from slices thinner than a grain, few of which contain a site.
 
-use crate::snow::grains::birth::removal::Removal;
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
+use super::claims::Claims;
+use super::removal::Removal;
 use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::numeric::blocks::{DIM, Origin, VOXELS};
-use crate::vdb::FloatGrid;
-
-use super::claims::Claims;
 use crate::snow::grains::colliders::field::Window;
+use crate::vdb::FloatGrid;
 
 /// Packing of new grains: the share of space that they fill.
 pub const PACKING: f64 = 0.55;

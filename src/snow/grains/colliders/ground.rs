@@ -3,10 +3,9 @@
 //! The front of a solid is its outside. A sheet is oriented as in the base layer: faces that disagree with their neighbours follow the
 //! larger part, and the sheet as a whole faces up. Beyond its rim a sheet has no front: grains may fall past it.
 
-use crate::snow::grains::colliders::shell::RIM_CORNER;
 use rayon::prelude::*;
 
-use super::shell::Shell;
+use super::shell::{RIM_CORNER, Shell};
 use crate::geometry::mesh::weld::Weld;
 use crate::geometry::{DVec3, TriMesh};
 

@@ -1,12 +1,10 @@
 //! One correction of eight pairs of grains: impulses, pushes, and which grains are supported or woken.
 
 use super::contacts::Batch;
-use super::rows::{Part, Row, SUPPORTED, Shared};
-use crate::snow::grains::solver::density::SURROUNDED;
-use crate::snow::grains::solver::rest;
-use crate::snow::grains::solver::rest::Rest;
-use crate::snow::grains::solver::rows::V;
-
+use super::density::SURROUNDED;
+use super::rest;
+use super::rest::Rest;
+use super::rows::{Part, Row, SUPPORTED, Shared, V};
 use crate::numeric::lanes::{LaneMask, Lanes};
 
 /// Share of an overlap that a sub-step removes.
@@ -288,7 +286,8 @@ mod tests {
     use crate::context::{Context, Pool};
     use crate::geometry::DVec3;
     use crate::snow::grains::Params;
-    use crate::snow::grains::heap::{Colliders, Heap};
+    use crate::snow::grains::colliders::set::Colliders;
+    use crate::snow::grains::heap::Heap;
     use crate::snow::grains::params::Division;
 
     /// Velocities (m/s) of a grain and of another that lands on it at 1 m/s, both supported.

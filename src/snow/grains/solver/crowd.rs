@@ -19,7 +19,8 @@ use crate::context::Context;
 use crate::error::Result;
 #[cfg(test)]
 use crate::geometry::DVec3;
-use crate::snow::grains::heap::{Colliders, Heap};
+use crate::snow::grains::colliders::set::Colliders;
+use crate::snow::grains::heap::Heap;
 
 /// Edge of a cell (diameters): it holds 2 x 2 x 2 grains side by side.
 const CELL: f32 = 2.0;
@@ -396,8 +397,9 @@ mod tests {
     use super::*;
     use crate::context::Pool;
     use crate::geometry::mesh::TriMesh;
+    use crate::snow::grains::colliders::set::Floor;
     use crate::snow::grains::colliders::shell::Shell;
-    use crate::snow::grains::heap::Floor;
+    use crate::snow::grains::heap::MOST;
 
     /// Positions (m) of grains of diameter 1 m on a floor, beside a mesh, after crowding was relieved.
     fn spread(positions: &[DVec3], mesh: Option<(TriMesh, bool)>) -> Vec<DVec3> {

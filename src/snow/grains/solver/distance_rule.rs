@@ -11,8 +11,9 @@ use super::rest;
 use super::rows::{Row, norm};
 use crate::error::Result;
 use crate::geometry::DVec3;
+use crate::snow::grains::colliders::set::Pose;
 use crate::snow::grains::colliders::shell::Shell;
-use crate::snow::grains::heap::{Heap, Pose};
+use crate::snow::grains::heap::Heap;
 
 /// Speed above which a grain is fast, in sqrt(g d): a slower one rises by at most d / 32, too little to leave the hollow
 /// between the grains below it.

@@ -11,13 +11,12 @@
 //! Columns are swept upward in a fixed order, in four sets within which they share no grain: any number of threads gives the same bytes.
 //! Eight pairs are solved at a time (`contacts`).
 
-use crate::snow::grains::solver::collide::Coefficients;
 use rayon::prelude::*;
 
-use super::collide::{Contact, Eight, FARTHEST, STEEP, TOUCHING, collide};
+use super::collide::{Coefficients, Contact, Eight, FARTHEST, STEEP, TOUCHING, collide};
 use super::contacts::Batch;
 use super::layout::{Block, Layout};
-use super::rest::{self};
+use super::rest;
 use super::rows::{Part, Row, Shared, V, add, dot, norm, scaled, sub};
 use crate::context::Context;
 use crate::error::Result;

@@ -2,13 +2,12 @@
 
 use super::layout::At;
 use super::rows::{V, dot};
-
 use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::snow::grains::colliders::field::Window;
 use crate::snow::grains::colliders::nearby::Nearby;
+use crate::snow::grains::colliders::set::{Colliders, Floor, Pose};
 use crate::snow::grains::colliders::shell::{DEPTHS, Shell};
-use crate::snow::grains::heap::{Colliders, Floor, Pose};
 
 /// Search distance for surfaces (diameters): more than the longest step of a crowd's path, which starts anywhere in a cell with
 /// edges of two diameters and ends at the centre of the next, so that a mesh between the two is near both.

@@ -2,18 +2,17 @@
 //! the surfaces around it, one after another, repeatedly. A grain that reaches no free position within a diameter and a half stays where it
 //! was, except that it is moved out of ground: it is *trapped*.
 
-use crate::snow::grains::solver::surfaces::DEEP;
 use rayon::prelude::*;
 
 use super::layout::{At, Layout, world};
 use super::rows::{Row, V, add, dot};
-use super::surfaces::Surfaces;
+use super::surfaces::{DEEP, Surfaces};
 use crate::error::Result;
 use crate::snow::grains::colliders::field::Seen;
 use crate::snow::grains::colliders::nearby::Nearby;
 use crate::snow::grains::colliders::search::around;
+use crate::snow::grains::colliders::set::Colliders;
 use crate::snow::grains::colliders::touch::Touch;
-use crate::snow::grains::heap::Colliders;
 
 /// A grain that is awake and this near (diameters) to the plane of a surface may be inside the surface itself.
 const NEAR: f32 = 0.1;

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::solve::{NONE, Row};
 use super::PIECE;
+use super::solve::{NONE, Row};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::Coord;
