@@ -6,6 +6,7 @@
 pub mod check;
 #[cfg(feature = "vdb")]
 mod estimate;
+#[cfg(feature = "vdb")]
 mod grain_params;
 #[cfg(feature = "vdb")]
 mod initial_grains;
@@ -18,6 +19,7 @@ mod keys;
 mod plan;
 #[cfg(feature = "vdb")]
 mod stages;
+#[cfg(feature = "vdb")]
 mod wind;
 
 pub(super) use keys::grains::{GRAIN_KEYS, check_grains, has_grains};
