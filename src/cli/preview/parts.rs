@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::cli::vdb::model;
-use crate::cli::vdb::model::Content;
 use frazil::geometry::{DetailedMesh, Points, TriMesh};
+#[cfg(feature = "vdb")]
 use frazil::vdb::FloatGrid;
 use frazil::{Error, Result, io};
+
+#[cfg(feature = "vdb")]
+use crate::cli::vdb::model::{self, Content};
 
 /// A part of a picture, as read.
 pub enum Part {

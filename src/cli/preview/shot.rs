@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::cli::preview::parts::{Part, of_vdb, points_of};
+use super::parts::{Part, of_vdb, points_of};
 use frazil::io::mesh::{self, extension};
 use frazil::scene::run::Stored;
 use frazil::scene::{Rebuild, RebuildGrains, Scene};

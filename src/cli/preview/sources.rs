@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::cli::preview::parts::{Part, of_vdb, points_of};
 use frazil::geometry::{DetailedMesh, TriMesh};
 use frazil::io::files::sequence::Pattern;
 use frazil::motion::{Character, Play, is_gltf};
 use frazil::{Context, Error, Result, io};
 
+#[cfg(feature = "vdb")]
+use super::parts::of_vdb;
+use super::parts::{Part, points_of};
 #[cfg(feature = "vdb")]
 use super::shot::Shot;
 use super::spill::Spill;
