@@ -5,11 +5,11 @@
 //! the mesh is cut exactly along their outer faces: no search for triangles that fit between the old and the new surface is needed, since
 //! both share the cut.
 //!
-//! 1. `prepare.rs`: holes are closed, and parts turned outward: the solid is where the winding number is over 0.
+//! 1. `prepare/`: holes are closed, and parts turned outward: the solid is where the winding number is over 0.
 //! 2. `cut/pierces.rs`, `cut/exact.rs`: where the mesh passes through the grid, decided without rounding.
-//! 3. `region/faulty_cells.rs`: cells in which the mesh is at fault; `region.rs`: the cells that must be rebuilt with them.
-//! 4. `cut.rs`, `cut/polygon.rs`: the mesh outside these cells; `fill.rs`: marching cubes inside, sewn to it point by point.
-//! 5. `tidy.rs`: slivers among the new triangles are removed.
+//! 3. `region/faulty_cells.rs`: cells in which the mesh is at fault; `region/`: the cells that must be rebuilt with them.
+//! 4. `cut/`: the mesh outside these cells; `fill/`: marching cubes inside, sewn to it point by point.
+//! 5. `tidy/`: slivers among the new triangles are removed.
 //!
 //! # Glossary
 //!

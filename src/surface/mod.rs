@@ -7,7 +7,7 @@
 //! merged or split: they are flagged, and so are those beside which the mesh does not cover the surface (`topology/coverage.rs`).
 //!
 //! There the mesh is changed (`topology/change.rs`): its own signed distances take the topology of phi (`topology/mesh_distance.rs`,
-//! `topology/matching/`), and it is cut and rebuilt in the cells where it no longer fits (`repair/`). Parts without liquid are removed
+//! `topology/matching/`), and it is cut and rebuilt in the cells where it no longer fits (`mesh_repair`). Parts without liquid are removed
 //! (`topology/dry_parts.rs`), stretched edges are split and compressed ones collapsed (`remesh/`).
 //!
 //! # Glossary
@@ -102,7 +102,7 @@ impl Particles {
             }
         }
         if let Some(at) = self.positions.iter().position(|position| !position.iter().all(|x| x.is_finite())) {
-            return refuse(format!("the place of particle {} is not finite", at + 1));
+            return refuse(format!("the position of particle {} is not finite", at + 1));
         }
         if let Some(at) = self.velocities.iter().position(|speed| !speed.iter().all(|x| x.is_finite())) {
             return refuse(format!("the velocity of particle {} is not finite", at + 1));

@@ -201,7 +201,7 @@ pub(super) fn of_grid(
         points.attributes.push(Attribute { name: name.clone(), values });
     }
     if points.offsets.len() != points.cells.len() {
-        return Err("the .vdb file is damaged, or its points have no places".into());
+        return Err("the .vdb file is damaged, or its points have no positions".into());
     }
     position(&mut points, &head)?;
     points.validate().map_err(|error| error.to_string())?;

@@ -315,7 +315,7 @@ static void what_is_refused(frz_context *ctx, const ball *rest, const frz_grid *
     FAILS(frz_grains_emit(ctx, grains, VIEW(places, 3), VIEW(speeds, 3), 0, NULL), FRZ_ERROR_ARGUMENT, "velocities: element 1 is not finite");
     speeds[1][0] = 2e4f;
     FAILS(frz_grains_emit(ctx, grains, VIEW(places, 3), VIEW(speeds, 3), 0, NULL), FRZ_ERROR_ARGUMENT, "velocities: element 1 has a component that is not within -10000 to 10000 m/s");
-    FAILS(frz_grains_emit(ctx, grains, VIEW(places, 3), VIEW(speeds, 1), 0, NULL), FRZ_ERROR_ARGUMENT, "velocities: 1 elements, but there are 3 places");
+    FAILS(frz_grains_emit(ctx, grains, VIEW(places, 3), VIEW(speeds, 1), 0, NULL), FRZ_ERROR_ARGUMENT, "velocities: 1 elements, but there are 3 positions");
     view = VIEW(places, 3), view.stride = 8;
     FAILS(frz_grains_emit(ctx, grains, view, NO_VIEW, 0, NULL), FRZ_ERROR_ARGUMENT, "positions: the stride of 8 bytes is less than an element's 12");
     view.count = (size_t)-1 / 3, view.stride = 0;

@@ -295,7 +295,7 @@ const TRIANGLES: [Counted; 11] = [
     ("doubled_triangles", ["triangle with the corners of another", "triangles with the corners of another"]),
     (
         "doubled_vertices",
-        ["vertex at the place of another: joined", "vertices at the place of another: joined"],
+        ["vertex at the position of another: joined", "vertices at the position of another: joined"],
     ),
     (
         "near_vertices",
@@ -327,7 +327,7 @@ fn in_words(mesh: &Value) -> String {
         (true, _) if count("near_vertices") > 0 => {
             "a solid, once vertices within rounding of one position are joined"
         }
-        (true, _) => "a solid, once vertices at one place are joined",
+        (true, _) => "a solid, once vertices at one position are joined",
     };
     let [vertices, triangles, parts] = [
         ("vertices", ["vertex", "vertices"]),

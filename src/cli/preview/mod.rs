@@ -100,7 +100,7 @@ fn sun(text: &str) -> Result<(f64, f64), String> {
 }
 
 fn plane(text: &str) -> Result<Plane, String> {
-    let wrong = || "write an axis and a place on it (m), such as x=0.1".to_string();
+    let wrong = || "write an axis and a position on it (m), such as x=0.1".to_string();
     let (name, at) = text.split_once('=').ok_or_else(wrong)?;
     let axis = ["x", "y", "z"].iter().position(|axis| *axis == name.trim()).ok_or_else(wrong)?;
     let at = options::finite(at.trim()).map_err(|_| wrong())?;

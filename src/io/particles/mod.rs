@@ -155,7 +155,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Cloud> {
     let (cloud, left_out) = caught(path, || parse().map_err(|what| Error::file(path, one_line(&what))))?;
     if let Some(n) = cloud.positions.iter().position(|position| !position.iter().all(|part| part.is_finite()))
     {
-        return Err(Error::file(path, format!("the place of particle {} is not finite", n + 1)));
+        return Err(Error::file(path, format!("the position of particle {} is not finite", n + 1)));
     }
     if !left_out.is_empty() {
         let list = one_line(&left_out.join(", "));
@@ -183,7 +183,7 @@ pub fn write(path: &Path, points: &Points, keeps_voxels: bool) -> Result<()> {
             if !points.attributes.is_empty() {
                 let names: Vec<&str> =
                     points.attributes.iter().map(|attribute| &attribute.name[..]).collect();
-                log::warn!("{}: .xyz holds places only, without {}", path.display(), names.join(", "));
+                log::warn!("{}: .xyz holds positions only, without {}", path.display(), names.join(", "));
             }
             atomic::write(path, |out| xyz::write(out, points))
         }
@@ -202,7 +202,7 @@ fn warn_of_rounding(path: &Path, points: &Points) {
     let farthest = points.bounds().map_or(0.0, |(low, high)| low.amax().max(high.amax()));
     let moved = spacing(farthest) / 2.0;
     if moved > MOST_MOVED {
-        log::warn!("{}: places in 32 bits are rounded, by up to {moved} m", path.display());
+        log::warn!("{}: positions in 32 bits are rounded, by up to {moved} m", path.display());
     }
 }
 

@@ -1,5 +1,5 @@
 //! A little liquid on a terrain in scenes: the keys of `[shallow]` and of the tables beside it, the contents of its files ([`Inputs`]), the
-//! check ([`check`]), estimates of memory and disk space, the stage `liquid` (`stage.rs`), and the surroundings for a picture of it
+//! check ([`check`]), estimates of memory and disk space, the stage `liquid` (`stage/`), and the surroundings for a picture of it
 //! ([`Around`]).
 
 mod check;

@@ -107,7 +107,7 @@ impl Drift {
     fn check(&self, params: Params) -> std::result::Result<(), String> {
         let is_nan = |index: &usize| !self.positions[*index].iter().all(|x| x.is_finite());
         if let Some(point) = (0..self.positions.len()).find(is_nan) {
-            return Err(format!("the place of point {} is not finite", point + 1));
+            return Err(format!("the position of point {} is not finite", point + 1));
         }
         for (point, velocity) in self.velocities.iter().enumerate() {
             if !velocity.iter().all(|x| x.is_finite()) {

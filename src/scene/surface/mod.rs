@@ -1,5 +1,5 @@
 //! Meshes that follow a liquid in scenes: the keys of `[surface]`, the contents of its files ([`Inputs`]), the check ([`check`]), estimates
-//! of memory and disk space, and the stage `surface` (`track.rs`).
+//! of memory and disk space, and the stage `surface` (`track/`).
 
 #[cfg(feature = "vdb")]
 mod check;

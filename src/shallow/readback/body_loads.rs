@@ -69,7 +69,7 @@ impl Shallow {
             return Err(Error::argument(format!("density = {density} kg/m3 is not positive and finite")));
         }
         let bodies = self.bodies();
-        for (what, given) in [("velocities", velocities.len()), ("places", out.len())] {
+        for (what, given) in [("velocities", velocities.len()), ("loads", out.len())] {
             if given != bodies.len() {
                 let count = bodies.len();
                 return Err(Error::argument(format!(

@@ -46,7 +46,7 @@ pub fn solids(
         sample(&positions, &mut distances)?;
         if distances.len() != positions.len() {
             let (got, wanted) = (distances.len(), positions.len());
-            return Err(Error::argument(format!("the sampler returned {got} distances for {wanted} places")));
+            return Err(Error::argument(format!("the sampler returned {got} distances for {wanted} positions")));
         }
         for ((position, distance), index) in positions.iter().zip(&distances).zip(next..) {
             if !distance.is_finite() {
@@ -273,7 +273,7 @@ mod tests {
             *out = vec![1.0; 3];
             Ok(())
         });
-        assert_eq!(message(few), "the sampler returned 3 distances for 2000 places");
+        assert_eq!(message(few), "the sampler returned 3 distances for 2000 positions");
         let refused = solids(GRID, heights(), 0.5, [-1.0, 1.0], |_, _| Err(Error::argument("no grid")));
         assert_eq!(message(refused), "no grid");
     }

@@ -83,7 +83,7 @@ impl Caster {
             if let Some(index) = (0..size[axis] - 1).find(merges) {
                 let position = centre(axis, index);
                 return Err(Error::argument(format!(
-                    "a cell of {cell} m is too fine for places at {position:e} m"
+                    "a cell of {cell} m is too fine for positions at {position:e} m"
                 )));
             }
         }
@@ -487,7 +487,7 @@ mod tests {
         assert_eq!(caster(Grid { origin: [0.0, 2e30], ..GRID }), "an origin at 2e30 m is beyond 1e30 m");
         assert!(
             caster(Grid { origin: [1e17, 0.0], ..GRID })
-                .starts_with("a cell of 0.5 m is too fine for places at ")
+                .starts_with("a cell of 0.5 m is too fine for positions at ")
         );
         let mut caster = Caster::new(GRID, heights()).unwrap();
         let error = caster.cast(&positions, &triangles, [0..9, 0..8]).unwrap_err().to_string();

@@ -184,7 +184,7 @@ impl Grains {
     pub fn emit(&mut self, positions: &[DVec3], velocities: &[[f32; 3]], frame: i32) -> Result<u32> {
         if !velocities.is_empty() && velocities.len() != positions.len() {
             let text = format!(
-                "velocities: {} elements, but there are {} places",
+                "velocities: {} elements, but there are {} positions",
                 velocities.len(),
                 positions.len()
             );
@@ -318,7 +318,7 @@ impl Grains {
         self.wake_near(&removals, after.voxel_size());
         let claims = Claims::new(around.objects, self.params.compression, [from, to])?;
         let sourcing = Sourcing { diameter: self.heap.diameter, claims, seed: self.params.seed, frame };
-        ctx.allow("finding places for grains", sourcing.bytes(removals.len(), after.voxel_size()))?;
+        ctx.allow("finding positions for grains", sourcing.bytes(removals.len(), after.voxel_size()))?;
         let cell = after.voxel_size();
         let behind = |position: DVec3| around.is_behind(position, 2.0 * cell);
         let positions = sourcing.positions([before.grid(), after], &removals, &mut self.owed, behind)?;

@@ -217,7 +217,7 @@ impl<R: Read + Seek> Walk<R> {
             let (_, _, size) = self.entry(part)?;
             self.skip(size, part)?;
             if self.at > before {
-                return Err(damaged(format_args!("the {part} reaches beyond its place")));
+                return Err(damaged(format_args!("the {part} reaches beyond its bounds")));
             }
         }
         Ok(())

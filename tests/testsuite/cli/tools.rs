@@ -197,7 +197,7 @@ fn mesh_check_says_what_joining_vertices_by_position_hides() {
     assert_eq!((&report["solid"], &report["open_edges"]), (&true.into(), &0.into()));
     assert_eq!((&by_index["watertight"], &by_index["open_edges"]), (&false.into(), &36.into()));
     let said = works(folder.path(), "mesh check mesh.ply");
-    assert!(said.contains("mesh.ply: a solid, once vertices at one place are joined"), "{said}");
+    assert!(said.contains("mesh.ply: a solid, once vertices at one position are joined"), "{said}");
     assert!(said.contains("36 edges with one triangle, by the vertices' indices"), "{said}");
     // Two boxes with a corner in common.
     let [mut two, second] = [[-1.0, 0.0], [0.0, 1.0]].map(|[low, high]| TriMesh::cuboid([low; 3], [high; 3]));

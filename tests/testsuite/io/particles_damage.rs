@@ -180,7 +180,7 @@ fn a_position_that_is_not_finite_is_named() {
     ];
     for (name, bytes, particle) in cases {
         let error = parse(name, &bytes).unwrap_err().to_string();
-        assert_eq!(error, format!("{name}: the place of particle {particle} is not finite"));
+        assert_eq!(error, format!("{name}: the position of particle {particle} is not finite"));
     }
 }
 

@@ -214,7 +214,7 @@ fn what_leaves_the_area_rests_until_it_comes_back() {
     // High above a slope the nearest position is another one than that below.
     let said = works(folder, "check spill.toml --set source.2.at=[0,0.3,0]");
     assert!(
-        said.contains("source.2: the place of the terrain that is nearest to it")
+        said.contains("source.2: the point of the terrain that is nearest to it")
             && said.contains("beside it"),
         "{said}"
     );

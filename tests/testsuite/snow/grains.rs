@@ -196,7 +196,7 @@ fn loose_grains_are_added_or_refused_all_together() {
         (&[at(f64::NAN)], &[], "positions: element 0 is too far from the origin"),
         (&[at(3.0)], &[[0.0, f32::NAN, 0.0]], "velocities: element 0 has a component"),
         (&[at(3.0)], &[[0.0, 2e4, 0.0]], "velocities: element 0 has a component"),
-        (&[at(3.0)], &[[0.0; 3]; 2], "velocities: 2 elements, but there are 1 places"),
+        (&[at(3.0)], &[[0.0; 3]; 2], "velocities: 2 elements, but there are 1 positions"),
         (&[at(3.0), at(4.0)], &[], "more than max = 4"),
     ];
     for (positions, velocities, words) in refused {

@@ -203,7 +203,7 @@ impl Args {
                         );
                         return Ok(spacing);
                     }
-                    let what = "has too few particles, or too many at one place, to tell their spacing: give --spacing";
+                    let what = "has too few particles, or too many at one position, to tell their spacing: give --spacing";
                     first.get_or_insert_with(|| Error::file(&path, what));
                 }
                 Err(error) => {

@@ -268,7 +268,7 @@ fn beside(scene: &Scene, shallow: &Shallow, mesh: &TriMesh, attached: &[Option<A
         let off = ((x - own_x).powi(2) + (z - own_z).powi(2)).sqrt();
         (off > point.point.radius.max(2.0 * shallow.cell)).then(|| {
             format!(
-                "{}: {}: the place of the terrain that is nearest to it, with which it moves, lies {off:.6} m beside it, at ({x:.6}, {y:.6}, {z:.6})",
+                "{}: {}: the point of the terrain that is nearest to it, with which it moves, lies {off:.6} m beside it, at ({x:.6}, {y:.6}, {z:.6})",
                 scene.path.display(),
                 point.title()
             )

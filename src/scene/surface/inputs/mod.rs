@@ -95,7 +95,7 @@ impl Inputs {
                 estimate
             }
             (None, None) => {
-                let what = "has too few particles, or too many at one place, to tell their spacing: give surface.spacing";
+                let what = "has too few particles, or too many at one position, to tell their spacing: give surface.spacing";
                 return Err(Error::file(first, what));
             }
         };
