@@ -96,7 +96,12 @@ impl Harness {
     }
 
     fn is_asked(&self, gate: &Gate) -> bool {
-        self.only.is_empty() || self.only.iter().any(|only| gate.name.starts_with(only.as_str()))
+        // A whole name is that gate alone: "mist_step" is not "mist_step_points".
+        let is_whole = |only: &String| self.gates.iter().any(|gate| gate.name == *only);
+        let is_meant = |only: &String| {
+            if is_whole(only) { gate.name == *only } else { gate.name.starts_with(only.as_str()) }
+        };
+        self.only.is_empty() || self.only.iter().any(is_meant)
     }
 
     /// Prints that a gate, or all gates whose names begin so, cannot be measured here.

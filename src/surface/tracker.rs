@@ -143,7 +143,7 @@ impl Tracker {
                 let (lost, triangles) = (tracker.vertices.len() - known, surface.1.count());
                 return Ok((tracker, StepReport { lost, triangles, apart, ..StepReport::default() }));
             }
-            // Measured again: later steps must find the values that were measured.
+            // Measured again with the wider band: later steps use it, and must find the same values.
             if wanted > tracker.reach {
                 tracker.reach = wanted.max(1.25 * tracker.reach).min(REACH[1]);
             }

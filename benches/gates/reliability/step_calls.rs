@@ -1,6 +1,7 @@
 //! Every step function of the C interface with random settings that it accepts: one that takes far longer than others ends when it is cancelled.
 
 use std::mem::zeroed;
+use std::path::{Path, PathBuf};
 use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -21,7 +22,7 @@ use frazil::capi::snow::mist_points::*;
 use crate::capi::host::view;
 use crate::harness::Harness;
 use crate::reliability::step_meshes as meshes;
-use crate::reliability::watch::{Tried, Watch};
+use crate::reliability::watch::{Judged, PARTS, Tried, Watch};
 
 /// A struct of zeroes that begins with its size.
 pub fn sized<T>() -> T {
@@ -49,29 +50,59 @@ pub fn run(h: &mut Harness) {
     ];
     let gate = |name: &str| format!("reliability.step_calls.{name}");
     let wanted: Vec<_> = functions.into_iter().filter(|(name, _)| h.wants(&gate(name))).collect();
-    let judged = |(name, scenes): (&'static str, Scenes)| {
-        let watch = Watch::new();
-        let mut tried = Tried::new(&watch, name);
-        while !tried.is_done() {
-            scenes(&mut tried);
-        }
-        let (slow, note) = tried.judged();
-        println!("# {name}: {slow} too slow");
-        (name, slow, note)
+    let known = Known::of_this_program();
+    let judged = |(name, scenes): (&'static str, Scenes), part: usize| {
+        known.part(name, part).unwrap_or_else(|| {
+            let watch = Watch::new();
+            let mut tried = Tried::new(&watch, name, part);
+            while !tried.is_done() {
+                scenes(&mut tried);
+            }
+            let judged = tried.judged();
+            known.keep(name, part, &judged);
+            println!("# {name}, part {} of {PARTS}: {} too slow", part + 1, judged.slow);
+            judged
+        })
     };
-    // Each runs in a thread of its own, and is measured by the CPU time of that: one for each core, the next function to whoever is done.
+    // Each part runs in a thread of its own, and is measured by the CPU time of that: one for each core, the next to whoever is done.
     let next = AtomicUsize::new(0);
     let worker = || {
-        let function = || wanted.get(next.fetch_add(1, Ordering::SeqCst)).copied();
-        std::iter::from_fn(function).map(judged).collect::<Vec<_>>()
+        let part = || {
+            let number = next.fetch_add(1, Ordering::SeqCst);
+            wanted.get(number / PARTS).map(|function| (number / PARTS, *function, number % PARTS))
+        };
+        std::iter::from_fn(part).map(|(at, function, part)| (at, judged(function, part))).collect::<Vec<_>>()
     };
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let results: Vec<_> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..cores.min(wanted.len())).map(|_| scope.spawn(worker)).collect();
+        let workers: Vec<_> = (0..cores).map(|_| scope.spawn(worker)).collect();
         workers.into_iter().flat_map(|worker| worker.join().expect("a worker")).collect()
     });
-    for (name, slow, note) in results {
+    for (at, (name, _)) in wanted.iter().enumerate() {
+        let parts: Vec<_> = results.iter().filter(|(of, _)| *of == at).map(|(_, judged)| *judged).collect();
+        let (slow, note) = Judged::all(&parts);
         h.gate(&gate(name), slow as f64, &note);
+    }
+}
+
+/// Parts that an earlier run of this very program has measured: those of mist take hours, and a run that was stopped goes on with the next.
+struct Known(PathBuf);
+
+impl Known {
+    fn of_this_program() -> Self {
+        let program = std::env::current_exe().and_then(std::fs::read).expect("the program");
+        let folder = format!("target/step_calls/{:016x}", xxhash_rust::xxh3::xxh3_64(&program));
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+        std::fs::create_dir_all(&folder).expect("a folder");
+        Self(folder)
+    }
+
+    fn part(&self, name: &str, part: usize) -> Option<Judged> {
+        Judged::read(&std::fs::read_to_string(self.0.join(format!("{name}.{part}"))).ok()?)
+    }
+
+    fn keep(&self, name: &str, part: usize, judged: &Judged) {
+        std::fs::write(self.0.join(format!("{name}.{part}")), judged.line()).expect("a file");
     }
 }
 

@@ -11,8 +11,10 @@ use rustix::time::{ClockId, clock_gettime};
 use crate::capi::host::Threads;
 use crate::snow::grains::Random;
 
-/// Steps of each function.
-pub const STEPS: usize = 10_000;
+/// Steps of each function, in parts that run apart, each with settings of its own.
+pub const STEPS: usize = PARTS * PART;
+pub const PARTS: usize = 10;
+const PART: usize = 1_000;
 /// A step is cancelled after so many times the median of those before, but not earlier than this (s); and may then take so long (s).
 const TIMES: f64 = 20.0;
 const EARLIEST: f64 = 0.005;
@@ -41,6 +43,48 @@ pub struct Tried<'a> {
     /// CPU times of those that went on for too long (s).
     late: Vec<f64>,
     slowest: f64,
+}
+
+/// What is known of the steps of a part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Judged {
+    /// How many went on for too long.
+    pub slow: usize,
+    pub cancelled: usize,
+    /// CPU time of a step in the middle (s).
+    pub median: f64,
+    /// The longest CPU time from a cancel to the end of its step (s).
+    pub slowest: f64,
+}
+
+impl Judged {
+    /// As a line of text.
+    pub fn line(&self) -> String {
+        format!("{} {} {:e} {:e}", self.slow, self.cancelled, self.median, self.slowest)
+    }
+
+    /// From such a line.
+    pub fn read(line: &str) -> Option<Self> {
+        let mut words = line.split_whitespace();
+        let slow = words.next()?.parse().ok()?;
+        let cancelled = words.next()?.parse().ok()?;
+        let median = words.next()?.parse().ok()?;
+        let slowest = words.next()?.parse().ok()?;
+        Some(Self { slow, cancelled, median, slowest })
+    }
+
+    /// Of all parts, and a note on them.
+    pub fn all(parts: &[Self]) -> (usize, String) {
+        let mut medians: Vec<f64> = parts.iter().map(|part| part.median).collect();
+        medians.sort_unstable_by(f64::total_cmp);
+        let cancelled: usize = parts.iter().map(|part| part.cancelled).sum();
+        let slowest = parts.iter().map(|part| part.slowest).fold(0.0, f64::max);
+        let median = 1e3 * medians[medians.len() / 2];
+        let note = format!(
+            "{STEPS} steps, median {median:.2} ms; {cancelled} cancelled, which ended within {slowest:.3} s"
+        );
+        (parts.iter().map(|part| part.slow).sum(), note)
+    }
 }
 
 /// Microseconds of the clock on the wall.
@@ -91,23 +135,18 @@ impl Drop for Watch {
 }
 
 impl<'a> Tried<'a> {
-    /// None yet, of the function of a name.
-    pub fn new(watch: &'a Watch, name: &'static str) -> Self {
-        let random = Random(0x9e37_79b9_7f4a_7c15 ^ name.len() as u64);
-        let (times, late) = (Vec::with_capacity(STEPS), Vec::new());
+    /// None yet, of a part of those of the function of a name.
+    pub fn new(watch: &'a Watch, name: &'static str, part: usize) -> Self {
+        let random = Random(0x9e37_79b9_7f4a_7c15 ^ (name.len() + 1000 * part) as u64);
+        let (times, late) = (Vec::with_capacity(PART), Vec::new());
         Self { watch, random, name, times, median: 0.0, cancelled: 0, late, slowest: 0.0 }
     }
 
-    /// How many went on for too long, and a note on all of them.
-    pub fn judged(&self) -> (usize, String) {
-        let Self { median, cancelled, .. } = self;
+    /// What is known of them at the end.
+    pub fn judged(&self) -> Judged {
+        let Self { median, cancelled, .. } = *self;
         let slow = self.late.iter().filter(|took| **took > TIMES * median).count();
-        let slowest = self.slowest.max(0.0);
-        let note = format!(
-            "{STEPS} steps, median {:.2} ms; {cancelled} cancelled, which ended within {slowest:.3} s",
-            1e3 * median
-        );
-        (slow, note)
+        Judged { slow, cancelled, median, slowest: self.slowest.max(0.0) }
     }
 
     /// The context that steps are made with.
@@ -117,7 +156,7 @@ impl<'a> Tried<'a> {
 
     /// Whether there were enough.
     pub fn is_done(&self) -> bool {
-        self.times.len() >= STEPS
+        self.times.len() >= PART
     }
 
     /// One step; whether it was made to its end.

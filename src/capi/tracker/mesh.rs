@@ -340,7 +340,7 @@ pub unsafe extern "C" fn frz_tracker_step(
             finite("dt", dt)?;
             let (from, to) = (particles(from)?, particles(to)?);
             let follower = &mut *follower;
-            // A step that was computed in advance checks for no cancel.
+            // Taking a step that was computed in advance does not check for a cancel.
             call.ctx().check()?;
             let done = match follower.outlook.take(&from, &to, dt) {
                 Some((tracker, done)) => {

@@ -150,8 +150,8 @@ impl Shape {
         Some(())
     }
 
-    /// The sides of the part of a triangle outside a set, which lies to their left; adds the sides along outer faces to the rim, in the
-    /// opposite direction.
+    /// The sides of the part of a triangle outside a set, directed so that this part lies to their left; adds the sides along outer faces
+    /// to the rim, in the opposite direction.
     fn halves(
         &self,
         triangle: u32,

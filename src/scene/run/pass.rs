@@ -40,9 +40,9 @@ pub struct Shared<'a> {
     pub done: Done<'a>,
 }
 
-/// Any stage, with the pass that makes it.
+/// A stage of any type, with the pass that makes its frames.
 pub trait AnyStage: Stage {
-    /// As the trait that describes it.
+    /// The stage itself, as a [`Stage`].
     fn as_stage(&self) -> &dyn Stage;
 
     /// See [`Stepping::foresee`].

@@ -1,9 +1,9 @@
 //! Rivulets (`Threads`): liquid from nearby overflow edges gathers into one fall, because of surface tension.
 //!
 //! A thin sheet that leaves an edge contracts: from the edge of a table a film runs off in rivulets some millimetres apart. Of all overflow
-//! edges, the one with most liquid is the first rivulet, and takes what goes over those within [`REACH`]; the one with most of the rest is
-//! the next. The recent flow of a rivulet counts, so that it stays where it is. All comparisons are in integers, and equal edges stay
-//! separate: a turned or mirrored scene has the same rivulets.
+//! edges, the one with the most liquid is the first rivulet, and takes what flows over those within [`REACH`]; of the remaining edges, the
+//! one with the most is the next. The recent flow of a rivulet counts, so that it stays where it is. All comparisons are in integers, and
+//! equal edges stay separate: a turned or mirrored scene has the same rivulets.
 
 use super::falling::{Falling, Waiting, add};
 use crate::shallow::columns::Columns;

@@ -16,11 +16,12 @@ pub struct Step {
     pub drive: f32,
     /// 3 dt nu / unit^2 (units^2).
     pub drag: f32,
-    /// [`FAST_WAVES`](super::fast_films::FAST_WAVES) divided by `drive` (units). Divided by a depth: the factor by which the inertia of a fast film is reduced.
+    /// [`FAST_WAVES`](super::fast_films::FAST_WAVES) divided by `drive` (units). Divided by a depth: the factor by which the
+    /// inertia of a fast film is reduced.
     pub lighter: f32,
     /// The maximum transfer of a pipe of a fast film in a step, as part of a column's depth.
     pub fastest: f32,
-    /// Maximum depth in the section A (units), for stability; with whole sections, as in the thesis, their depth dx.
+    /// Maximum depth in the section A (units), for stability; for whole sections, as in the thesis, this is dx.
     pub section: f32,
     /// Whether all sections are dx^2.
     pub is_whole: bool,
@@ -38,9 +39,9 @@ pub struct Step {
     pub again: f32,
     /// Edge of a cell (units).
     pub cell: f32,
-    /// Maximum surface difference (units) at which the liquid in a pipe comes to rest,
+    /// Maximum surface difference (units) at which the liquid in a pipe comes to rest.
     pub level: i32,
-    /// and maximum flux, as part of the depth in its section: below both no motion is visible.
+    /// Maximum flux at which it does, as part of the depth in its section: below both limits no motion is visible.
     pub slow: f32,
 }
 

@@ -100,8 +100,8 @@ pub enum Indices<'a> {
     U32(&'a mut [u32]),
 }
 
-/// Buffers of the caller. They are written from the start, in order, and never read; they may be longer than the mesh. Those that are
-/// absent are not wanted. Vertices are in the order of their columns' indices, followed by extras.
+/// Buffers of the caller. They are written from the start, in order, and never read; they may be longer than the mesh. Absent ones are
+/// skipped. Vertices are in the order of their columns' indices, followed by extras.
 #[derive(Debug, Default)]
 pub struct Target<'a> {
     /// Three numbers per vertex (m x scale).

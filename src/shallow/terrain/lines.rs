@@ -44,8 +44,8 @@ impl Lines {
         (position - self.positions[1]) * self.inverse
     }
 
-    /// Count of lines left of a coordinate after the shift, exactly. A triangle can only cross the lines from the minimum rank of its
-    /// corners to the line before the maximum.
+    /// Exact count of the lines left of a coordinate, with the lines shifted symbolically (`crossings.rs`). A triangle can only cross the
+    /// lines from the minimum rank of its corners to the line before the maximum.
     #[inline]
     pub fn rank(&self, position: f64) -> u32 {
         // Usually right.
@@ -116,7 +116,7 @@ impl Outline {
             let greatest = |edge: &Edge| position(edge, f64::NEG_INFINITY);
             let start = lesser(lesser(least(a), least(b)), least(c)) - self.error;
             let end = greater(greater(greatest(a), greatest(b)), greatest(c)) + self.error;
-            // Half a line further, the nearest line is the first after a position; the error exceeds what this rounds.
+            // Rounding a position plus half a line gives the first line after it; the error margin is larger than the rounding of this sum.
             out.first[lane] = whole(lesser(greater(start + 0.5, first), last));
             out.last[lane] = whole(lesser(greater(end + 0.5, first), last));
         }

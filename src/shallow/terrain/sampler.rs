@@ -46,7 +46,9 @@ pub fn solids(
         sample(&positions, &mut distances)?;
         if distances.len() != positions.len() {
             let (got, wanted) = (distances.len(), positions.len());
-            return Err(Error::argument(format!("the sampler returned {got} distances for {wanted} positions")));
+            return Err(Error::argument(format!(
+                "the sampler returned {got} distances for {wanted} positions"
+            )));
         }
         for ((position, distance), index) in positions.iter().zip(&distances).zip(next..) {
             if !distance.is_finite() {

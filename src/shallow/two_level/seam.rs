@@ -1,9 +1,9 @@
 //! The pipes between fine and coarse columns, along the edge of the near cells.
 //!
-//! Each leads from a fine cell across its side to the coarse one beyond: Eq. 4.1 and 4.5 over the distance of their middles, 1.5 cells,
-//! through the cross-section of the fine cell. The coarse surface is evaluated beside the fine cell's middle, a quarter of a coarse cell to
-//! the side, with the slope given by the coarse columns along the edge: otherwise a film that runs along the edge would oscillate across
-//! it.
+//! Each leads from a fine cell across its side to the coarse one beyond: Eq. 4.1 and 4.5 over the distance between their middles, 1.5
+//! cells, through the cross-section of the fine cell. The coarse surface is evaluated beside the fine cell's middle, a quarter of a coarse
+//! cell to the side, with the slope given by the coarse columns along the edge: otherwise a film that runs along the edge would oscillate
+//! across it.
 
 use super::FINE;
 use super::rests::{Load, Rests, change, of_column};
@@ -29,7 +29,7 @@ struct Pipe {
     ends: [u32; 2],
     /// The previous and next coarse columns along the edge, or [`NONE`].
     along: [u32; 2],
-    /// Where the fine cell lies along the edge, relative to the middle of the coarse one: -1 before, 1 behind.
+    /// Where the fine cell lies along the edge, relative to the middle of the coarse one: -1 before it, 1 after it.
     side: i32,
     /// Direction to the coarse column: along x or z, and -1 or 1.
     axis: usize,
@@ -169,7 +169,7 @@ impl Seam {
         }
     }
 
-    /// Flux and rounding remainder of each pipe, in order: its part of a saved state.
+    /// Flux and rounding remainder of each pipe, in order: the part of a saved state that describes the edge.
     pub fn numbers(&self) -> impl ExactSizeIterator<Item = [f32; 2]> + '_ {
         self.pipes.iter().map(|pipe| [pipe.flux, pipe.left])
     }
@@ -179,7 +179,7 @@ impl Seam {
         self.last
     }
 
-    /// Restores its part of a saved state.
+    /// Restores that part of a saved state.
     pub fn set_numbers(&mut self, last: f64, numbers: impl Iterator<Item = [f32; 2]>) {
         self.last = last;
         for (pipe, [flux, left]) in self.pipes.iter_mut().zip(numbers) {
@@ -219,7 +219,7 @@ impl Seam {
         self.is_moving = run!(true true true true true false true false true true false false false true false false false false);
     }
 
-    /// Makes the transfers across the edge, limited to what the step has left.
+    /// Makes the transfers across the edge, limited to the liquid and the room that the step has left in the columns.
     pub fn end_step(&mut self, fine: &mut Shallow, coarse: &mut Shallow, rest: &mut Rests) {
         if !self.is_moving {
             return;

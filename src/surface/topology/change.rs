@@ -159,7 +159,7 @@ pub fn change(
     let in_cells: Vec<DVec3> = unfit.vertices.iter().map(|position| lattice.to_cells(*position)).collect();
     let fixed = in_cells.iter().map(|position| lattice.fix(*position)).collect::<Result<Vec<_>>>()?;
     let (shape, flagged) = ctx.phase("flag", || {
-        // Some 100 bytes for each edge of the grid, of which there are up to 1.7 for each cell face's area of the mesh.
+        // Some 100 bytes for each edge of the grid that the mesh pierces: up to 1.7 per unit of its area, in cell faces.
         let edges = |[a, b, c]: [DVec3; 3]| (b - a).cross(&(c - a)).norm() / 2.0;
         let faces: f64 =
             unfit.triangles.iter().map(|names| edges(names.map(|name| in_cells[name as usize]))).sum();

@@ -20,7 +20,7 @@ use crate::error::Result;
 use crate::sweep::signed_distance::bins::{Bins, each_voxel, voxel_of};
 use crate::sweep::signed_distance::exposure::{BURIED, Exposure, OPEN, THIN};
 
-/// A part of a face, and whether it is sure.
+/// A part of a face, and whether it is known to be open throughout ([`Facet::sure`]).
 type Part = (Corners, bool);
 
 /// Depth (fixed-point units) up to which a sheet counts as surface: the sides of a sweep are folds of many sheets that are closer together

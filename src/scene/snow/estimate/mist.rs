@@ -1,6 +1,6 @@
 //! Forecast of the memory and disk space of mist. The cost of a cell of air is known; how far mist spreads is not, until it is made. So the
-//! count of cells is that of mist that a folder already holds, even if only of the shot's first frames or of coarser cells, or else a guide
-//! value: the cells that fill the boxes of all objects, along their paths while mist lasts.
+//! count of cells is taken from the mist that a folder already holds, even if only of the shot's first frames or of coarser cells; without
+//! any, it is a rough estimate: the cells that fill the boxes of all objects, along their paths while mist lasts.
 
 use std::collections::HashMap;
 
@@ -125,7 +125,7 @@ fn rounded(length: f64) -> f64 {
 }
 
 /// The last frame of existing mist, up to `last`, and the maximum cells of its frames, converted to cells of an edge `cell` (m); `None` if
-/// no mist was raised yet, or no file has the size of its cells.
+/// no mist was raised yet, or no file is left that states the size of its cells.
 fn made(stored: &Stored, cell: f64, last: i32) -> Result<Option<(i32, f64)>> {
     let (mut end, mut counts) = (None, Vec::new());
     for frame in stored.frames().filter(|frame| *frame <= last) {

@@ -48,9 +48,9 @@ pub struct Ground<'a> {
     pub lips: &'a Lips,
     /// Whether slow liquid may come to rest.
     pub may_rest: bool,
-    /// Rows with columns that may fill up,
+    /// Rows with columns that may fill up.
     pub may_fill: &'a [bool],
-    /// and the minimum room of each row's columns (units).
+    /// Minimum room of each row's columns (units).
     pub room: &'a [f32],
     /// Changes of scalars by their laws.
     pub acts: &'a [Act],

@@ -42,7 +42,7 @@ pub(in crate::shallow::surface) struct Walls {
     pub list: Vec<Wall>,
     /// For each wall, whether a triangle uses its extra vertex.
     pub used: Vec<bool>,
-    /// Columns around a column whose surface ends at it: position in the ring, index, and whether they have a wall.
+    /// For one column, the neighbours whose surfaces end at it: position in the ring, index, and whether they have a wall.
     nodes: Vec<(usize, u32, bool)>,
 }
 
@@ -83,7 +83,7 @@ impl Walls {
                 }
             }
         }
-        // Nodes linked with a wet column that the dry column itself is linked with use its vertex.
+        // A dry column's own vertex serves the nodes that are linked with any wet column with which it is itself linked.
         if !scene.is_wet(column) {
             let linked = RING.map(|step| scene.wet_beside(column, step));
             self.add(scene, column, linked, true);

@@ -108,7 +108,7 @@ const INSTANT: f64 = 0.125;
 const NEAR: f64 = 2.0;
 /// Maximum spacing of the corners (cells of the base) at which a narrow band of three cells on each side shows where the surface is.
 const BAND: f64 = 2.9;
-/// Maximum parts of a cell's edge. In cells of more than 11 voxels of the base, its surface is placed where the sign changes.
+/// Maximum parts of a cell's edge. In cells wider than 11 voxels of the base, the base's surface is placed where the sign changes.
 const PARTS: usize = 4;
 
 impl<'a> Surroundings<'a> {
@@ -134,7 +134,7 @@ impl<'a> Moving<'a> {
         let is_sheet = body.share_of_caps(&first) >= HOLES || body.contradictions() > 0;
         let farthest = first.iter().zip(&last).map(|(a, b)| (b - a).norm()).fold(0.0, f64::max);
         let jumps = farthest > FASTEST_OBJECT * (to - from);
-        // A rotation may leave the bounding box of both poses.
+        // A rotation may carry vertices outside the bounding box of both poses.
         let room = DVec3::repeat(if jumps { 0.0 } else { farthest });
         let positions = last.iter().chain(first.iter().filter(|_| !jumps));
         let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
@@ -450,7 +450,7 @@ impl Around<'_> {
         sum / (parts * parts) as f32
     }
 
-    /// Speed (m/s) along the axis of the cover of a cell's lower face.
+    /// Speed (m/s), along the axis, of what covers a cell's lower face.
     fn speed(&self, corners: &Corners, tile: Coord, axis: usize, cell: [usize; 3]) -> f32 {
         let parts = self.lattice.parts;
         // The corner nearest to the centre of the face.
