@@ -24,7 +24,7 @@ use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::Lanes;
 
 impl Flow {
-    /// Advects velocity and density for a time (s). Paths longer than [`FARTHEST`] cells are clamped.
+    /// Advects velocity and density for a time (s). Paths longer than [`FARTHEST`](crate::flow::FARTHEST) cells are clamped.
     ///
     /// # Errors
     /// Cancel; the fields are then invalid.

@@ -14,7 +14,7 @@ pub struct Depths<'a> {
     /// Whether each strip may have a wet column; if absent, all strips are searched.
     pub active: Option<&'a [bool]>,
     /// Minimum depth at which each index is shown where it is wet (units), at most from base to ceiling; replaces [`Layout::least_depth`].
-    /// May be empty. See [`heights::minimum_heights::Lifts`].
+    /// May be empty. See [`Lifts`](super::heights::minimum_heights::Lifts).
     pub least: &'a [i32],
     /// How far below its base each index is shown where it is dry (units), at most down to the underside of its solid; replaces
     /// [`Layout::least_depth`]. May be empty.
@@ -118,7 +118,7 @@ pub struct Target<'a> {
     pub carried: [Option<&'a mut [f32]>; MOST],
     /// Layer of each vertex's column; for an extra, the lowest layer of the wet columns around whose surface ends there.
     pub layers: Option<&'a mut [u32]>,
-    /// Index of each vertex's column; [`NONE`] for an extra.
+    /// Index of each vertex's column; [`NONE`](crate::shallow::columns::NONE) for an extra.
     pub columns: Option<&'a mut [u32]>,
     /// Three per triangle.
     pub indices: Indices<'a>,
