@@ -150,7 +150,7 @@ fn listed(names: &[&str]) -> String {
 /// The name of a mesh in USD, from the name of its file or pattern.
 pub fn prim_name(input: &Path) -> String {
     let stem = input.file_stem().unwrap_or_default().to_string_lossy();
-    usd::text::prim_name(stem.split(['%', '#', '$', '.']).next().unwrap_or_default())
+    usd::prim_name(stem.split(['%', '#', '$', '.']).next().unwrap_or_default())
 }
 
 /// Refuses an output file of a type that cannot hold a mesh.

@@ -34,9 +34,8 @@ pub(super) fn prim_names(scene: &Scene) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for object in scene.objects.iter().filter(|object| object.role.moves()) {
         let stem = object.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let stem = usd::text::prim_name(
-            stem.split(['%', '#', '$']).next().unwrap_or("").trim_end_matches(['.', '_']),
-        );
+        let stem =
+            usd::prim_name(stem.split(['%', '#', '$']).next().unwrap_or("").trim_end_matches(['.', '_']));
         let count =
             names.iter().filter(|name| **name == stem || name.starts_with(&format!("{stem}_"))).count();
         let numbered = |number: usize| if number == 1 { stem.clone() } else { format!("{stem}_{number}") };

@@ -1180,6 +1180,7 @@ class Packaging(unittest.TestCase):
 if __name__ == "__main__":
     tested = unittest.main(verbosity=1, exit=False).result
     # The end of `make test` lists what was skipped.
+    (ROOT / "target").mkdir(exist_ok=True)
     with open(ROOT / "target/skipped.txt", "a") as listed:
         listed.writelines(f"{test.id()}: {why}\n" for test, why in tested.skipped)
     sys.exit(not tested.wasSuccessful())

@@ -3,7 +3,7 @@
 use super::liquid::{Spill, frz_shallow};
 use super::snapshot::{Taken, frz_shallow_snapshot};
 use super::surface::{
-    Buffer, NO_SPAN, check_buffers, check_room, frz_shallow_layout, frz_shallow_size, layout,
+    Buffer, NO_SPAN, check_buffers, check_room, frz_shallow_layout, frz_shallow_size, indices_in, layout,
 };
 use crate::capi::ffi::guard::{Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{change, read, required};
@@ -11,7 +11,7 @@ use crate::capi::ffi::views::{Plain, Sized32, fill, frz_span, sized};
 use crate::capi::runtime::context::{enter_light, frz_context};
 use crate::shallow::free_fall::Droplet;
 use crate::shallow::free_fall::mesh::{Balls, Target, bound};
-use crate::shallow::surface::{Counts, Indices, Layout};
+use crate::shallow::surface::{Counts, Layout};
 
 /// A drop of liquid in the air.
 #[repr(C)]
@@ -156,10 +156,7 @@ impl frz_shallow_drops_target {
         check_buffers(&self.buffers(), self.index_bits)?;
         // SAFETY: guaranteed by the caller, and they do not overlap.
         unsafe {
-            let indices = match self.index_bits {
-                16 => self.indices.numbers("indices", 1)?.map_or(Indices::None, Indices::U16),
-                _ => self.indices.numbers("indices", 1)?.map_or(Indices::None, Indices::U32),
-            };
+            let indices = indices_in(&self.indices, self.index_bits)?;
             Ok(Target {
                 positions: self.positions.numbers("positions", 3)?,
                 normals: self.normals.numbers("normals", 3)?,

@@ -1,5 +1,6 @@
 //! Small amounts of liquid on a terrain, in real time.
 
+use super::flowing::Flowing;
 use super::params::{domain, frz_shallow_domain, frz_shallow_params, params};
 use super::sources::Attached;
 use super::surface::ledges::Ledged;
@@ -13,9 +14,11 @@ use crate::capi::grid::sparse::frz_grid;
 use crate::capi::mesh::triangles::frz_mesh;
 use crate::capi::runtime::context::{creates, enter_light, frz_context};
 use crate::context::Context;
+use crate::error::Result;
 use crate::shallow::free_fall::Droplet;
 use crate::shallow::free_fall::mesh::Balls;
 use crate::shallow::scalars::MOST;
+use crate::shallow::sources::FlowPoint;
 use crate::shallow::surface::Surface;
 use crate::shallow::terrain::Solids;
 use crate::shallow::terrain::shapes::Shape;
@@ -118,6 +121,34 @@ impl Noun for frz_shallow {
     type Value = Spill;
     const NAME: &'static str = "shallow liquid";
     const TAG: u32 = 0x6672_7a09;
+}
+
+impl Flowing for Spill {
+    fn terrain(&self) -> &Terrain {
+        &self.terrain
+    }
+
+    fn flows(&self) -> &[Attached] {
+        &self.flows
+    }
+
+    fn set_flows(&mut self, flows: Vec<Attached>, points: &[FlowPoint]) -> Result<()> {
+        self.shallow.set_flows(points, |at| format!("flow {at}"))?;
+        self.flows = flows;
+        Ok(())
+    }
+
+    fn moved(&self, flow: usize) -> f64 {
+        self.shallow.moved(flow)
+    }
+
+    fn pour_at(&mut self, at: [f64; 3], radius: f64, volume: f64) -> Result<f64> {
+        self.shallow.pour_at(at, radius, volume)
+    }
+
+    fn fill(&mut self, height: f64) {
+        self.shallow.fill(height);
+    }
 }
 
 impl Spill {

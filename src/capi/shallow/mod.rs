@@ -25,4 +25,5 @@ pub mod stains;
 
 pub mod snapshot;
 
+pub(in crate::capi) mod flowing;
 mod lists;

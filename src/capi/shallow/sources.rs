@@ -1,11 +1,12 @@
 //! Where shallow liquid enters and leaves, and the balance of its volume.
 
+use super::flowing;
 use super::liquid::{Spill, frz_shallow};
 use super::lists::each_sized;
 use super::terrain::Terrain;
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{change, clear, read, required};
-use crate::capi::ffi::views::{Sized32, fill, finite, frz_view, meaning};
+use crate::capi::ffi::handle::{change, read};
+use crate::capi::ffi::views::{Sized32, fill, frz_view, meaning};
 use crate::capi::mesh::triangles::no_flags;
 use crate::shallow::Balance;
 use crate::shallow::sources::{FlowPoint, Kind, Pulse};
@@ -159,17 +160,8 @@ pub unsafe extern "C" fn frz_shallow_set_flows(
     flows: *const frz_shallow_flow,
     count: usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut spill = change(shallow)?;
-            let attached = Attached::all(flows, count, &spill.terrain)?;
-            let points: Vec<FlowPoint> = attached.iter().map(|flow| flow.point.clone()).collect();
-            spill.shallow.set_flows(&points, |at| format!("flow {at}"))?;
-            spill.flows = attached;
-            Ok(())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe { flowing::set_flows(shallow, flows, count) })
 }
 
 /// Reports the volume that entered or left through a flow point since it was set.
@@ -184,20 +176,8 @@ pub unsafe extern "C" fn frz_shallow_flow_moved(
     flow: usize,
     volume: *mut f64,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(volume);
-            let volume = required(volume, "volume")?;
-            let spill = read(shallow)?;
-            let count = spill.flows.len();
-            if flow >= count {
-                return Err(Failure::argument(format!("flow = {flow} is none of the {count} that were set")));
-            }
-            volume.write_unaligned(spill.shallow.moved(flow));
-            Ok(())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe { flowing::moved(shallow, flow, volume) })
 }
 
 /// Pours a volume at a position, shared by the columns that a flow point there would act on; each takes what it has room for, or gives what
@@ -217,20 +197,8 @@ pub unsafe extern "C" fn frz_shallow_pour(
     volume: f64,
     poured: *mut f64,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(poured);
-            let mut spill = change(shallow)?;
-            let at = required(at.cast_mut(), "at")?.cast::<[f64; 3]>().read_unaligned();
-            finite("volume", volume)?;
-            let moved = spill.shallow.pour_at(at, radius, volume)?;
-            if !poured.is_null() {
-                poured.write_unaligned(moved);
-            }
-            Ok(())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe { flowing::pour(shallow, at, radius, volume, poured) })
 }
 
 /// Fills all columns up to a height, or to their ceiling; fuller ones are unchanged.
@@ -240,13 +208,8 @@ pub unsafe extern "C" fn frz_shallow_pour(
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_fill(shallow: *mut frz_shallow, height: f64) -> frz_status {
-    guard(|| {
-        // SAFETY: the liquid is NULL or alive.
-        let mut spill = unsafe { change(shallow) }?;
-        finite("height", height)?;
-        spill.shallow.fill(height);
-        Ok(())
-    })
+    // SAFETY: the liquid is NULL or alive.
+    guard(|| unsafe { flowing::fill_up(shallow, height) })
 }
 
 /// Sets the depths of all columns: an initial state from a host, or the liquid of the host's own solver, for its surface. What this adds

@@ -1,15 +1,17 @@
 //! Shallow liquid in cells of two sizes: small ones near what matters.
 
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::guard::{Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{Noun, change, clear, destroy, read, required};
-use crate::capi::ffi::views::{Sized32, fill, finite, frz_view};
+use crate::capi::ffi::views::{Sized32, fill, frz_view};
 use crate::capi::mesh::triangles::frz_mesh;
 use crate::capi::runtime::context::{creates, enter_light, frz_context};
+use crate::capi::shallow::flowing::{self, Flowing};
 use crate::capi::shallow::liquid::frz_shallow_report;
 use crate::capi::shallow::params::{domain, frz_shallow_domain, frz_shallow_params, params};
 use crate::capi::shallow::sources::{Attached, frz_shallow_balance, frz_shallow_flow};
 use crate::capi::shallow::terrain::Terrain;
 use crate::context::Context;
+use crate::error::Result;
 use crate::shallow::scalars::MOST;
 use crate::shallow::sources::FlowPoint;
 use crate::shallow::terrain::Solids;
@@ -49,6 +51,34 @@ impl Noun for frz_shallow_detail {
     type Value = Spread;
     const NAME: &'static str = "shallow liquid in cells of two sizes";
     const TAG: u32 = 0x6672_7a0c;
+}
+
+impl Flowing for Spread {
+    fn terrain(&self) -> &Terrain {
+        &self.terrain
+    }
+
+    fn flows(&self) -> &[Attached] {
+        &self.flows
+    }
+
+    fn set_flows(&mut self, flows: Vec<Attached>, points: &[FlowPoint]) -> Result<()> {
+        self.detail.set_flows(points, |at| format!("flow {at}"))?;
+        self.flows = flows;
+        Ok(())
+    }
+
+    fn moved(&self, flow: usize) -> f64 {
+        self.detail.moved(flow)
+    }
+
+    fn pour_at(&mut self, at: [f64; 3], radius: f64, volume: f64) -> Result<f64> {
+        self.detail.pour_at(at, radius, volume)
+    }
+
+    fn fill(&mut self, height: f64) {
+        self.detail.fill(height);
+    }
 }
 
 impl Spread {
@@ -270,17 +300,8 @@ pub unsafe extern "C" fn frz_shallow_detail_set_flows(
     flows: *const frz_shallow_flow,
     count: usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut spread = change(detail)?;
-            let attached = Attached::all(flows, count, &spread.terrain)?;
-            let points: Vec<FlowPoint> = attached.iter().map(|flow| flow.point.clone()).collect();
-            spread.detail.set_flows(&points, |at| format!("flow {at}"))?;
-            spread.flows = attached;
-            Ok(())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe { flowing::set_flows(detail, flows, count) })
 }
 
 /// Changes the rate of a flow point: a valve. The volume that it has moved stays.
@@ -295,11 +316,8 @@ pub unsafe extern "C" fn frz_shallow_detail_set_rate(
     flow: usize,
     rate: f64,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the liquid is NULL or alive.
-        let mut spread = unsafe { change(detail) }?;
-        Ok(spread.detail.set_rate(flow, rate)?)
-    })
+    // SAFETY: the liquid is NULL or alive.
+    guard(|| Ok(unsafe { change(detail) }?.detail.set_rate(flow, rate)?))
 }
 
 /// Reports the volume that entered or left through a flow point since it was set.
@@ -314,20 +332,8 @@ pub unsafe extern "C" fn frz_shallow_detail_flow_moved(
     flow: usize,
     volume: *mut f64,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(volume);
-            let volume = required(volume, "volume")?;
-            let spread = read(detail)?;
-            let count = spread.flows.len();
-            if flow >= count {
-                return Err(Failure::argument(format!("flow = {flow} is none of the {count} that were set")));
-            }
-            volume.write_unaligned(spread.detail.moved(flow));
-            Ok(())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe { flowing::moved(detail, flow, volume) })
 }
 
 /// Pours a volume at a position, as frz_shallow_pour does, into cells of the size at that position.
@@ -346,20 +352,8 @@ pub unsafe extern "C" fn frz_shallow_detail_pour(
     volume: f64,
     poured: *mut f64,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(poured);
-            let mut spread = change(detail)?;
-            let at = required(at.cast_mut(), "at")?.cast::<[f64; 3]>().read_unaligned();
-            finite("volume", volume)?;
-            let moved = spread.detail.pour_at(at, radius, volume)?;
-            if !poured.is_null() {
-                poured.write_unaligned(moved);
-            }
-            Ok(())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe { flowing::pour(detail, at, radius, volume, poured) })
 }
 
 /// Fills all columns up to a height, as frz_shallow_fill does.
@@ -369,13 +363,8 @@ pub unsafe extern "C" fn frz_shallow_detail_pour(
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_detail_fill(detail: *mut frz_shallow_detail, height: f64) -> frz_status {
-    guard(|| {
-        // SAFETY: the liquid is NULL or alive.
-        let mut spread = unsafe { change(detail) }?;
-        finite("height", height)?;
-        spread.detail.fill(height);
-        Ok(())
-    })
+    // SAFETY: the liquid is NULL or alive.
+    guard(|| unsafe { flowing::fill_up(detail, height) })
 }
 
 /// Reports where all liquid is, and where it came from. Less than a cell's share of four units waits for the rest of a unit of large cells:

@@ -11,6 +11,7 @@ use std::path::PathBuf;
 
 use frazil::scene::run::verify::{Verified, verify};
 use frazil::scene::{Override, Scene, System};
+use serde::Serialize;
 
 use super::output;
 use super::session::Session;
@@ -54,6 +55,25 @@ impl Args {
     }
 }
 
+/// Warns if the files need more than is free; `how` says how sure that is.
+fn warn_of_space(warnings: &mut Vec<String>, how: &str, needed: Option<u64>, free: Option<u64>) {
+    if let (Some(needed), Some(free)) = (needed, free)
+        && needed > free
+    {
+        warnings.push(format!("the files {how} {}, but only {} are free", size(needed), size(free)));
+    }
+}
+
+/// Prints a report, in words or as JSON.
+fn print(args: &Args, report: &impl Serialize, in_words: impl FnOnce() -> String) -> Result<(), Failure> {
+    let text = if args.json {
+        format!("{:#}\n", serde_json::to_value(report).expect("plain values become JSON"))
+    } else {
+        in_words()
+    };
+    output::print(&text).during()
+}
+
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.scene.is_dir() {
@@ -75,12 +95,7 @@ fn check_folder(args: &Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::refused("-o, --set and --preview are of no use with an output folder"));
     }
     let verified = verify(&session.ctx, &args.scene).before()?;
-    let text = if args.json {
-        format!("{:#}\n", serde_json::to_value(&verified).expect("plain values become JSON"))
-    } else {
-        verified_in_words(&verified)
-    };
-    output::print(&text).during()?;
+    print(args, &verified, || verified_in_words(&verified))?;
     session.record("frames", verified.frames.into());
     match &verified.damaged[..] {
         [] => Ok(()),

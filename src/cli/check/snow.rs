@@ -6,8 +6,7 @@ use frazil::scene::snow::MistForecast;
 use frazil::scene::snow::check::{ObjectReport, Report, check};
 use frazil::scene::{Inputs, Scene, System, check_memory};
 
-use super::{Args, size, surface};
-use crate::cli::output;
+use super::{Args, print, size, surface, warn_of_space};
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
 
@@ -34,16 +33,8 @@ pub fn run(args: &Args, session: &Session, mut scene: Scene) -> Result<(), Failu
     let free = args.free_space();
     let of_mist = report.mist.as_ref().map_or(0, |mist| mist.disk_bytes);
     let needed = report.disk_bytes.map(|bytes| bytes.saturating_add(of_mist));
-    if let (Some(free), Some(needed)) = (free, needed.filter(|needed| Some(*needed) > free)) {
-        let (needed, free) = (size(needed), size(free));
-        report.warnings.push(format!("the files need about {needed}, but only {free} are free"));
-    }
-    let text = if args.json {
-        format!("{:#}\n", serde_json::to_value(&report).expect("plain values become JSON"))
-    } else {
-        in_words(&report, limit, free)
-    };
-    output::print(&text).during()
+    warn_of_space(&mut report.warnings, "need about", needed, free);
+    print(args, &report, || in_words(&report, limit, free))
 }
 
 fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {

@@ -5,8 +5,7 @@ use std::fmt::Write;
 use frazil::scene::Scene;
 use frazil::scene::surface::{Inputs, Report, check};
 
-use super::{Args, size};
-use crate::cli::output;
+use super::{Args, print, size, warn_of_space};
 use crate::cli::session::Session;
 use crate::cli::session::exit::{Failure, Phase};
 
@@ -28,16 +27,8 @@ pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure>
         report.warnings.push(what);
     }
     let free = args.free_space();
-    if let Some(free) = free.filter(|free| report.disk_bytes > *free) {
-        let (needed, free) = (size(report.disk_bytes), size(free));
-        report.warnings.push(format!("the files need about {needed}, but only {free} are free"));
-    }
-    let text = if args.json {
-        format!("{:#}\n", serde_json::to_value(&report).expect("plain values become JSON"))
-    } else {
-        in_words(&report, limit, free)
-    };
-    output::print(&text).during()
+    warn_of_space(&mut report.warnings, "need about", Some(report.disk_bytes), free);
+    print(args, &report, || in_words(&report, limit, free))
 }
 
 fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {

@@ -3,7 +3,7 @@
 pub mod materials;
 pub mod points;
 pub mod primvars;
-pub mod text;
+mod text;
 
 use std::fmt::Write;
 pub(super) use text::list;

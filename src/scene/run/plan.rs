@@ -33,7 +33,7 @@ impl Plan<'_> {
     }
 
     /// The stages with these names, by index; all if there are no names.
-    pub fn chosen(&self, only: &[String]) -> Result<Vec<usize>> {
+    pub(super) fn chosen(&self, only: &[String]) -> Result<Vec<usize>> {
         if let Some(unknown) = only.iter().find(|name| !self.names().contains(&&name[..])) {
             let names = self.names().join(", ");
             let what = format!("has no stage \"{unknown}\": its stages are {names}");
@@ -49,7 +49,7 @@ impl Plan<'_> {
     }
 
     /// The stages that depend on these, directly or indirectly, by index.
-    pub fn downstream(&self, of: &[usize]) -> Vec<usize> {
+    pub(super) fn downstream(&self, of: &[usize]) -> Vec<usize> {
         let mut names: Vec<&str> = of.iter().map(|position| self.stages[*position].name()).collect();
         let mut out = Vec::new();
         for (position, stage) in self.stages().enumerate() {
@@ -62,7 +62,7 @@ impl Plan<'_> {
     }
 
     /// Refuses frames that the chosen stages read from other stages, if this scene would not make them as they are.
-    pub fn refuse_stale(&self, chosen: &[usize], folder: &Path) -> Result<()> {
+    pub(super) fn refuse_stale(&self, chosen: &[usize], folder: &Path) -> Result<()> {
         for reader in chosen.iter().map(|position| self.stages[*position].as_stage()) {
             let is_read = |position: &usize| reader.upstream().contains(&self.stages[*position].name());
             for position in
@@ -79,7 +79,7 @@ impl Plan<'_> {
     }
 
     /// Whether the exact states of all frames of a stage are kept: the stage itself, or another one, reads them.
-    pub fn keeps_states_of(&self, of: &dyn Stage) -> bool {
+    pub(super) fn keeps_states_of(&self, of: &dyn Stage) -> bool {
         let reads =
             |stage: &dyn Stage| stage.upstream().contains(&of.name()) && stage.reads_state_of(of.name());
         of.keeps_every_state() || self.stages().any(reads)

@@ -152,6 +152,18 @@ pub(in crate::capi) fn check_buffers(buffers: &[Buffer<'_>], index_bits: u32) ->
     Err(Failure::argument(format!("index_bits = {index_bits} is not 16 or 32")))
 }
 
+/// Indices of a size that [`check_buffers`] has let pass.
+///
+/// # Safety
+/// As of the span's other buffers: memory that can be written and that nothing else uses, for `'a`.
+pub(in crate::capi) unsafe fn indices_in<'a>(span: &frz_span, index_bits: u32) -> Outcome<Indices<'a>> {
+    // SAFETY: guaranteed by the caller.
+    Ok(match index_bits {
+        16 => unsafe { span.numbers("indices", 1) }?.map_or(Indices::None, Indices::U16),
+        _ => unsafe { span.numbers("indices", 1) }?.map_or(Indices::None, Indices::U32),
+    })
+}
+
 /// Refuses buffers that are too small.
 pub(in crate::capi) fn check_room(buffers: &[Buffer<'_>], counts: &Counts) -> Outcome {
     for (name, span, _, is_of_vertices) in buffers {
@@ -205,10 +217,7 @@ impl frz_shallow_target {
         check_buffers(&self.buffers(), self.index_bits)?;
         // SAFETY: guaranteed by the caller, and they do not overlap.
         unsafe {
-            let indices = match self.index_bits {
-                16 => self.indices.numbers("indices", 1)?.map_or(Indices::None, Indices::U16),
-                _ => self.indices.numbers("indices", 1)?.map_or(Indices::None, Indices::U32),
-            };
+            let indices = indices_in(&self.indices, self.index_bits)?;
             Ok(Target {
                 positions: self.positions.numbers("positions", 3)?,
                 normals: self.normals.numbers("normals", 3)?,

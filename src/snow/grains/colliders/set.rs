@@ -30,7 +30,7 @@ pub struct Floor {
 
 impl Floor {
     /// Touches of a block's members near the floor.
-    pub fn touches(
+    pub(in crate::snow::grains) fn touches(
         &self,
         block: &crate::snow::grains::solver::layout::Block,
         rows: &[Row],
