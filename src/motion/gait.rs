@@ -12,11 +12,13 @@ const RATE: f64 = 60.0;
 const POSES: (f64, f64) = (24.0, 240.0);
 /// Maximum vertices posed, over all poses: bounds the time of the analysis.
 const MOST_VERTICES: f64 = 5e7;
-/// Standing parts may be this fraction of a figure's height above the lowest part of their pose, and that part as far above the level that
-/// the fraction `REACHED` of the poses goes down to: a toe that digs in, or a jump, must not hide a walk.
+/// Tolerance, as a fraction of a figure's height: standing parts may be this far above the lowest part of their pose. That part may be as
+/// far above the level that the lowest parts of the fraction `REACHED` of the poses reach: a toe that digs in, or a jump, must not hide a
+/// walk.
 const STANDS: f64 = 0.015;
 const REACHED: f64 = 0.4;
-/// Parts that rise or fall by more than `LEVEL` of their horizontal path do not stand, unless it is within `STILL` of the tolerance above.
+/// Parts that rise or fall by more than the fraction `LEVEL` of their horizontal path do not stand, unless they do so by at most the
+/// fraction `STILL` of that tolerance.
 const LEVEL: f64 = 0.25;
 const STILL: f64 = 0.1;
 /// Maximum spread of steady velocities, as a fraction of the speed: walks have up to 0.22, runs 0.45.

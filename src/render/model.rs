@@ -12,7 +12,7 @@ pub struct Model {
     /// Unit normals at the vertices of a smooth surface; without them triangles are flat.
     pub(super) normals: Option<Vec<Vec3>>,
     albedo: Colour,
-    /// Colours of the vertices, in place of a single one.
+    /// Colours of the vertices, instead of a single one.
     colours: Option<Vec<[f32; 3]>>,
     /// Opacities of the vertices of a liquid, 0 to 1.
     pub(super) opacities: Option<Vec<f32>>,

@@ -24,7 +24,7 @@ impl Model {
 
 impl Fog {
     /// A fog volume. A value of 1 attenuates light per metre as its metadata `frazil:density_scale` says, or by `extinction` without that
-    /// (1/m, over short paths, over 0). Inactive voxels, and values below 0, count as empty.
+    /// (1/m, over short paths, above 0). Inactive voxels, and values below 0, count as empty.
     ///
     /// # Errors
     /// A transform that is not linear; a scale that is not a number of 0 or more; densities too far apart to be drawn, or too many for the

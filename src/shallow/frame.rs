@@ -141,7 +141,7 @@ impl Shallow {
     /// Whether a frame may take so long that it should be cancellable; `count` is the number of its steps, if known.
     pub(super) fn may_take_long(&mut self, dt: f64, count: Option<usize>) -> bool {
         let steps = match (count, self.params.pace) {
-            // Given steps may be so long that columns fill up on the way; the number of exact steps is only known at the end.
+            // Given steps may be so long that columns fill up during the frame; the number of exact steps is only known at the end.
             (Some(_), _) | (None, Pace::Exact) => return true,
             (None, Pace::Realtime(longest)) => (dt / longest).max(1.0),
         };

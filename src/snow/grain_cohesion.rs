@@ -1,7 +1,7 @@
 //! The attraction between grains that lets a wall of them stand.
 
 /// Height (diameters) of a wall that stands without attraction, as the gate `snow.grains.wall` measures it: at an angle of repose of 32
-/// degrees, and its change for each degree below and above that.
+/// degrees, and how much it grows with each degree below and with each degree above that.
 const ALONE: [f64; 3] = [6.2, 0.4, 0.15];
 /// Measured attraction (weights of a grain), times tan(a) tan(45 degrees + a/2), where a is the angle of repose, for each further diameter;
 /// and its increase with each diameter: long chains of contacts are solved less accurately.

@@ -46,7 +46,7 @@ pub(super) mod ffi {
         x: i32,
         y: i32,
         z: i32,
-        /// 1 for a position of 8 voxels along an edge, 2 for 128, 3 for 4096.
+        /// 1 for a tile of 8 voxels along an edge, 2 for 128, 3 for 4096.
         level: u32,
         active: bool,
         /// For floats, the first number.

@@ -73,7 +73,7 @@ impl Spot {
             values: (0..count).map(|n| (n * 7 % 251) as f64).collect(),
         };
         let uvs = Uvs {
-            positions: (0..3 * faces).map(|n| [n as f32 * 1.3e-5, 1.0 / (1.0 + n as f32)]).collect(),
+            coordinates: (0..3 * faces).map(|n| [n as f32 * 1.3e-5, 1.0 / (1.0 + n as f32)]).collect(),
             corners: Some((0..3 * faces as u32).collect()),
             missing: 0,
         };

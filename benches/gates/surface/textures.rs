@@ -183,9 +183,9 @@ impl Sheet {
                 let height: f32 = names.iter().map(|name| mesh.positions[*name as usize].z).sum();
                 names.map(|name| if height < 0.0 { name + count } else { name })
             });
-            Uvs { corners: Some(corners.collect()), positions: [positions, behind].concat(), missing: 0 }
+            Uvs { corners: Some(corners.collect()), coordinates: [positions, behind].concat(), missing: 0 }
         } else {
-            Uvs { positions, corners: None, missing: 0 }
+            Uvs { coordinates: positions, corners: None, missing: 0 }
         };
         let first = DetailedMesh { mesh: mesh.clone(), uvs: Some(uvs), arrays: Vec::new() };
         Self {
@@ -255,7 +255,7 @@ impl Sheet {
 fn texture(mesh: &DetailedMesh, face: usize) -> [Pair; 3] {
     let uvs = mesh.uvs.as_ref().expect("a texture");
     let indices = uvs.indices(&mesh.mesh.triangles, face);
-    edges(indices.map(|index| uvs.positions[index as usize].map(f64::from)))
+    edges(indices.map(|index| uvs.coordinates[index as usize].map(f64::from)))
 }
 
 /// By how much edges differ from the particles' own: of several the nearest.

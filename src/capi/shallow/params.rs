@@ -46,7 +46,8 @@ pub enum frz_shallow_border {
     FRZ_SHALLOW_CLOSED = 0,
     /// Nothing: liquid flows off along the slope of the ground near the border, and is lost.
     FRZ_SHALLOW_OPEN = 1,
-    /// Liquid at rest, at the initial level of the liquid at the border: waves leave, and do not come back.
+    /// Liquid at rest, at the height of the last fill (frz_shallow_fill, frz_shallow_detail_fill): waves leave, and do not come back. Before
+    /// the first fill, and where the ground is higher, as FRZ_SHALLOW_OPEN.
     FRZ_SHALLOW_ABSORBING = 2,
 }
 

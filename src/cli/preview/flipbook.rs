@@ -96,7 +96,7 @@ impl<'a> Flipbook<'a> {
         each.finish()
     }
 
-    /// Writes a GIF file, whole or not at all, that plays `fps` frames of the shot a second. In place of a frame that cannot be drawn, the one
+    /// Writes a GIF file, whole or not at all, that plays `fps` frames of the shot a second. Instead of a frame that cannot be drawn, the one
     /// before is shown longer.
     ///
     /// # Errors

@@ -33,8 +33,8 @@ impl Flow {
     }
 
     /// The same with [`Scheme::Bounded`], with mass conservation: a density that is not negative keeps the requested share of its mass, to
-    /// rounding, and what the scheme loses or gains is restored within two tiles. Some is lost only where density would have to grow by
-    /// more than a tenth: of the last mist that is thinner than `least`.
+    /// rounding, and what the scheme loses or gains is restored within two tiles, or farther away if the density there would have to grow
+    /// by more than a fifth at once. Some is lost only if all of the density together would: of the last mist, which is thinner than `least`.
     ///
     /// # Errors
     /// Cancel; the fields are then invalid.

@@ -5,7 +5,7 @@
 //! together weigh each point once. Each cell carries its mass along its path to a point, and thus into the eight hats around it: this is
 //! the mass that each hat should hold. After advection the hat holds a different mass. The density is then multiplied by factors that are
 //! given at the corners and linear in between, the mass that each hat should hold over the mass that it holds, so that the total mass is
-//! right to rounding and no density farther than a tile from a loss changes.
+//! right to rounding and no density farther than a tile from a loss changes, unless a hat would have to grow by more than `MOST_GAIN`.
 
 use rayon::prelude::*;
 
@@ -27,10 +27,11 @@ pub struct Keeping {
     pub least: f32,
 }
 
-/// Largest factor by which density grows in a step: if nearly all the mist of a tile was cut off, its mass must not return in the remainder.
+/// Largest factor of a hat, and then of all density, in a round: if nearly all the mist of a tile was cut off, its mass must not return in
+/// the remainder.
 const MOST_GAIN: f64 = 1.2;
-/// Passes in which a hat that would have to grow by more than this factor passes the excess on to the adjacent hats. What is left after them is
-/// spread over all of the density.
+/// Passes in which a hat that would have to grow by more than [`MOST_GAIN`] hands the excess to the adjacent hats. The excess that remains
+/// after them is spread over all of the density.
 const PASSES: usize = 6;
 /// In a step a density below `least` loses this share of its difference from `least`. It fades slowly on purpose: when it ended at once,
 /// flows that differed only by rounding soon differed by as much as `least`.

@@ -91,7 +91,7 @@ impl DetailedMesh {
     /// A mesh without vertices and faces whose arrays have the same names.
     pub fn emptied(&self) -> Self {
         let uvs = self.uvs.as_ref().map(|uvs| Uvs {
-            positions: Vec::new(),
+            coordinates: Vec::new(),
             corners: uvs.corners.as_ref().map(|_| Vec::new()),
             missing: 0,
         });
@@ -114,9 +114,10 @@ impl DetailedMesh {
         };
         let uvs = self.uvs.map(|uvs| match uvs.corners {
             Some(_) => uvs,
-            None => {
-                Uvs { positions: used.iter().map(|&vertex| uvs.positions[vertex as usize]).collect(), ..uvs }
-            }
+            None => Uvs {
+                coordinates: used.iter().map(|&vertex| uvs.coordinates[vertex as usize]).collect(),
+                ..uvs
+            },
         });
         let arrays = self.arrays.into_iter().map(kept).collect();
         Self { mesh: self.mesh.without_unused(), uvs, arrays }

@@ -90,7 +90,7 @@ impl TriMesh {
         (0..self.triangles.len()).map(twice).sum::<f64>() / 2.0 + 0.0
     }
 
-    /// Edges, smaller vertex index first, with the number of triangles that run along them minus those that run back.
+    /// The edges of each triangle, sorted, smaller vertex index first: with 1 if the triangle runs along the edge in this order, else -1.
     fn edge_uses(&self) -> Vec<((u32, u32), i32)> {
         let mut edges: Vec<((u32, u32), i32)> = self
             .triangles

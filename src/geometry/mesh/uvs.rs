@@ -7,8 +7,8 @@ pub const NONE: u32 = u32::MAX;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Uvs {
     /// The coordinates; one pair for each vertex if `corners` is `None`.
-    pub positions: Vec<[f32; 2]>,
-    /// Indices into `positions`, one for each corner of the faces, in their order.
+    pub coordinates: Vec<[f32; 2]>,
+    /// Indices into `coordinates`, one for each corner of the faces, in their order.
     pub corners: Option<Vec<u32>>,
     /// Corners without coordinates in the file: they have 0, 0.
     pub missing: usize,
@@ -18,15 +18,17 @@ impl Uvs {
     /// Coordinates 0, 0 for meshes without any, with these numbers of vertices and triangles; by corner, or by vertex.
     pub fn nothing(has_corners: bool, vertices: usize, faces: usize) -> Self {
         match has_corners {
-            true => Self { positions: vec![[0.0; 2]], corners: Some(vec![0; 3 * faces]), missing: 3 * faces },
-            false => Self { positions: vec![[0.0; 2]; vertices], corners: None, missing: vertices },
+            true => {
+                Self { coordinates: vec![[0.0; 2]], corners: Some(vec![0; 3 * faces]), missing: 3 * faces }
+            }
+            false => Self { coordinates: vec![[0.0; 2]; vertices], corners: None, missing: vertices },
         }
     }
 
-    /// Coordinates of the corners of faces: for each corner `at` has an index into `positions`, or [`NONE`], and `vertices` its vertex. If
+    /// Coordinates of the corners of faces: for each corner `at` has an index into `coordinates`, or [`NONE`], and `vertices` its vertex. If
     /// all corners of every vertex agree, coordinates are stored by vertex. `None` if no corner has any.
     pub fn of_corners(
-        mut positions: Vec<[f32; 2]>,
+        mut coordinates: Vec<[f32; 2]>,
         mut at: Vec<u32>,
         vertices: &[u32],
         count: usize,
@@ -36,20 +38,20 @@ impl Uvs {
             return None;
         }
         if missing > 0 {
-            at.iter_mut().filter(|index| **index == NONE).for_each(|index| *index = positions.len() as u32);
-            positions.push([0.0; 2]);
+            at.iter_mut().filter(|index| **index == NONE).for_each(|index| *index = coordinates.len() as u32);
+            coordinates.push([0.0; 2]);
         }
         let mut own: Vec<Option<[f32; 2]>> = vec![None; count];
         let agrees = |(&vertex, &index): (&u32, &u32)| {
-            let position = positions[index as usize];
+            let position = coordinates[index as usize];
             // Vertices out of range are refused by the check of the mesh.
             own.get_mut(vertex as usize).is_none_or(|own| *own.get_or_insert(position) == position)
         };
         if vertices.iter().zip(&at).all(agrees) {
-            let positions = own.into_iter().map(Option::unwrap_or_default).collect();
-            return Some(Self { positions, corners: None, missing });
+            let coordinates = own.into_iter().map(Option::unwrap_or_default).collect();
+            return Some(Self { coordinates, corners: None, missing });
         }
-        Some(Self { positions, corners: Some(at), missing })
+        Some(Self { coordinates, corners: Some(at), missing })
     }
 
     /// The same for triangles, whose corners index those of the faces.
@@ -70,10 +72,10 @@ impl Uvs {
         let by_corner = parts.clone().any(|(uvs, ..)| uvs.is_some_and(|uvs| uvs.corners.is_some()));
         let mut out = Self { corners: by_corner.then(Vec::new), ..Self::default() };
         for (uvs, vertices, triangles) in parts {
-            let first = out.positions.len() as u32;
+            let first = out.coordinates.len() as u32;
             match uvs {
-                Some(uvs) => out.positions.extend_from_slice(&uvs.positions),
-                None => out.positions.resize(out.positions.len() + vertices, [0.0; 2]),
+                Some(uvs) => out.coordinates.extend_from_slice(&uvs.coordinates),
+                None => out.coordinates.resize(out.coordinates.len() + vertices, [0.0; 2]),
             }
             let own = uvs.and_then(|uvs| uvs.corners.as_deref()).unwrap_or(triangles.as_flattened());
             out.corners.iter_mut().for_each(|corners| corners.extend(own.iter().map(|index| first + index)));
@@ -82,7 +84,7 @@ impl Uvs {
         Some(out)
     }
 
-    /// Indices into `positions` of a triangle's corners, in a mesh of these triangles.
+    /// Indices into `coordinates` of a triangle's corners, in a mesh of these triangles.
     pub fn indices(&self, triangles: &[[u32; 3]], triangle: usize) -> [u32; 3] {
         match &self.corners {
             Some(corners) => [0, 1, 2].map(|corner| corners[3 * triangle + corner]),
@@ -107,16 +109,16 @@ mod tests {
         let vertices = [0, 2, 1, 1, 2, 3];
         // The same coordinates may occur twice.
         let uvs = Uvs::of_corners(POSITIONS.to_vec(), vec![0, 1, 2, 2, 3, 0], &vertices, 5).unwrap();
-        assert_eq!(uvs.positions, [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0], [0.0, 0.0]]);
+        assert_eq!(uvs.coordinates, [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0], [0.0, 0.0]]);
         assert_eq!((uvs.corners, uvs.missing), (None, 0));
         let uvs = Uvs::of_corners(POSITIONS.to_vec(), vec![0, 1, 2, 2, 0, 0], &vertices, 5).unwrap();
-        assert_eq!((uvs.positions, uvs.corners), (POSITIONS.to_vec(), Some(vec![0, 1, 2, 2, 0, 0])));
+        assert_eq!((uvs.coordinates, uvs.corners), (POSITIONS.to_vec(), Some(vec![0, 1, 2, 2, 0, 0])));
     }
 
     #[test]
     fn corners_without_any_have_0() {
         let uvs = Uvs::of_corners(POSITIONS.to_vec(), vec![1, NONE, NONE], &[0, 1, 1], 2).unwrap();
-        assert_eq!((uvs.positions, uvs.corners, uvs.missing), (vec![[1.0, 0.0], [0.0, 0.0]], None, 2));
+        assert_eq!((uvs.coordinates, uvs.corners, uvs.missing), (vec![[1.0, 0.0], [0.0, 0.0]], None, 2));
         assert_eq!(Uvs::of_corners(POSITIONS.to_vec(), vec![NONE; 3], &[0, 1, 2], 3), None);
     }
 
@@ -124,14 +126,14 @@ mod tests {
     fn meshes_are_joined_with_and_without() {
         let (seam, smooth) = ([[0, 1, 2], [2, 1, 3]], [[2, 0, 1]]);
         let corners = Some(vec![0, 1, 2, 2, 1, 0]);
-        let first = Uvs { positions: POSITIONS[..3].to_vec(), corners, missing: 0 };
-        let second = Uvs { positions: POSITIONS[1..].to_vec(), corners: None, missing: 1 };
+        let first = Uvs { coordinates: POSITIONS[..3].to_vec(), corners, missing: 0 };
+        let second = Uvs { coordinates: POSITIONS[1..].to_vec(), corners: None, missing: 1 };
         let parts = [(Some(&first), 4, &seam[..]), (None, 3, &smooth), (Some(&second), 3, &smooth)];
         let all = Uvs::joined(parts.into_iter()).unwrap();
         assert_eq!(all.corners.as_deref(), Some(&[0, 1, 2, 2, 1, 0, 5, 3, 4, 8, 6, 7][..]));
-        assert_eq!((all.positions[4], all.positions[6], all.missing), ([0.0; 2], POSITIONS[1], 1));
+        assert_eq!((all.coordinates[4], all.coordinates[6], all.missing), ([0.0; 2], POSITIONS[1], 1));
         let all = Uvs::joined(parts[1..].iter().copied()).unwrap();
-        assert_eq!((all.corners, all.positions.len()), (None, 6));
+        assert_eq!((all.corners, all.coordinates.len()), (None, 6));
         assert_eq!(Uvs::joined(parts[1..2].iter().copied()), None);
     }
 }

@@ -205,7 +205,7 @@ pub(in crate::io) fn write(
             .iter()
             .try_for_each(|[a, b, c]| writeln!(out, "f {} {} {}", a + 1, b + 1, c + 1));
     };
-    for [u, v] in &uvs.positions {
+    for [u, v] in &uvs.coordinates {
         writeln!(out, "vt {u} {v}")?;
     }
     for (index, triangle) in mesh.triangles.iter().enumerate() {

@@ -173,7 +173,7 @@ impl Parsed {
                 let missing = self.of_vertices.iter().filter(|position| is_missing(position)).count();
                 let known = |position: [f32; 2]| if uvs::is_finite(position) { position } else { [0.0; 2] };
                 let positions = self.of_vertices.into_iter().map(known).collect();
-                Some(Uvs { positions, corners: None, missing })
+                Some(Uvs { coordinates: positions, corners: None, missing })
             }
             of_corners => of_corners,
         };

@@ -47,7 +47,7 @@ pub(in crate::io) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carrie
     writeln!(out, "end_header")?;
     for (vertex, p) in mesh.positions.iter().enumerate() {
         let velocity = velocities.get(vertex).filter(|_| moving);
-        let position = of_vertices.map(|uvs| uvs.positions[vertex]);
+        let position = of_vertices.map(|uvs| uvs.coordinates[vertex]);
         let values = p.iter().chain(velocity.into_iter().flatten()).chain(position.iter().flatten());
         for value in values {
             out.write_all(&value.to_le_bytes())?;
@@ -62,7 +62,7 @@ pub(in crate::io) fn write(out: &mut dyn Write, mesh: &TriMesh, carried: &Carrie
         if let Some(uvs) = of_corners {
             out.write_all(&[6])?;
             for index in uvs.indices(&mesh.triangles, number) {
-                for value in uvs.positions[index as usize] {
+                for value in uvs.coordinates[index as usize] {
                     out.write_all(&value.to_le_bytes())?;
                 }
             }

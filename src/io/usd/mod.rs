@@ -366,7 +366,7 @@ pub fn clip(kind: &str, frame: i32, fps: f64, units: Units, meshes: &[MeshFrame]
         }
         declare_uvs(&mut out, "        ", mesh.uvs);
         if let Some(uvs) = mesh.uvs {
-            let positions = list(uvs.positions.iter(), |out, [u, v]| {
+            let positions = list(uvs.coordinates.iter(), |out, [u, v]| {
                 let _ = write!(out, "({u}, {v})");
             });
             let _ = writeln!(out, "        {POSITIONS}.timeSamples = {{ {frame}: {positions} }}");

@@ -169,15 +169,15 @@ impl<'a> Origins<'a> {
     fn uvs(&self, uvs: &Uvs, triangles: &[[u32; 3]], sources: &[Source], is_tracked: bool) -> Uvs {
         if uvs.corners.is_none() && (is_tracked || !self.joins_seams(uvs, triangles)) {
             let position = |origin: &Origin| match origin {
-                Origin::Vertex(vertex) => uvs.positions[*vertex as usize],
+                Origin::Vertex(vertex) => uvs.coordinates[*vertex as usize],
                 Origin::Place(triangle, weights) => {
-                    between(self.old[*triangle].map(|vertex| uvs.positions[vertex as usize]), weights)
+                    between(self.old[*triangle].map(|vertex| uvs.coordinates[vertex as usize]), weights)
                 }
             };
             let positions = self.vertices.iter().map(position).collect();
-            return Uvs { positions, corners: None, missing: uvs.missing };
+            return Uvs { coordinates: positions, corners: None, missing: uvs.missing };
         }
-        let mut positions = uvs.positions.clone();
+        let mut positions = uvs.coordinates.clone();
         let mut corners = Vec::with_capacity(3 * self.triangles.len());
         let mut beside = self.beside(uvs, triangles, sources).into_iter().peekable();
         for (chart, weights) in &self.triangles {
@@ -190,11 +190,11 @@ impl<'a> Origins<'a> {
                     corners.push(own[most]);
                 } else {
                     corners.push(positions.len() as u32);
-                    positions.push(between(own.map(|index| uvs.positions[index as usize]), weights));
+                    positions.push(between(own.map(|index| uvs.coordinates[index as usize]), weights));
                 }
             }
         }
-        Uvs { positions, corners: Some(corners), missing: uvs.missing }
+        Uvs { coordinates: positions, corners: Some(corners), missing: uvs.missing }
     }
 
     /// The vertex of the old mesh that a vertex of the new mesh was.
@@ -253,7 +253,7 @@ impl<'a> Origins<'a> {
 
     /// Whether a vertex joins several old vertices that had different texture coordinates.
     fn joins_seams(&self, uvs: &Uvs, triangles: &[[u32; 3]]) -> bool {
-        let position = |vertex: u32| uvs.positions[vertex as usize];
+        let position = |vertex: u32| uvs.coordinates[vertex as usize];
         let is_other = |chart: usize, weights: &Weights, vertex: u32| {
             let most = heaviest(weights);
             let own = self.own(vertex);
@@ -302,7 +302,7 @@ mod tests {
             array("spread", On::Vertices, Number::F64, &[0.0, 1.0, f64::NAN, 3.0]),
         ];
         let positions = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-        let uvs = Uvs { positions: positions.clone(), corners: None, missing: 2 };
+        let uvs = Uvs { coordinates: positions.clone(), corners: None, missing: 2 };
         let detail = DetailedMesh { mesh: old, uvs: Some(uvs), arrays };
         let carried = carried(&detail, new.clone(), &VERTICES, &SOURCES, None);
         assert_eq!(carried.mesh, new);
@@ -322,19 +322,23 @@ mod tests {
         assert!(spread[2].is_nan() && spread[4].is_nan() && spread[3] == 3.0, "{spread:?}");
         let uvs = carried.uvs.unwrap();
         assert_eq!((uvs.corners, uvs.missing), (None, 2));
-        assert!(uvs.positions[..4] == positions && uvs.positions[4] == [0.5, 1.0], "{:?}", uvs.positions);
+        assert!(
+            uvs.coordinates[..4] == positions && uvs.coordinates[4] == [0.5, 1.0],
+            "{:?}",
+            uvs.coordinates
+        );
     }
 
     #[test]
     fn coordinates_with_seams_stay_coordinates_of_corners() {
         let (old, new) = squares();
         let positions: Vec<[f32; 2]> = (0..6u8).map(|n| [f32::from(n), 0.125 * f32::from(n)]).collect();
-        let uvs = Uvs { positions: positions.clone(), corners: Some((0..6).collect()), missing: 0 };
+        let uvs = Uvs { coordinates: positions.clone(), corners: Some((0..6).collect()), missing: 0 };
         let detail = DetailedMesh { mesh: old, uvs: Some(uvs), arrays: Vec::new() };
         let uvs = carried(&detail, new, &VERTICES, &SOURCES, None).uvs.unwrap();
         assert_eq!(uvs.corners.unwrap(), [0, 2, 1, 3, 4, 6, 3, 7, 5]);
-        assert!(uvs.positions.starts_with(&positions));
-        assert_eq!(uvs.positions[6..], [[4.5, 0.5625]; 2]);
+        assert!(uvs.coordinates.starts_with(&positions));
+        assert_eq!(uvs.coordinates[6..], [[4.5, 0.5625]; 2]);
     }
 
     #[test]
@@ -350,13 +354,13 @@ mod tests {
         let sources = [Source::Part(2), Source::Part(3), Source::Whole(1)];
         let places: Vec<[f32; 2]> = (0..7u8).map(|n| [f32::from(n), 0.5 * f32::from(n)]).collect();
         let found = |places: &[[f32; 2]], corners| {
-            let uvs = Some(Uvs { positions: places.to_vec(), corners, missing: 0 });
+            let uvs = Some(Uvs { coordinates: places.to_vec(), corners, missing: 0 });
             let detail = DetailedMesh { mesh: old.clone(), uvs, arrays: Vec::new() };
             let traced = Traced { first: &detail, tree: None, positions: &[], spacing: 1.0 };
             carried(&detail, new.clone(), &vertices, &sources, Some(&traced)).uvs.unwrap()
         };
         let uvs = found(&places[..6], None);
-        assert_eq!((uvs.positions, uvs.corners), (kept.map(|n| places[n]).to_vec(), None));
+        assert_eq!((uvs.coordinates, uvs.corners), (kept.map(|n| places[n]).to_vec(), None));
         let mut indices = old.triangles.as_flattened().to_vec();
         for has_seam in [false, true] {
             if has_seam {
@@ -366,7 +370,7 @@ mod tests {
             let uvs = found(&places, Some(indices.clone()));
             let first = if has_seam { 6 } else { 0 };
             assert_eq!(
-                (uvs.positions, uvs.corners),
+                (uvs.coordinates, uvs.corners),
                 (places.clone(), Some(vec![first, 2, 5, 0, 5, 4, 0, 4, 3]))
             );
         }
@@ -376,7 +380,7 @@ mod tests {
     fn coordinates_that_no_corner_has_any_more_go_where_nothing_is_traced() {
         let (old, mut new) = squares();
         let positions: Vec<[f32; 2]> = (0..6u8).map(|n| [f32::from(n), 0.125 * f32::from(n)]).collect();
-        let uvs = Some(Uvs { positions: positions.clone(), corners: Some((0..6).collect()), missing: 0 });
+        let uvs = Some(Uvs { coordinates: positions.clone(), corners: Some((0..6).collect()), missing: 0 });
         let first = DetailedMesh { mesh: old, uvs, arrays: Vec::new() };
         let traced = Traced { first: &first, tree: None, positions: &[], spacing: 1.0 };
         let [mut with, mut without] = [first.clone(), first.clone()];
@@ -384,13 +388,13 @@ mod tests {
             with = carried(&with, new.clone(), &VERTICES, &SOURCES, Some(&traced));
             without = carried(&without, new.clone(), &VERTICES, &SOURCES, None);
             let (uvs, all) = (with.uvs.as_ref().unwrap(), without.uvs.as_ref().unwrap());
-            assert!(uvs.positions.starts_with(&positions));
+            assert!(uvs.coordinates.starts_with(&positions));
             let corners = uvs.corners.as_ref().unwrap();
-            assert!((6..uvs.positions.len() as u32).all(|index| corners.contains(&index)), "{corners:?}");
-            assert_eq!(all.positions.len() > uvs.positions.len(), change > 0);
+            assert!((6..uvs.coordinates.len() as u32).all(|index| corners.contains(&index)), "{corners:?}");
+            assert_eq!(all.coordinates.len() > uvs.coordinates.len(), change > 0);
             for triangle in 0..3 {
                 let of = |uvs: &Uvs| {
-                    uvs.indices(&new.triangles, triangle).map(|index| uvs.positions[index as usize])
+                    uvs.indices(&new.triangles, triangle).map(|index| uvs.coordinates[index as usize])
                 };
                 assert_eq!(of(uvs), of(all));
             }
@@ -411,14 +415,14 @@ mod tests {
             if has_seam {
                 places[4] = [7.0, 7.0];
             }
-            let uvs = Some(Uvs { positions: places.clone(), corners: None, missing: 0 });
+            let uvs = Some(Uvs { coordinates: places.clone(), corners: None, missing: 0 });
             let detail = DetailedMesh { mesh: soup.clone(), uvs, arrays: Vec::new() };
             let uvs = carried(&detail, square.clone(), &vertices, &sources, None).uvs.unwrap();
             if has_seam {
-                assert_eq!((uvs.positions, uvs.corners), (places, Some(vec![0, 1, 2, 3, 4, 5])));
+                assert_eq!((uvs.coordinates, uvs.corners), (places, Some(vec![0, 1, 2, 3, 4, 5])));
             } else {
                 let kept = [0, 1, 2, 5].map(|n: usize| places[n]);
-                assert_eq!((&uvs.positions[..], uvs.corners), (&kept[..], None));
+                assert_eq!((&uvs.coordinates[..], uvs.corners), (&kept[..], None));
             }
         }
     }

@@ -40,7 +40,7 @@ pub(in crate::mesh_repair) fn textured(
 ) {
     if charts.list.is_empty() {
         // New geometry has coordinates of the previous mesh, and each change adds some.
-        tidy(out, first.positions.len());
+        tidy(out, first.coordinates.len());
         return;
     }
     let texture = Texture::of(charts, first, mesh);
@@ -50,14 +50,14 @@ pub(in crate::mesh_repair) fn textured(
         .map(|slot| near.nearest(slot, out, texture.own[slot], texture.reach[slot]))
         .collect();
     let differences = kept.iter().zip(&texture.own).map(|(kept, own)| {
-        let position = out.positions[(*kept)? as usize].map(f64::from);
+        let position = out.coordinates[(*kept)? as usize].map(f64::from);
         Some([position[0] - own[0], position[1] - own[1]])
     });
     let spread = texture.spread(charts, differences.collect());
     let own = |slot: usize| [0, 1].map(|axis| (texture.own[slot][axis] + spread[slot][axis]) as f32);
     if out.corners.is_none() {
         for (slot, name) in charts.names.iter().enumerate().filter(|(slot, _)| !is_kept[*slot]) {
-            out.positions[*name as usize] = own(slot);
+            out.coordinates[*name as usize] = own(slot);
         }
         let is_far = |slot: &usize| is_kept[*slot] && kept[*slot].is_none();
         charts.list.iter_mut().for_each(|chart| chart.is_torn |= chart.slots.iter().any(is_far));
@@ -77,8 +77,8 @@ pub(in crate::mesh_repair) fn textured(
                     Corner::Own => own(slot),
                     Corner::Chart(position) => position.map(|x| x as f32),
                 };
-                out.positions.push(position);
-                out.positions.len() as u32 - 1
+                out.coordinates.push(position);
+                out.coordinates.len() as u32 - 1
             });
             if let Corner::Own = corner {
                 made[slot] = Some(index);
@@ -91,13 +91,13 @@ pub(in crate::mesh_repair) fn textured(
             corners[3 * chart.number..3 * chart.number + 3].copy_from_slice(own);
         }
     }
-    tidy(out, first.positions.len());
+    tidy(out, first.coordinates.len());
 }
 
 /// Removes coordinates that no corner uses, except those of the first mesh.
 fn tidy(uvs: &mut Uvs, first: usize) {
     let Some(corners) = &mut uvs.corners else { return };
-    let mut is_used: Vec<bool> = (0..uvs.positions.len()).map(|at| at < first).collect();
+    let mut is_used: Vec<bool> = (0..uvs.coordinates.len()).map(|at| at < first).collect();
     corners.iter().for_each(|corner| is_used[*corner as usize] = true);
     let mut next = 0;
     let number = |is_used: &bool| {
@@ -107,7 +107,7 @@ fn tidy(uvs: &mut Uvs, first: usize) {
     let numbers: Vec<u32> = is_used.iter().map(number).collect();
     corners.iter_mut().for_each(|corner| *corner = numbers[*corner as usize]);
     let mut marks = is_used.iter();
-    uvs.positions.retain(|_| marks.next().copied().unwrap_or_default());
+    uvs.coordinates.retain(|_| marks.next().copied().unwrap_or_default());
 }
 
 /// Where a corner of a charted triangle takes its coordinate from.
@@ -140,14 +140,14 @@ impl Texture {
     fn of(charts: &Charts<'_>, first: &Uvs, mesh: &TriMesh) -> Self {
         let triangles = &charts.first.mesh.triangles;
         let at = |triangle: usize, weights: &Weights| -> Pair {
-            let corners = first.indices(triangles, triangle).map(|index| first.positions[index as usize]);
+            let corners = first.indices(triangles, triangle).map(|index| first.coordinates[index as usize]);
             between(corners, weights).map(f64::from)
         };
         let own: Vec<Pair> = charts.spots.iter().map(|spot| at(spot.triangle, &spot.weights)).collect();
         // Largest change of coordinates over a metre of a triangle of the first mesh.
         let rate = |triangle: usize| {
             let positions = charts.first.mesh.corners(triangle);
-            let corners = first.indices(triangles, triangle).map(|index| first.positions[index as usize]);
+            let corners = first.indices(triangles, triangle).map(|index| first.coordinates[index as usize]);
             let corners = corners.map(|position| position.map(f64::from));
             let of_edge = |[a, b]: [usize; 2]| {
                 let length = (positions[b] - positions[a]).norm();
@@ -244,7 +244,7 @@ impl Around {
     fn nearest(&self, slot: usize, uvs: &Uvs, position: Pair, reach: f64) -> Option<u32> {
         let begin = self.0.partition_point(|(other, _)| *other < slot);
         let own = self.0[begin..].iter().take_while(|(other, _)| *other == slot);
-        let far = |index: u32| apart(uvs.positions[index as usize].map(f64::from), position);
+        let far = |index: u32| apart(uvs.coordinates[index as usize].map(f64::from), position);
         let all = own.map(|(_, index)| (far(*index), *index));
         let nearest = all.fold(None, |best: Option<(f64, u32)>, next| match best {
             Some(best) if best.0 <= next.0 => Some(best),

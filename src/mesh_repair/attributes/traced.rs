@@ -291,13 +291,15 @@ mod tests {
             names.map(|name| if is_beyond { name + count } else { name })
         };
         let uvs = match kind {
-            Kind::OfVertices => Uvs { positions, corners: None, missing: 0 },
-            Kind::OfCorners => {
-                Uvs { positions, corners: Some(mesh.triangles.as_flattened().to_vec()), missing: 0 }
-            }
+            Kind::OfVertices => Uvs { coordinates: positions, corners: None, missing: 0 },
+            Kind::OfCorners => Uvs {
+                coordinates: positions,
+                corners: Some(mesh.triangles.as_flattened().to_vec()),
+                missing: 0,
+            },
             Kind::WithSeam => {
                 let corners = mesh.triangles.iter().flat_map(corner).collect();
-                Uvs { positions: [positions, beyond].concat(), corners: Some(corners), missing: 0 }
+                Uvs { coordinates: [positions, beyond].concat(), corners: Some(corners), missing: 0 }
             }
         };
         let x = mesh.positions.iter().map(|position| f64::from(position.x)).collect();
@@ -342,7 +344,7 @@ mod tests {
         let uvs = detail.uvs.as_ref().unwrap();
         let indices = uvs.indices(&detail.mesh.triangles, triangle);
         let names = detail.mesh.triangles[triangle];
-        [0, 1, 2].map(|n| (uvs.positions[indices[n] as usize], detail.mesh.positions[names[n] as usize]))
+        [0, 1, 2].map(|n| (uvs.coordinates[indices[n] as usize], detail.mesh.positions[names[n] as usize]))
     }
 
     fn mask(detail: &DetailedMesh) -> &[f64] {
@@ -380,7 +382,7 @@ mod tests {
                     assert!((x[vertex] - wanted).abs() < 1e-4, "{vertex}: {} {wanted}", x[vertex]);
                 }
                 assert!((0..sources.len()).all(|n| astray > 0.0 || (number[n] - n as f64).abs() < 40.0));
-                let made = out.uvs.as_ref().unwrap().positions.len() - (SIDE + 1) * (SIDE + 1);
+                let made = out.uvs.as_ref().unwrap().coordinates.len() - (SIDE + 1) * (SIDE + 1);
                 assert_eq!(made, if kind == Kind::OfVertices { 0 } else { 9 });
             }
         }

@@ -300,7 +300,7 @@ impl Sheet {
             self.triangles.push(self.triangles[at].map(|vertex| vertex + by));
         }
         if let Some(uvs) = &mut self.uvs {
-            uvs.positions.extend_from_within(vertices.clone());
+            uvs.coordinates.extend_from_within(vertices.clone());
         }
         for at in vertices {
             self.vertices.push(self.vertices[at] + shift);
@@ -345,7 +345,7 @@ impl Sheet {
         let count = self.vertices.len() - begin;
         let Some(positions) = positions else {
             if let Some(uvs) = &mut self.uvs {
-                uvs.positions.resize(self.vertices.len(), [0.0; 2]);
+                uvs.coordinates.resize(self.vertices.len(), [0.0; 2]);
                 uvs.missing += count;
             }
             return Ok(());
@@ -354,9 +354,9 @@ impl Sheet {
         if positions.len() != count {
             return Err("has not texture coordinates for every vertex".into());
         }
-        let before = || Uvs { positions: vec![[0.0; 2]; begin], corners: None, missing: begin };
+        let before = || Uvs { coordinates: vec![[0.0; 2]; begin], corners: None, missing: begin };
         let uvs = self.uvs.get_or_insert_with(before);
-        uvs.positions.extend(positions.into_iter().map(|[u, v]| [u, 1.0 - v]));
+        uvs.coordinates.extend(positions.into_iter().map(|[u, v]| [u, 1.0 - v]));
         Ok(())
     }
 }

@@ -131,8 +131,8 @@ impl Filled {
 }
 
 impl Fog {
-    /// A fog of densities by block position (a multiple of 8 on each axis), each at most once. Density 1 attenuates light by `extinction`
-    /// per metre (1/m, over short paths, over 0; products above a million count as a million).
+    /// A fog of densities by block position (a multiple of 8 on each axis), each at most once. Density 1 removes the share `extinction`
+    /// of the light per metre, over short paths (1/m, above 0; density times extinction counts as a million at most).
     /// # Errors
     /// Densities too far apart, or too many for the memory limit; cancel.
     pub fn of_parts(

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Former values longer than this are not reported.
 const LONG: usize = 80;
-/// Prefix in place of a file's name: the same content under another name is the same input.
+/// Prefix of a hash instead of a file's name: the same content under another name is the same input.
 pub const CONTENT: &str = "content ";
 
 /// Settings by key: `snow.noise.size`, `object[1].scale`.

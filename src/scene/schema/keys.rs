@@ -139,7 +139,7 @@ pub fn tables(keys: &[Key]) -> Vec<&'static str> {
     out
 }
 
-/// The settings that a stage depends on, with the content of the objects' files in place of their names. Only objects with these roles
+/// The settings that a stage depends on, with the content of the objects' files instead of their names. Only objects with these roles
 /// count, each according to its role. Of the frames only the first counts: a shot may be extended.
 ///
 /// # Errors

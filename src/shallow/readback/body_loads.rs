@@ -2,7 +2,7 @@
 //!
 //! A body is a pillar in each cell that it covers (`terrain/shapes.rs`). Its faces are where liquid touches pillars: below, above, and at
 //! the sides, where the pillar of one cell and the liquid of the next are at the same height. On a face acts the weight of the liquid above
-//! it, rho g (eta - y), integrated exactly over the pillar, with the head of a flooded column in place of eta; a submerged ball has the
+//! it, rho g (eta - y), integrated exactly over the pillar, with the head of a flooded column instead of eta; a submerged ball has the
 //! buoyancy of its pillars. On a face that the liquid runs into acts the stagnation pressure, rho w^2 / 2, and along each face the shear of
 //! a film, of a flooded gap, or of a wall half a cell away.
 

@@ -46,7 +46,7 @@ impl Snapshot {
         snapshot
     }
 
-    /// Takes the current liquid, in place of the previous one: the strips that have or had liquid, and the columns where the terrain has
+    /// Replaces the contents by the current liquid: the strips that have or had liquid, and the columns where the terrain has
     /// changed. Allocates nothing, unless these are more than ever before; it may be another liquid.
     pub fn take(&mut self, shallow: &Shallow) {
         if self.terrain != shallow.identity.number() {

@@ -36,7 +36,7 @@ pub(in crate::shallow) enum Account {
 pub(in crate::shallow) const ACCOUNTS: usize = Account::Dried as usize + 1;
 
 impl Account {
-    /// Accounts of outflow at flow points are negative.
+    /// Factor from the change of a column to its account: drains and absorbers count what they remove as positive.
     fn sign(self) -> i128 {
         if matches!(self, Self::Drained | Self::Absorbed) { -1 } else { 1 }
     }

@@ -94,8 +94,8 @@ impl Fast {
         self.rows.fill(false);
     }
 
-    /// Finds the rows with fast pipes. Returns a power of two, at most `farthest`: the cells within which each disturbance stays during
-    /// `step` times the last step.
+    /// Finds the rows with fast pipes. Returns a count of cells, a power of two: the smallest that no disturbance exceeds during `step`
+    /// times the last step, or `farthest` if that is less.
     pub fn find(&mut self, films: &Films, step: f32, farthest: u32) -> u32 {
         let rows = &mut self.rows[..];
         dispatch!(find_rows(rows: &mut [bool], films: &Films, step: f32, farthest: u32) -> u32)

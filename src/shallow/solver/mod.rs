@@ -297,8 +297,8 @@ impl Flow {
         self.active.rouse_all();
     }
 
-    /// Finds fast films. Returns a power of two, at most `farthest`: the cells within which each disturbance in them stays during `step`
-    /// times the last step, whose g unit dt^2 / dx^2 is `drive` (1 / units).
+    /// Finds fast films. Returns a count of cells, a power of two: the smallest that no disturbance in them exceeds during `step` times the
+    /// last step, or `farthest` if that is less. g unit dt^2 / dx^2 of the last step is `drive` (1 / units).
     pub fn find_fast(&mut self, columns: &Columns, drive: f64, step: f64, farthest: u32) -> u32 {
         self.active.refresh(columns, &self.depth);
         let Self { fast, active, depth, flux: [east, south], .. } = self;

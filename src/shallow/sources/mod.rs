@@ -162,7 +162,7 @@ impl FlowPoint {
 }
 
 impl Flows {
-    /// Sets the flow points, in place of the previous ones; what those have moved stays in the sums. `which` names one in an error.
+    /// Replaces the flow points; what the previous ones have moved stays in the sums. `which` names one in an error.
     ///
     /// # Errors
     /// `Argument`: a number out of range, or a point that has no column within its radius (or two cells): it lies inside solid, or outside

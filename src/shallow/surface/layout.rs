@@ -43,7 +43,7 @@ pub struct Layout {
     pub scale: f64,
     /// The axis that points up.
     pub up: Up,
-    /// Left-handed axes: the horizontal axis that is not x points the other way (Y up: z to the north; Z up: y to the south).
+    /// Left-handed axes: the horizontal axis that is not x is reversed (Y up: z to the north; Z up: y to the south).
     pub left_handed: bool,
     /// Minimum height of a wet vertex above its base (m), against flicker where the terrain is drawn too (thesis 4.2.4: 0.05 of a cell). A
     /// dry vertex is at least as far below its base, and further where the liquid around is lower.

@@ -1,4 +1,4 @@
-//! Which way the triangles of a terrain face: closed parts outward.
+//! The direction that the triangles of a terrain face: closed parts outward.
 
 use crate::geometry::TriMesh;
 use crate::geometry::check::orientation::{Closing, Orientation};

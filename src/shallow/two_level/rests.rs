@@ -79,7 +79,7 @@ impl Rests {
         Load { units: self.units[cell], amounts: self.amounts.get(cell).copied().unwrap_or_default() }
     }
 
-    /// Sets what waits in a cell, in place of what did.
+    /// Replaces what waits in a cell.
     pub fn set(&mut self, cell: usize, load: Load) {
         self.units[cell] = load.units;
         if let Some(amounts) = self.amounts.get_mut(cell) {

@@ -10,7 +10,7 @@ use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh};
 use crate::surface::particles::grid::cell_of;
 
-/// A direction along which no edges of new meshes run.
+/// A direction along which no edges of modelled meshes run.
 const ASLANT: DVec3 = DVec3::new(0.5773, 0.6533, 0.4896);
 /// Maximum distance of a particle that is beside a part (spacings).
 const BESIDE: f64 = 0.5;

@@ -104,8 +104,8 @@ impl Parts {
         Lacking { positions, specks }
     }
 
-    /// The drops, of ascending `drops`, that hold too few particles, and the `bubbles`, with a position (m) on each, that lie in such a
-    /// drop; and the bounds (cells) of these drops. The meshes that they would get are counted in the same way.
+    /// Those of `drops` (ascending) that hold too few particles, and those of `bubbles` (each with a position (m) on it) that lie in such a
+    /// drop; also the bounds (cells) of these drops. The particles in the meshes that they would get are counted in the same way.
     fn specks(
         &self,
         phi: &Implicit,

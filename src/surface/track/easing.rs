@@ -23,7 +23,7 @@ const LONGEST: f64 = 4.0;
 const NEAR: f64 = 0.25;
 /// Number of iterations in which vertices without a pull take the mean displacement of their neighbours.
 const SPREAD: usize = 8;
-/// A pull on a vertex with less than this weight is ignored.
+/// Pulls on a vertex are ignored if their weights add up to less than this.
 const LEAST: f64 = 1e-3;
 
 /// Effect of a step on the vertices before it.

@@ -169,7 +169,7 @@ fn by_positions(detail: &DetailedMesh) -> Vec<Placed> {
     let values = |name: &str| &arrays.iter().find(|array| array.name == name).unwrap().values;
     let [dry, mask, red, part] = ["dry", "mask", "red", "part"].map(values);
     let triangle = |n: usize| {
-        let positions = uvs.indices(&mesh.triangles, n).map(|index| uvs.positions[index as usize]);
+        let positions = uvs.indices(&mesh.triangles, n).map(|index| uvs.coordinates[index as usize]);
         let mut corners = [0, 1, 2].map(|corner| {
             let vertex = mesh.triangles[n][corner] as usize;
             let [u, v] = positions[corner].map(|x| u64::from(x.to_bits()));
@@ -204,7 +204,7 @@ fn what_is_not_rebuilt_keeps_its_arrays_bit_for_bit() {
     ];
     // Each corner has its own: seams everywhere.
     let positions = (0..corners).map(|n| [0.25 * n as f32, 1.0 + n as f32]).collect();
-    let uvs = Uvs { positions, corners: Some((0..corners).collect()), missing: 0 };
+    let uvs = Uvs { coordinates: positions, corners: Some((0..corners).collect()), missing: 0 };
     let arrays: Vec<&MeshArray> = arrays.iter().collect();
     let carried = mesh::Carried { uvs: Some(&uvs), arrays: &arrays, ..Default::default() };
     mesh::write_carried(&folder.join("two.ply"), &mesh, &carried).unwrap();

@@ -29,7 +29,7 @@ fn of_polygons(polygons: PolygonMesh) -> (Vec<[f32; 3]>, Vec<Vec<Corner>>) {
     let triangle = |index: usize| {
         let at = uvs.indices(&mesh.triangles, index);
         (0..3)
-            .map(|i| (positions[mesh.triangles[index][i] as usize], uvs.positions[at[i] as usize]))
+            .map(|i| (positions[mesh.triangles[index][i] as usize], uvs.coordinates[at[i] as usize]))
             .collect()
     };
     let triangles = (0..mesh.triangles.len()).map(triangle).collect();

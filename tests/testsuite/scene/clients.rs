@@ -23,7 +23,7 @@ fn shot(tables: &str) -> TempDir {
     // Seams at every edge.
     let corners = (0..3 * mesh.triangles.len() as u32).map(|corner| corner % 4).collect();
     let positions = vec![[0.0, 0.0], [0.75, 0.0], [0.5, 1.0], [0.25, -2.0]];
-    let uvs = frazil::geometry::Uvs { positions, corners: Some(corners), missing: 0 };
+    let uvs = frazil::geometry::Uvs { coordinates: positions, corners: Some(corners), missing: 0 };
     let carried = frazil::io::mesh::Carried { uvs: Some(&uvs), ..Default::default() };
     frazil::io::mesh::write_carried(&folder.path().join("box.obj"), &mesh, &carried).unwrap();
     let scene = "[shot]\nframes = \"3-8\"\n[snow]\nground = 0.0\narea = [-1, -1, 1, 1]\ndepth = 0.3\ncell = 0.02\n\

@@ -68,7 +68,7 @@ fn detailed(mesh: TriMesh) -> DetailedMesh {
         [(corner / (3 * CHART)) as f32 + position.y, position.z - position.x]
     };
     let positions = mesh.triangles.as_flattened().iter().enumerate().map(position).collect();
-    let uvs = Uvs { positions, corners: Some((0..3 * faces as u32).collect()), missing: 0 };
+    let uvs = Uvs { coordinates: positions, corners: Some((0..3 * faces as u32).collect()), missing: 0 };
     DetailedMesh { mesh, uvs: Some(uvs), arrays }
 }
 
@@ -108,7 +108,7 @@ fn array<'a>(mesh: &'a DetailedMesh, name: &str) -> &'a [f64] {
 /// The texture coordinates of a triangle's corners.
 fn coordinates(mesh: &DetailedMesh, triangle: usize) -> [[f32; 2]; 3] {
     let uvs = mesh.uvs.as_ref().expect("texture coordinates");
-    uvs.indices(&mesh.mesh.triangles, triangle).map(|index| uvs.positions[index as usize])
+    uvs.indices(&mesh.mesh.triangles, triangle).map(|index| uvs.coordinates[index as usize])
 }
 
 /// A number of a frame's report.

@@ -48,7 +48,7 @@ fn write_shot(folder: &Path) {
     write_cache(folder, "ball", &ball, FRAMES);
     let (vertices, faces) = (ball.mesh.positions.len(), ball.mesh.triangles.len());
     let uvs = Uvs {
-        positions: (0..3 * faces).map(|n| [n as f32 / 7.0, 1.0 / (1.0 + n as f32)]).collect(),
+        coordinates: (0..3 * faces).map(|n| [n as f32 / 7.0, 1.0 / (1.0 + n as f32)]).collect(),
         corners: Some((0..3 * faces as u32).collect()),
         missing: 0,
     };
@@ -150,7 +150,7 @@ fn a_mesh_that_was_sculpted_takes_the_position_of_the_tracked_one() {
         assert!(part.len() == faces && part.iter().all(|part| *part == 0.0), "frame {number}");
         assert!(now.arrays.iter().all(|array| array.name != "heat"), "frame {number}");
         let uvs = now.uvs.as_ref().expect("texture coordinates");
-        assert!(uvs.positions.iter().all(|position| *position == [0.0; 2]), "frame {number}");
+        assert!(uvs.coordinates.iter().all(|position| *position == [0.0; 2]), "frame {number}");
         // Velocities lead to the next frame.
         if number < FRAMES {
             let next = frame(folder, "out", number + 1).mesh;

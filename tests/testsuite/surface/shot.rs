@@ -45,7 +45,7 @@ fn detailed(mesh: &TriMesh) -> DetailedMesh {
         values: (0..count).map(|n| (n % 251) as f64).collect(),
     };
     let uvs = Uvs {
-        positions: (0..3 * faces).map(|n| [n as f32 / 7.0, 1.0 / (1.0 + n as f32)]).collect(),
+        coordinates: (0..3 * faces).map(|n| [n as f32 / 7.0, 1.0 / (1.0 + n as f32)]).collect(),
         corners: Some((0..3 * faces as u32).collect()),
         missing: 0,
     };

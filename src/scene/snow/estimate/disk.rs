@@ -67,7 +67,7 @@ pub fn estimate(scene: &Scene, inputs: &Inputs) -> u64 {
         let drawn = body.motion().drawn();
         let vertices = drawn.vertices as f64;
         let (positions, corners) = drawn.uvs.map_or((0.0, 0.0), |uvs| {
-            (uvs.positions.len() as f64, uvs.corners.as_ref().map_or(0.0, |corners| corners.len() as f64))
+            (uvs.coordinates.len() as f64, uvs.corners.as_ref().map_or(0.0, |corners| corners.len() as f64))
         });
         let usda = vertices * USDA_PER_VERTEX + positions * USDA_PER_POSITION + corners * USDA_PER_INDEX;
         let ply = vertices * PLY_PER_VERTEX + positions.max(corners) * PLY_PER_POSITION;

@@ -57,7 +57,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "friction",
         Kind::Number(0.0, 1.0, ""),
-        "between grains, in place of repose_angle_deg; grains do not rotate, so low values suffice",
+        "between grains, instead of repose_angle_deg; grains do not rotate, so low values suffice",
     )
     .or_nothing()
     .such_as("0.2")
@@ -66,7 +66,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         "grains",
         "attraction",
         Kind::Number(0.0, MOST_ATTRACTION, "weights of a grain"),
-        "between grains that nearly touch, in place of stands",
+        "between grains that nearly touch, instead of stands",
     )
     .or_nothing()
     .such_as("4.0")
@@ -167,7 +167,7 @@ pub const GRAIN_KEYS: &[Key] = &[
         OBJECT,
         "compression",
         Kind::Number(0.0, 1.0, ""),
-        "in place of grains.compression, for the snow that it removes",
+        "instead of grains.compression, for the snow that it removes",
     )
     .or_nothing()
     .such_as("0.9")

@@ -42,7 +42,7 @@ pub const KEYS: &[Key] = &[
         "snow",
         "top",
         Kind::File(TOPS),
-        "in place of depth: mesh of the top surface, or the layer as a level set",
+        "instead of depth: mesh of the top surface, or the layer as a level set",
     )
     .or_nothing()
     .such_as("\"snow_top.ply\"")

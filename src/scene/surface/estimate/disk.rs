@@ -30,7 +30,7 @@ impl FrameSize {
     pub fn of(output: Files, is_rebuilt: bool, detail: &DetailedMesh) -> Self {
         let [vertices, triangles] = counts(detail);
         let (positions, corners) = detail.uvs.as_ref().map_or((0, 0), |uvs| {
-            (uvs.positions.len() as u64, uvs.corners.as_ref().map_or(0, |corners| corners.len() as u64))
+            (uvs.coordinates.len() as u64, uvs.corners.as_ref().map_or(0, |corners| corners.len() as u64))
         });
         let index = u64::from(vertices.max(positions).max(1).ilog10()) + 1 + AROUND_INDEX;
         // In .obj files every corner has an index of its texture coordinates, if there are any.
@@ -100,7 +100,7 @@ mod tests {
             positions: (0..4).map(|n| Vec3::repeat(n as f32)).collect(),
             triangles: vec![[0, 1, 2], [0, 2, 3]],
         };
-        let uvs = Uvs { positions: vec![[0.5; 2]; 6], corners: Some((0..6).collect()), missing: 0 };
+        let uvs = Uvs { coordinates: vec![[0.5; 2]; 6], corners: Some((0..6).collect()), missing: 0 };
         let array = |name: &str, on, count: usize| MeshArray {
             name: name.into(),
             on,

@@ -166,7 +166,7 @@ fn counts(detail: &DetailedMesh) -> [f64; 2] {
 fn numbers(detail: &DetailedMesh) -> f64 {
     let arrays: usize = detail.arrays.iter().map(|array| array.values.len()).sum();
     let uvs = detail.uvs.as_ref().map_or(0, |uvs| {
-        uvs.positions.len() + uvs.corners.as_ref().map_or(0, |corners| corners.len().div_ceil(2))
+        uvs.coordinates.len() + uvs.corners.as_ref().map_or(0, |corners| corners.len().div_ceil(2))
     });
     (arrays + uvs) as f64
 }

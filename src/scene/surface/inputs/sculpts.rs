@@ -150,8 +150,8 @@ fn conformed(edited: DetailedMesh, first: &DetailedMesh) -> (DetailedMesh, Vec<S
                      one side"
                         .into(),
                 );
-                let positions = of_vertices(&uvs.positions, corners, &mesh.triangles, vertices);
-                Some(Uvs { positions, corners: None, missing: uvs.missing })
+                let positions = of_vertices(&uvs.coordinates, corners, &mesh.triangles, vertices);
+                Some(Uvs { coordinates: positions, corners: None, missing: uvs.missing })
             }
             _ => Some(uvs),
         },
@@ -244,7 +244,7 @@ mod tests {
             array("part", On::Vertices, Number::I32, &[5.0; 4]),
             array("red", On::Vertices, Number::F32, &[0.0, 1.0, 0.5, 7.0]),
         ];
-        let uvs = Some(Uvs { positions: vec![[0.5; 2]; 4], corners: None, missing: 0 });
+        let uvs = Some(Uvs { coordinates: vec![[0.5; 2]; 4], corners: None, missing: 0 });
         let (taken, faults) = conformed(DetailedMesh { mesh: mesh(2), uvs, arrays }, &first);
         assert!(taken.mesh == mesh(2) && taken.uvs.is_none());
         let wanted = [
@@ -273,8 +273,8 @@ mod tests {
     #[test]
     fn texture_coordinates_have_the_form_that_those_of_the_first_mesh_have() {
         let positions = vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
-        let seamless = Uvs { positions: positions.clone(), corners: None, missing: 0 };
-        let seams = Uvs { positions: positions.clone(), corners: Some(vec![3, 1, 2, 0, 3, 1]), missing: 1 };
+        let seamless = Uvs { coordinates: positions.clone(), corners: None, missing: 0 };
+        let seams = Uvs { coordinates: positions.clone(), corners: Some(vec![3, 1, 2, 0, 3, 1]), missing: 1 };
         let with = |uvs: Option<&Uvs>| DetailedMesh { mesh: mesh(2), uvs: uvs.cloned(), arrays: Vec::new() };
         let taken = |uvs, first| {
             let (mesh, faults) = conformed(with(uvs), &with(first));
@@ -282,14 +282,14 @@ mod tests {
         };
         let (uvs, faults) = taken(Some(&seamless), Some(&seams));
         let corners = Some(vec![0, 1, 2, 0, 3, 1]);
-        assert_eq!((uvs, faults), (Uvs { positions, corners, missing: 0 }, String::new()));
+        assert_eq!((uvs, faults), (Uvs { coordinates: positions, corners, missing: 0 }, String::new()));
         let (uvs, faults) = taken(Some(&seams), Some(&seamless));
-        assert_eq!(uvs.positions, [[1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]);
+        assert_eq!(uvs.coordinates, [[1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]);
         assert!(uvs.corners.is_none() && uvs.missing == 1 && faults.contains("seams"), "{faults}");
         let (uvs, faults) = taken(None, Some(&seams));
         assert_eq!((uvs.corners, uvs.missing), (Some(vec![0; 6]), 6));
         assert!(faults.contains("carries: texture coordinates; they are 0"), "{faults}");
         let (uvs, _) = taken(None, Some(&seamless));
-        assert_eq!((uvs.positions, uvs.corners, uvs.missing), (vec![[0.0; 2]; 4], None, 4));
+        assert_eq!((uvs.coordinates, uvs.corners, uvs.missing), (vec![[0.0; 2]; 4], None, 4));
     }
 }

@@ -51,8 +51,8 @@ pub fn save(tracker: &Tracker, detail: &DetailedMesh, sculpted: Option<i32>) -> 
     to.u32(u32::from(detail.uvs.is_some()));
     if let Some(uvs) = &detail.uvs {
         to.count(uvs.missing);
-        to.count(uvs.positions.len());
-        to.f32s(uvs.positions.as_flattened());
+        to.count(uvs.coordinates.len());
+        to.f32s(uvs.coordinates.as_flattened());
         let corners = uvs.corners.as_deref();
         to.u32(u32::from(corners.is_some()));
         corners.unwrap_or_default().iter().for_each(|corner| to.u32(*corner));
@@ -103,13 +103,17 @@ fn uvs(from: &mut Reader<'_>, vertices: usize, faces: usize) -> Result<Uvs> {
         |from: &mut Reader<'_>| Ok([f32::from_le_bytes(from.take()?), f32::from_le_bytes(from.take()?)]);
     let positions = (0..count).map(|_| position(from)).collect::<Result<Vec<[f32; 2]>>>()?;
     if from.u32()? == 0 {
-        return if count == vertices { Ok(Uvs { positions, corners: None, missing }) } else { Err(wrong()) };
+        return if count == vertices {
+            Ok(Uvs { coordinates: positions, corners: None, missing })
+        } else {
+            Err(wrong())
+        };
     }
     let corners = (0..3 * faces).map(|_| from.u32()).collect::<Result<Vec<u32>>>()?;
     if corners.iter().any(|corner| *corner as usize >= count) {
         return Err(wrong());
     }
-    Ok(Uvs { positions, corners: Some(corners), missing })
+    Ok(Uvs { coordinates: positions, corners: Some(corners), missing })
 }
 
 fn wrong() -> Error {
@@ -145,7 +149,7 @@ mod tests {
             values: (0..count).map(|n| if n == 3 { f64::NAN } else { n as f64 }).collect(),
         };
         let arrays = vec![array("wet", On::Vertices, vertices), array("part", On::Faces, faces)];
-        let uvs = Uvs { positions: vec![[0.5, 0.25]; 7], corners: Some(vec![6; 3 * faces]), missing: 2 };
+        let uvs = Uvs { coordinates: vec![[0.5, 0.25]; 7], corners: Some(vec![6; 3 * faces]), missing: 2 };
         let first = DetailedMesh { mesh, ..DetailedMesh::default() };
         (tracker, first, DetailedMesh { mesh: TriMesh::default(), uvs: Some(uvs), arrays })
     }

@@ -249,7 +249,7 @@ impl Rows {
         is_held
     }
 
-    /// Closes the pipes that belong to the network, after the fluxes of a row.
+    /// Moves the network's units in a row, after the fluxes of that row, and closes the network's pipes there for the rest of the step.
     fn shut(&mut self, ground: &Ground, parts: &mut Parts, row: usize) {
         let (position, buffer) = (Place::new(ground.columns, row), &mut self.ring[row % RING]);
         let part = parts.of(row);

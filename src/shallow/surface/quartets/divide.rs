@@ -1,4 +1,4 @@
-//! Triangles of quartets of three and four columns.
+//! Triangles of groups of three and four columns.
 
 use crate::shallow::surface::quartets::cells::Entry;
 

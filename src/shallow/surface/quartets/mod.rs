@@ -1,4 +1,4 @@
-//! Quartets: groups of four linked columns of neighbouring cells, from which triangles are made (thesis 4.2.2).
+//! Quartets: the columns of 2 x 2 cells. Groups of linked columns among them become triangles (thesis 4.2.2).
 
 pub(in crate::shallow) mod cells;
 pub(in crate::shallow) mod divide;

@@ -95,7 +95,8 @@ impl Walls {
         }
     }
 
-    /// Adds the wall of the nodes linked with the given columns, or else that of the first node without a wall and those linked with it.
+    /// Adds the wall of the nodes linked with the given columns or, if there are none, that of the first node without a wall; with all
+    /// nodes without a wall that are linked with these, directly or through others.
     fn add(&mut self, scene: Scene<'_>, column: usize, linked: [Option<usize>; 8], is_own: bool) {
         let mut members = [NONE; 8];
         let is_linked =
