@@ -1,7 +1,8 @@
 //! A boot-sized box walks through snow: `cargo run --release --example press_snow DIR`.
 //!
-//! Each frame presses the moving box into the snow and writes the surface and the removed snow as DIR/snow.NNNN.vdb. Change the keys
-//! in `walk` to move it elsewhere, `DEPTH` for deeper snow, or replace the box by a mesh of your own (`frazil::io::mesh::read`).
+//! Each frame presses the moving box into the snow and writes the snow as DIR/snow.NNNN.vdb, and what the frame removed as
+//! DIR/removed.NNNN.vdb (`frazil preview DIR/snow.0024.vdb -o snow.png` draws one). Change the keys in `walk` to move the box elsewhere,
+//! `DEPTH` for deeper snow, or replace it by a mesh of your own (`frazil::io::mesh::read`).
 
 use std::path::Path;
 
@@ -47,8 +48,10 @@ fn main() -> Result<()> {
         let end = f64::from(frame) * DT;
         let report = base.step(&ctx, std::slice::from_ref(&body), end - DT, end, frame)?;
         println!("frame {frame}: {:.2} litres removed", 1000.0 * report.removed_volume);
-        let path = folder.join(format!("snow.{frame:04}.vdb"));
-        file::write(&path, &[base.surface(), base.removed()], &WriteOptions::default())?;
+        for (name, grid) in [("snow", base.surface()), ("removed", base.removed())] {
+            let path = folder.join(format!("{name}.{frame:04}.vdb"));
+            file::write(&path, &[grid], &WriteOptions::default())?;
+        }
     }
     Ok(())
 }
