@@ -175,7 +175,7 @@ enum frz_status
      */
     FRZ_ERROR_ARGUMENT = 1,
     /**
-     * The contents of a file, or the bytes given in place of a file, cannot be used.
+     * The contents of a file, or the bytes given instead of a file, cannot be used.
      */
     FRZ_ERROR_FILE = 2,
     /**
@@ -590,7 +590,8 @@ enum frz_shallow_border
      */
     FRZ_SHALLOW_OPEN = 1,
     /**
-     * Liquid at rest, at the initial level of the liquid at the border: waves leave, and do not come back.
+     * Liquid at rest, at the height of the last fill (frz_shallow_fill, frz_shallow_detail_fill): waves leave, and do not come back. Before
+     * the first fill, and where the ground is higher, as FRZ_SHALLOW_OPEN.
      */
     FRZ_SHALLOW_ABSORBING = 2,
 };

@@ -21,8 +21,8 @@ class Grains(Handle):
 
     floor: the height of a level ground (m); None: there is none.
     rests: whether grains that lie still come to rest.
-    repose_angle_deg: slope of a poured pile, in place of friction.
-    stands: height of a wall that just stands (m), in place of attraction.
+    repose_angle_deg: slope of a poured pile, instead of friction.
+    stands: height of a wall that just stands (m), instead of attraction.
     keep_box: (low, high), places (m) of a box outside of which grains are taken away; None: there is none.
     air_by_density: whether grains among others feel less of the air than those of a thin spray.
     Further parameters, as in frz_grains_params: compression, friction, attraction, restitution, air, gravity, lowest, lifetime,

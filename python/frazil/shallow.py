@@ -269,7 +269,7 @@ class Shallow(Handle):
         return out
 
     def set_flows(self, flows):
-        """Sets Sources, Drains, Orifices and Absorbers, in place of those before."""
+        """Sets Sources, Drains, Orifices and Absorbers, replacing those before."""
         array = (ShallowFlow * max(len(flows), 1))(*(_flow(flow) for flow in flows))
         call("shallow_set_flows", self.pointer, array, len(flows))
 
@@ -286,7 +286,7 @@ class Shallow(Handle):
         return out.value
 
     def set_scalars(self, scalars):
-        """Sets Scalars, up to four, that the liquid carries, in place of those before: there is nothing yet of any."""
+        """Sets Scalars, up to four, that the liquid carries, replacing those before: there is nothing yet of any."""
         call("shallow_set_scalars", self.pointer, scalars_of(scalars), len(scalars))
         self._scalars = len(scalars)
 
@@ -376,7 +376,7 @@ class Shallow(Handle):
         return moved
 
     def set_bodies(self, bodies):
-        """Sets Balls, Capsules and Boxes that move over the ground, in place of those before; as update_terrain."""
+        """Sets Balls, Capsules and Boxes that move over the ground, replacing those before; as update_terrain."""
         self._keep()
         array = (ShallowBody * max(len(bodies), 1))(*(_body(body) for body in bodies))
         moved = ShallowMoved(c.sizeof(ShallowMoved))

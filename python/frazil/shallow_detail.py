@@ -119,7 +119,7 @@ class ShallowDetail(Handle):
         return self._move("update_heights", view(np.ascontiguousarray(heights, np.float32).reshape(-1)))
 
     def set_bodies(self, bodies):
-        """Sets Balls, Capsules and Boxes that move over the ground, in place of those before; as update_terrain."""
+        """Sets Balls, Capsules and Boxes that move over the ground, replacing those before; as update_terrain."""
         array = (ShallowBody * max(len(bodies), 1))(*(_body(body) for body in bodies))
         return self._move("set_bodies", array, len(bodies))
 

@@ -16,7 +16,7 @@ pub enum frz_status {
     FRZ_OK = 0,
     /// An argument is NULL, out of range or not finite.
     FRZ_ERROR_ARGUMENT = 1,
-    /// The contents of a file, or the bytes given in place of a file, cannot be used.
+    /// The contents of a file, or the bytes given instead of a file, cannot be used.
     FRZ_ERROR_FILE = 2,
     /// The operating system refused to read or write.
     FRZ_ERROR_IO = 3,

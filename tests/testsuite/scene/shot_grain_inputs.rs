@@ -187,9 +187,9 @@ fn keys_that_others_stand_in_place_of_are_reported() {
     let at = folder.path();
     let said = |set: &str| works(at, &format!("check shot.toml {set}"));
     let both = said("--set grains.friction=0.2 --set grains.repose_angle_deg=25");
-    assert!(both.contains("grains.friction = 0.2 stands in place of grains.repose_angle_deg = 25"), "{both}");
+    assert!(both.contains("grains.friction = 0.2 replaces grains.repose_angle_deg = 25"), "{both}");
     let both = said("--set grains.attraction=4 --set grains.stands=0.2");
-    assert!(both.contains("grains.attraction = 4 stands in place of grains.stands = 0.2"), "{both}");
+    assert!(both.contains("grains.attraction = 4 replaces grains.stands = 0.2"), "{both}");
     for one in ["friction=0.2", "repose_angle_deg=25", "attraction=4 --set grains.preset=wet"] {
         assert!(!said(&format!("--set grains.{one}")).contains("stands in place"), "{one}");
     }

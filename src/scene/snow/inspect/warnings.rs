@@ -16,7 +16,7 @@ pub(in crate::scene::snow) fn replaced(values: &Values) -> Vec<String> {
     given
         .filter(|(_, _, other, value)| left_out(values, other) != Some(*value))
         .map(|(key, own, other, value)| {
-            format!("grains.{key} = {own} stands in place of grains.{other} = {value}, which has no effect")
+            format!("grains.{key} = {own} replaces grains.{other} = {value}, which has no effect")
         })
         .collect()
 }
