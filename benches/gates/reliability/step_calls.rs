@@ -6,9 +6,11 @@ use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use frazil::capi::frz_status::*;
+use frazil::capi::shallow::flow_points::*;
 use frazil::capi::shallow::liquid::*;
 use frazil::capi::shallow::params::*;
 use frazil::capi::shallow::sources::*;
+use frazil::capi::shallow::spill::*;
 use frazil::capi::shallow::terrain::*;
 use frazil::capi::shallow_two_level::ground::*;
 use frazil::capi::shallow_two_level::liquid::*;
@@ -362,8 +364,10 @@ pub fn mist_params(tried: &mut Tried, cell: f64) -> frz_mist_params {
     params.from_speed = tried.any(1e-2, 10.0);
     params.half_life = tried.any(1e-2, 100.0);
     params.gravity = tried.between(-10.0, 10.0);
-    params.turbulence = if tried.chance(0.5) { 0.0 } else { tried.any(0.1, 100.0) };
-    params.confinement = if tried.chance(0.5) { 0.0 } else { tried.any(0.01, 100.0) };
+    // Mostly calm: a storm fills hundreds of tiles, and ten thousand of them take hours.
+    let strongest = if tried.chance(0.9) { 1.0 } else { 100.0 };
+    params.turbulence = if tried.chance(0.5) { 0.0 } else { tried.any(0.01, strongest) };
+    params.confinement = if tried.chance(0.5) { 0.0 } else { tried.any(0.01, strongest) };
     params.flags =
         (FRZ_MIST_FLOOR * u32::from(tried.chance(0.4))) | (FRZ_MIST_FALLING * u32::from(tried.chance(0.5)));
     params
@@ -379,8 +383,8 @@ fn mist(tried: &mut Tried) {
             return;
         }
         for frame in 0..8 {
-            let (count, side, fastest) =
-                (tried.any(1.0, 50.0) as usize, cell * tried.any(0.1, 8.0), tried.any(0.1, 50.0));
+            let (count, side) = (tried.any(1.0, 50.0) as usize, cell * tried.any(0.1, 8.0));
+            let fastest = if tried.chance(0.9) { tried.any(0.1, 3.0) } else { tried.any(3.0, 50.0) };
             let [positions, speeds] = points(tried, count, side, fastest);
             let positions: Vec<[f64; 3]> = positions.iter().map(|position| position.map(f64::from)).collect();
             let params = mist_params(tried, cell);

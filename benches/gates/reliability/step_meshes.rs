@@ -83,12 +83,16 @@ fn snow(tried: &Tried) -> *mut frz_grid {
 }
 
 /// A layer and a cube for each of some frames.
-fn each_press(tried: &mut Tried, mut frame: impl FnMut(&mut Tried, *mut frz_base, &frz_body, i32)) {
+fn each_press(
+    tried: &mut Tried,
+    frames: i32,
+    mut frame: impl FnMut(&mut Tried, *mut frz_base, &frz_body, i32),
+) {
     let (snow, mut base) = (snow(tried), null_mut());
     // SAFETY: the pointers are valid, and handles are destroyed once.
     unsafe {
         works(frz_base_create(tried.ctx(), null(), snow, null(), 0, &mut base));
-        for at in 1..=16 {
+        for at in 1..=frames {
             let cube = Cube::new(tried);
             frame(tried, base, &cube.body(), at);
         }
@@ -98,7 +102,7 @@ fn each_press(tried: &mut Tried, mut frame: impl FnMut(&mut Tried, *mut frz_base
 }
 
 pub fn base(tried: &mut Tried) {
-    each_press(tried, |tried, base, body, frame| {
+    each_press(tried, 16, |tried, base, body, frame| {
         let mut params: frz_base_params = sized();
         let dt = step_length(tried);
         // SAFETY: the pointers are valid.
@@ -120,7 +124,7 @@ pub fn grids(tried: &mut Tried) {
         if frz_grains_create(tried.ctx(), &params, null(), 0, &mut grains) != FRZ_OK {
             return;
         }
-        each_press(tried, |tried, base, body, frame| {
+        each_press(tried, 16, |tried, base, body, frame| {
             let mut before = null_mut();
             works(frz_grid_copy(tried.ctx(), frz_base_grid(base), &mut before));
             works(frz_base_step(tried.ctx(), base, body, 1, 1.0 / 24.0, frame, null_mut()));
@@ -137,7 +141,9 @@ pub fn grids(tried: &mut Tried) {
 
 pub fn mist(tried: &mut Tried) {
     let cell = tried.any(0.5, 4.0) * VOXEL;
-    let (params, grain) = (mist_params(tried, cell), grain_params(tried, VOXEL / 3.0));
+    let (params, mut grain) = (mist_params(tried, cell), grain_params(tried, VOXEL / 3.0));
+    // Grains that fly apart spread mist over hundreds of tiles.
+    grain.attraction = 0.0;
     let (mut mist, mut grains) = (null_mut(), null_mut());
     // SAFETY: the pointers are valid, and handles are destroyed once.
     unsafe {
@@ -145,7 +151,7 @@ pub fn mist(tried: &mut Tried) {
             return;
         }
         works(frz_mist_create(tried.ctx(), &params, null(), 0, &mut mist));
-        each_press(tried, |tried, base, body, frame| {
+        each_press(tried, 4, |tried, base, body, frame| {
             works(frz_base_step(tried.ctx(), base, body, 1, 1.0 / 24.0, frame, null_mut()));
             works(frz_grains_step(tried.ctx(), grains, base, body, 1, 1.0 / 24.0, frame, null_mut()));
             frz_mist_set_params(mist, &mist_params(tried, cell));

@@ -1,7 +1,7 @@
 //! Shallow liquid in the air: its drops, and their mesh.
 
-use super::liquid::{Spill, frz_shallow};
 use super::snapshot::{Taken, frz_shallow_snapshot};
+use super::spill::{Spill, frz_shallow};
 use super::surface::{
     Buffer, NO_SPAN, check_buffers, check_room, frz_shallow_layout, frz_shallow_size, indices_in, layout,
 };

@@ -1,7 +1,7 @@
 //! What liquids in cells of one size and of two have in common: flow points, pouring, filling.
 
-use super::sources::{Attached, frz_shallow_flow};
-use super::terrain::Terrain;
+use super::flow_points::{Attached, frz_shallow_flow};
+use super::ground::Terrain;
 use crate::capi::ffi::guard::{Failure, Outcome};
 use crate::capi::ffi::handle::{Noun, change, clear, read, required};
 use crate::capi::ffi::views::finite;

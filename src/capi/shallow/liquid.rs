@@ -1,46 +1,18 @@
 //! Small amounts of liquid on a terrain, in real time.
 
-use super::flowing::Flowing;
+use super::ground::Terrain;
 use super::params::{domain, frz_shallow_domain, frz_shallow_params, params};
-use super::sources::Attached;
-use super::surface::ledges::Ledged;
-use super::surface::minimum_heights::Lifted;
-use super::terrain::Terrain;
+use super::spill::{Spill, frz_shallow};
 use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{Noun, change, destroy, read, required};
+use crate::capi::ffi::handle::{change, destroy, read, required};
 use crate::capi::ffi::views::{Sized32, fill, frz_span, frz_view, within};
 #[cfg(feature = "vdb")]
 use crate::capi::grid::sparse::frz_grid;
 use crate::capi::mesh::triangles::frz_mesh;
 use crate::capi::runtime::context::{creates, enter_light, frz_context};
 use crate::context::Context;
-use crate::error::Result;
-use crate::shallow::free_fall::Droplet;
-use crate::shallow::free_fall::mesh::Balls;
-use crate::shallow::scalars::MOST;
-use crate::shallow::sources::FlowPoint;
-use crate::shallow::surface::Surface;
-use crate::shallow::terrain::Solids;
-use crate::shallow::terrain::shapes::Shape;
+use crate::shallow::Report;
 use crate::shallow::time_step::MOST_STEPS;
-use crate::shallow::{Load, Params, Report, Shallow};
-
-/// A small amount of liquid on a ground: blood, coffee or paint in a fraction of a frame.
-///
-/// In real time: calls that a host makes in each frame follow stricter rules than all others. These calls are frz_shallow_step, _replay,
-/// _update_terrain, _update_heights, _set_bodies, _loads, _save, _restore, _surface, _find_lifts, _find_ledges, _drops, _drops_mesh,
-/// _read_scalar and _probe, frz_shallow_stains_update, _read and _soaked, and frz_shallow_snapshot_take, _surface, _drops, _drops_mesh and
-/// _probe. With a pool of 0 threads, from their second call on, they allocate nothing, take no lock, log and poll nothing, and make no
-/// system call except to read the thread's clock when a step has a budget. Memory grows only when more is needed than ever before, for
-/// instance more columns because a body uncovers another layer; failing calls may allocate too.
-///
-/// A cancel takes effect at the beginning of such a call, and also during a frame that may take long: one with exact steps, with over some
-/// two million columns times steps, or with many full columns. Such a frame first copies what it changes, so that a cancel leaves the
-/// liquid as it was. None of these calls has phases, which all other work has: frz_context_progress and frz_context_timings do not see
-/// them. Phases take locks and memory, and a poll between them may take longer than the few milliseconds of a frame.
-pub struct frz_shallow {
-    _opaque: [u8; 0],
-}
 
 /// What a frame did.
 #[repr(C)]
@@ -83,99 +55,6 @@ impl frz_shallow_report {
             filled: done.filled,
             slowed: done.slowed,
         }
-    }
-}
-
-/// The value of a liquid's handle.
-pub(in crate::capi) struct Spill {
-    /// The liquid.
-    pub shallow: Shallow,
-    /// What it flows over.
-    pub terrain: Terrain,
-    /// The host's flow points, in its order.
-    pub flows: Vec<Attached>,
-    /// The bodies of the last call.
-    pub shapes: Vec<Shape>,
-    /// Builds surfaces.
-    pub surface: Surface,
-    /// Minimum heights, once found.
-    pub lifted: Lifted,
-    /// Ledges, once found.
-    pub ledged: Ledged,
-    /// Mean velocities of all column indices (m/s), if a surface needs them.
-    pub velocities: Vec<[f32; 2]>,
-    /// Concentrations of scalars by column index, if a surface needs them.
-    pub concentrations: [Vec<f32>; MOST],
-    /// Builds and holds meshes of the liquid in the air.
-    pub balls: Balls,
-    /// Drops of the last such mesh.
-    pub drops: Vec<Droplet>,
-    /// Velocities of the bodies (m/s), and their loads, as last requested.
-    pub velocities_of_bodies: Vec<[f64; 3]>,
-    pub loads: Vec<Load>,
-    /// Steps of a replay (s).
-    steps: Vec<f64>,
-}
-
-impl Noun for frz_shallow {
-    type Value = Spill;
-    const NAME: &'static str = "shallow liquid";
-    const TAG: u32 = 0x6672_7a09;
-}
-
-impl Flowing for Spill {
-    fn terrain(&self) -> &Terrain {
-        &self.terrain
-    }
-
-    fn flows(&self) -> &[Attached] {
-        &self.flows
-    }
-
-    fn set_flows(&mut self, flows: Vec<Attached>, points: &[FlowPoint]) -> Result<()> {
-        self.shallow.set_flows(points, |at| format!("flow {at}"))?;
-        self.flows = flows;
-        Ok(())
-    }
-
-    fn moved(&self, flow: usize) -> f64 {
-        self.shallow.moved(flow)
-    }
-
-    fn pour_at(&mut self, at: [f64; 3], radius: f64, volume: f64) -> Result<f64> {
-        self.shallow.pour_at(at, radius, volume)
-    }
-
-    fn fill(&mut self, height: f64) {
-        self.shallow.fill(height);
-    }
-}
-
-impl Spill {
-    /// Dry ground.
-    fn new(ctx: &Context, params: Params, terrain: Terrain, solids: &Solids) -> Outcome<Self> {
-        let shallow = ctx.phase("columns", || Shallow::new(ctx, solids, params))?;
-        let mut surface = Surface::default();
-        surface.reserve(shallow.columns());
-        let most = shallow.params().falls.map_or(0, |falls| falls.most);
-        let mut balls = Balls::default();
-        balls.reserve(most);
-        Ok(Self {
-            shallow,
-            terrain,
-            flows: Vec::new(),
-            shapes: Vec::new(),
-            surface,
-            lifted: Lifted::default(),
-            ledged: Ledged::default(),
-            velocities: Vec::new(),
-            concentrations: Default::default(),
-            balls,
-            drops: Vec::with_capacity(most),
-            velocities_of_bodies: Vec::new(),
-            loads: Vec::new(),
-            steps: Vec::with_capacity(1024),
-        })
     }
 }
 

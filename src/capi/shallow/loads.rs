@@ -1,6 +1,6 @@
 //! Loads of shallow liquid on the bodies in it.
 
-use super::liquid::{Spill, frz_shallow};
+use super::spill::{Spill, frz_shallow};
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::change;
 use crate::capi::ffi::views::{Sized32, check_size, fill, frz_view};

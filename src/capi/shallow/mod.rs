@@ -3,7 +3,11 @@
 // In the order of the header.
 pub mod params;
 
+pub mod spill;
+
 pub mod liquid;
+
+pub mod flow_points;
 
 pub mod sources;
 
@@ -26,4 +30,5 @@ pub mod stains;
 pub mod snapshot;
 
 pub(in crate::capi) mod flowing;
+pub(in crate::capi) mod ground;
 mod lists;

@@ -1,6 +1,6 @@
 //! Shallow liquid as numbers: its columns, at points, in boxes.
 
-use super::liquid::frz_shallow;
+use super::spill::frz_shallow;
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{clear, read, required};
 use crate::capi::ffi::views::{Plain, Sized32, fill, frz_span, frz_view, meaning};

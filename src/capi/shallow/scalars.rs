@@ -2,8 +2,8 @@
 
 use std::ffi::c_char;
 
-use super::liquid::frz_shallow;
 use super::lists::each_sized;
+use super::spill::frz_shallow;
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{change, read};
 use crate::capi::ffi::views::{Sized32, fill, frz_span, frz_view, meaning, required_text};

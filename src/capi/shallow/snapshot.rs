@@ -1,9 +1,8 @@
 //! Shallow liquid as it was after a frame, for another thread.
 
-use super::liquid::{Spill, frz_shallow};
 use super::read::probe;
-use super::surface::ledges::Ledged;
-use super::surface::minimum_heights::no_lifts;
+use super::spill::{Spill, frz_shallow};
+use super::surface::prepared::{Ledged, no_lifts};
 use super::surface::{Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target};
 use crate::capi::ffi::guard::{frz_status, guard};
 use crate::capi::ffi::handle::{Noun, change, destroy, read};

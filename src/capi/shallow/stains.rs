@@ -2,8 +2,8 @@
 
 use std::ffi::c_void;
 
-use super::liquid::frz_shallow;
 use super::params::FRZ_SHALLOW_NO_SCALAR;
+use super::spill::frz_shallow;
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{Noun, change, destroy, read, required};
 use crate::capi::ffi::views::{Sized32, fill, frz_span, frz_view, sized, write_bytes};

@@ -2,7 +2,7 @@
 
 use std::ffi::c_void;
 
-use super::liquid::frz_shallow;
+use super::spill::frz_shallow;
 use crate::capi::ffi::guard::frz_status::FRZ_ERROR_CAPACITY;
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{change, clear, read, required};

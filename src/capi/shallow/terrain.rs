@@ -1,155 +1,15 @@
 //! The ground below shallow liquid: made once, then moved.
 
-use std::ops::Range;
-
-use super::liquid::{Spill, frz_shallow};
+use super::ground::{Terrain, cells_in, read_heights};
 use super::lists::each_sized;
+use super::spill::{Spill, frz_shallow};
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::change;
 use crate::capi::ffi::views::{Sized32, fill, frz_view, meaning};
 use crate::capi::runtime::context::{enter_light, frz_context};
-use crate::context::Context;
-use crate::geometry::{DVec3, TriMesh, Vec3};
+use crate::geometry::DVec3;
 use crate::shallow::Moved;
-use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
-use crate::shallow::terrain::facing::facing;
-#[cfg(feature = "vdb")]
-use crate::shallow::terrain::sampler;
 use crate::shallow::terrain::shapes::Shape;
-use crate::shallow::terrain::solids::Solid;
-use crate::shallow::terrain::triangles::Caster;
-use crate::shallow::terrain::{Solids, height};
-#[cfg(feature = "vdb")]
-use crate::vdb::FloatGrid;
-
-/// What the ground was made from, so that it can be made again.
-pub(in crate::capi) enum Terrain {
-    /// A mesh.
-    Mesh(Box<Moving>),
-    /// A height field; solids of the cells of its last change.
-    Heights(Vec<[Solid; 1]>),
-    /// A level set: it does not move.
-    #[cfg(feature = "vdb")]
-    LevelSet,
-}
-
-/// A mesh whose vertices move.
-pub(in crate::capi) struct Moving {
-    pub(in crate::capi) positions: Vec<Vec3>,
-    /// Incoming positions.
-    coming: Vec<Vec3>,
-    /// Triangles with closed parts outward, without duplicates.
-    pub(in crate::capi) triangles: Vec<[u32; 3]>,
-    /// Triangles as the host gave them, if that differs.
-    own: Option<Vec<[u32; 3]>>,
-    caster: Caster,
-}
-
-impl Terrain {
-    /// The ground of a mesh, and its solids.
-    pub(in crate::capi) fn of_mesh(
-        ctx: &Context,
-        mesh: &TriMesh,
-        grid: Grid,
-        heights: Heights,
-    ) -> Outcome<(Self, Solids)> {
-        let orientation = facing(mesh);
-        let triangles = orientation.applied(&mesh.triangles);
-        if orientation.has_open() {
-            ctx.warn("the mesh is open: all below its faces that face up is solid");
-        }
-        if let Some(what) = orientation.warning() {
-            ctx.warn(&format!("the mesh: {what}"));
-        }
-        let mut caster = Caster::new(grid, heights)?;
-        let solids = ctx.phase("cast", || {
-            caster.cast(&mesh.positions, &triangles, all_cells(&grid))?;
-            let mut solids = Solids::empty(grid, heights);
-            (0..grid.cells()).for_each(|cell| solids.push(caster.at(cell)));
-            Ok(solids)
-        })?;
-        let positions = mesh.positions.clone();
-        let own = (!orientation.is_unchanged()).then(|| mesh.triangles.clone());
-        let coming = Vec::with_capacity(positions.len());
-        Ok((Self::Mesh(Box::new(Moving { positions, coming, triangles, own, caster })), solids))
-    }
-
-    /// The ground of a height for each cell (m), and its solids.
-    pub(in crate::capi) fn of_heights(
-        tops: impl ExactSizeIterator<Item = f32>,
-        grid: Grid,
-        heights: Heights,
-    ) -> Outcome<(Self, Solids)> {
-        let solids = height::solids(tops.map(f64::from), grid, heights)?;
-        Ok((Self::Heights(Vec::with_capacity(grid.cells())), solids))
-    }
-
-    /// The ground of a level set, and its solids.
-    #[cfg(feature = "vdb")]
-    pub(in crate::capi) fn of_level_set(
-        ctx: &Context,
-        level_set: &FloatGrid,
-        grid: Grid,
-        heights: Heights,
-    ) -> Outcome<(Self, Solids)> {
-        let solids = ctx.phase("sample", || {
-            let (voxel, between) = (level_set.voxel_size(), level_set.heights());
-            sampler::solids(grid, heights, voxel, between, |positions, distances| {
-                ctx.check()?;
-                level_set.sample_linear(ctx, positions, distances)
-            })
-        })?;
-        Ok((Self::LevelSet, solids))
-    }
-
-    /// The position (m) on a triangle with these barycentric coordinates.
-    pub(in crate::capi) fn position(&self, (triangle, shares): &(u32, [f64; 3])) -> Outcome<[f64; 3]> {
-        let Self::Mesh(mesh) = self else {
-            return Err(Failure::argument("the liquid was not made with a mesh: there is no triangle"));
-        };
-        let own = mesh.own.as_ref().unwrap_or(&mesh.triangles);
-        let Some(corners) = own.get(*triangle as usize) else {
-            let count = own.len();
-            return Err(Failure::argument(format!("triangle = {triangle} is none of the mesh's {count}")));
-        };
-        let corner = |corner: usize| mesh.positions[corners[corner] as usize].cast::<f64>() * shares[corner];
-        Ok((corner(0) + corner(1) + corner(2)).into())
-    }
-}
-
-/// All cells of a grid.
-fn all_cells(grid: &Grid) -> [Range<usize>; 2] {
-    grid.size.map(|count| 0..count)
-}
-
-/// How far (cells) a cell's centre may lie outside a box and still count as inside.
-const ROUNDING: f64 = 1e-6;
-
-/// The cells whose centres lie within a host's box; all cells for NULL.
-///
-/// # Safety
-/// The pointer must be NULL or point to four numbers.
-pub(in crate::capi) unsafe fn cells_in(grid: &Grid, bounds: *const f64) -> Outcome<[Range<usize>; 2]> {
-    if bounds.is_null() {
-        return Ok(all_cells(grid));
-    }
-    // SAFETY: guaranteed by the caller.
-    let bounds = unsafe { bounds.cast::<[f64; 4]>().read_unaligned() };
-    let [x0, z0, x1, z1] = bounds;
-    // Negated, so that NaN is refused too.
-    if !(x0 <= x1 && z0 <= z1) {
-        return Err(Failure::argument(format!("bounds = {bounds:?} m have no inside")));
-    }
-    let range = |axis: usize, low: f64, high: f64| {
-        let count = grid.size[axis] as f64;
-        // In cells, from the centre of the first; rounding excludes none.
-        let [low, high] = [low, high].map(|position| (position - grid.origin[axis]) / grid.cell - 0.5);
-        let first = (low - ROUNDING).ceil().clamp(0.0, count);
-        let end = ((high + ROUNDING).floor() + 1.0).clamp(first, count);
-        first as usize..end as usize
-    };
-    Ok([range(0, x0, x1), range(1, z0, z1)])
-}
 
 /// How a change of the ground affected the liquid.
 #[repr(C)]
@@ -258,42 +118,6 @@ pub unsafe extern "C" fn frz_shallow_update_terrain(
     })
 }
 
-impl Moving {
-    /// The solids of all cells with the incoming vertices.
-    pub(in crate::capi) fn cast(&mut self, grid: Grid, heights: Heights) -> Outcome<Solids> {
-        self.caster.cast(&self.coming, &self.triangles, all_cells(&grid))?;
-        let mut solids = Solids::empty(grid, heights);
-        (0..grid.cells()).for_each(|cell| solids.push(self.caster.at(cell)));
-        Ok(solids)
-    }
-
-    /// Adopts the incoming vertices.
-    pub(in crate::capi) fn come(&mut self) {
-        std::mem::swap(&mut self.positions, &mut self.coming);
-    }
-
-    /// Reads the new positions of the vertices.
-    ///
-    /// # Safety
-    /// The view must describe memory that can be read.
-    pub(in crate::capi) unsafe fn take(&mut self, positions: &frz_view) -> Outcome {
-        // SAFETY: guaranteed by the caller.
-        let given = unsafe { positions.in_place::<[f32; 3]>("positions") }?;
-        let count = self.positions.len();
-        if given.len() != count {
-            let text = format!("positions: {} elements, but the mesh has {count} vertices", given.len());
-            return Err(Failure::argument(text));
-        }
-        self.coming.clear();
-        self.coming.extend(given.map(Vec3::from));
-        let is_wild = |position: &Vec3| !position.iter().all(|number| number.is_finite());
-        match self.coming.iter().position(is_wild) {
-            None => Ok(()),
-            Some(at) => Err(Failure::argument(format!("positions: element {at} is not finite"))),
-        }
-    }
-}
-
 /// Changes the heights of the height field that the liquid was created with, in real time (frz_shallow). The liquid is carried along, and
 /// none of it is lost. After a failure all is as it was.
 ///
@@ -327,36 +151,6 @@ pub unsafe extern "C" fn frz_shallow_update_heights(
             })
         }
     })
-}
-
-/// The solids of some cells, from a host's heights of all cells.
-///
-/// # Safety
-/// The view must describe memory that can be read.
-pub(in crate::capi) unsafe fn read_heights(
-    heights: &frz_view,
-    grid: &Grid,
-    range: &Heights,
-    [across, rows]: [Range<usize>; 2],
-    solids: &mut Vec<[Solid; 1]>,
-) -> Outcome {
-    // SAFETY: guaranteed by the caller.
-    let tops = unsafe { heights.in_place::<f32>("heights") }?;
-    if tops.len() != grid.cells() {
-        let text = format!("heights: {} elements, but there are {} cells", tops.len(), grid.cells());
-        return Err(Failure::argument(text));
-    }
-    if let Some(at) = tops.clone().position(|top| !top.is_finite()) {
-        return Err(Failure::argument(format!("heights: element {at} is not finite")));
-    }
-    let is_within = |cell: usize| {
-        let [x, z] = grid.position(cell);
-        across.contains(&x) && rows.contains(&z)
-    };
-    let own = tops.enumerate().filter(|(cell, _)| is_within(*cell));
-    solids.clear();
-    solids.extend(own.map(|(_, top)| [[BOTTOMLESS, range.round(top.into())]]));
-    Ok(())
 }
 
 /// Shapes of bodies.

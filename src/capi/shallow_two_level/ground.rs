@@ -8,11 +8,10 @@ use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{change, clear, read, required};
 use crate::capi::ffi::views::{fill, frz_view};
 use crate::capi::runtime::context::{enter_light, frz_context};
+use crate::capi::shallow::ground::{Terrain, read_heights};
 use crate::capi::shallow::state::{put_state, taken_state};
 use crate::capi::shallow::surface::{Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target};
-use crate::capi::shallow::terrain::{
-    Terrain, frz_shallow_body, frz_shallow_moved, read_bodies, read_heights,
-};
+use crate::capi::shallow::terrain::{frz_shallow_body, frz_shallow_moved, read_bodies};
 use crate::shallow::Moved;
 use crate::shallow::surface::{Counts, Depths};
 use crate::shallow::terrain::Solids;

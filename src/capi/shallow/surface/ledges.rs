@@ -1,42 +1,14 @@
 //! Ledges of shallow liquid: where its surface ends over nothing, and comes down to the ground's edge.
 
 use super::frz_shallow_size;
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use super::prepared::Ledged;
+use crate::capi::ffi::guard::{frz_status, guard};
 use crate::capi::ffi::handle::change;
 use crate::capi::ffi::views::fill;
 use crate::capi::runtime::context::{enter_light, frz_context};
-use crate::capi::shallow::liquid::{Spill, frz_shallow};
-use crate::capi::shallow::terrain::Terrain;
+use crate::capi::shallow::ground::Terrain;
+use crate::capi::shallow::spill::{Spill, frz_shallow};
 use crate::shallow::surface::Counts;
-use crate::shallow::surface::rim::ledges::Ledges;
-
-/// Ledges of a liquid.
-#[derive(Default)]
-pub(in crate::capi) struct Ledged {
-    ledges: Ledges,
-    /// Whether they match the current ground.
-    pub is_current: bool,
-}
-
-impl Ledged {
-    /// The ledges, if a surface needs them; a failure if it needs them and there are none.
-    pub(in crate::capi) fn wanted(&self, is_skirted: bool, when: &str) -> Outcome<Option<&Ledges>> {
-        if is_skirted && !self.is_current {
-            return Err(Failure::argument(format!(
-                "FRZ_SHALLOW_SKIRTED: frz_shallow_find_ledges has found no ledges {when}"
-            )));
-        }
-        Ok(is_skirted.then_some(&self.ledges))
-    }
-
-    /// Takes another object's ledges, if they match its current ground.
-    pub(in crate::capi) fn copy_from(&mut self, other: &Self) {
-        self.is_current = other.is_current;
-        if self.is_current {
-            self.ledges.copy_from(&other.ledges);
-        }
-    }
-}
 
 /// Finds the ledges, where the ground ends over nothing, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED.
 /// With the mesh that the liquid was created with, the edge is located between the centres of cells; on other ground the surface extends by

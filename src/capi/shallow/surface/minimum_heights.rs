@@ -1,13 +1,14 @@
 //! Minimum heights of shallow liquid: how far its films are raised so that the ground's mesh does not show through them.
 
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use super::prepared::Lifted;
+use crate::capi::ffi::guard::{Failure, frz_status, guard};
 use crate::capi::ffi::handle::change;
 use crate::capi::ffi::views::{Sized32, fill, sized};
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{enter_light, frz_context};
-use crate::capi::shallow::liquid::{Spill, frz_shallow};
-use crate::capi::shallow::terrain::{Terrain, cells_in};
-use crate::shallow::surface::heights::minimum_heights::{Distance, Fitted, Lifts};
+use crate::capi::shallow::ground::{Terrain, cells_in};
+use crate::capi::shallow::spill::{Spill, frz_shallow};
+use crate::shallow::surface::heights::minimum_heights::{Distance, Fitted};
 
 /// Distances between a thin film and the ground's mesh, in edges of a cell, each finite and 0 or more.
 #[repr(C)]
@@ -70,33 +71,6 @@ impl From<Fitted> for frz_shallow_fitted {
             capped: fitted.capped as u64,
         }
     }
-}
-
-/// Minimum heights of a liquid.
-#[derive(Default)]
-pub(in crate::capi) struct Lifted {
-    lifts: Lifts,
-    /// Whether they match the current ground.
-    pub is_current: bool,
-}
-
-impl Lifted {
-    /// Minimum and sunk depths, if they match the current ground.
-    pub(in crate::capi) fn known(&self) -> Option<(&[i32], &[i32])> {
-        self.is_current.then(|| (self.lifts.least(), self.lifts.sunk()))
-    }
-
-    /// The same; a failure if they do not match.
-    pub(in crate::capi) fn current(&self) -> Outcome<(&[i32], &[i32])> {
-        self.known().ok_or_else(|| no_lifts("since the ground or a body moved"))
-    }
-}
-
-/// The failure of a surface without minimum heights.
-pub(in crate::capi) fn no_lifts(when: &str) -> Failure {
-    Failure::argument(format!(
-        "FRZ_SHALLOW_LIFTED: frz_shallow_find_lifts has found no minimum heights {when}"
-    ))
 }
 
 /// Finds the minimum heights of all columns, or of those that have changed, from the mesh that the liquid was created with, in real time

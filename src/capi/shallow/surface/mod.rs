@@ -2,10 +2,11 @@
 
 pub mod ledges;
 pub mod minimum_heights;
+pub(in crate::capi) mod prepared;
 
 use std::cell::RefCell;
 
-use super::liquid::{Spill, frz_shallow};
+use super::spill::{Spill, frz_shallow};
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{change, read};
 use crate::capi::ffi::views::{Sized32, fill, frz_span, sized};

@@ -1,0 +1,142 @@
+//! Flow points of a host, and the triangles that they move with.
+
+use super::ground::Terrain;
+use super::lists::each_sized;
+use crate::capi::ffi::guard::{Failure, Outcome};
+use crate::capi::ffi::views::{Sized32, meaning};
+use crate::capi::mesh::triangles::no_flags;
+use crate::shallow::sources::{FlowPoint, Kind, Pulse};
+
+/// Flag of a flow point: it lies on a triangle of the mesh that the liquid was created with, and moves with it.
+pub const FRZ_SHALLOW_ON_TRIANGLE: u32 = 1;
+
+/// Kinds of flow points.
+#[repr(u32)]
+#[derive(Clone, Copy)]
+pub enum frz_shallow_flow_kind {
+    /// Liquid enters.
+    FRZ_SHALLOW_SOURCE = 0,
+    /// Liquid leaves, as long as there is some below: suction.
+    FRZ_SHALLOW_DRAIN = 1,
+    /// A drain that stops once it has taken frz_shallow_flow.capacity: gauze.
+    FRZ_SHALLOW_ABSORBER = 2,
+    /// A hole in the ground, through which liquid runs out by its own weight: frz_shallow_flow.opening times (2 g H)^(1/2) per second, H
+    /// being the mean depth in its circle (Torricelli's law), but at most its rate.
+    FRZ_SHALLOW_ORIFICE = 3,
+}
+
+use frz_shallow_flow_kind::*;
+
+const KINDS: [(u32, frz_shallow_flow_kind); 4] = [
+    (FRZ_SHALLOW_SOURCE as u32, FRZ_SHALLOW_SOURCE),
+    (FRZ_SHALLOW_DRAIN as u32, FRZ_SHALLOW_DRAIN),
+    (FRZ_SHALLOW_ABSORBER as u32, FRZ_SHALLOW_ABSORBER),
+    (FRZ_SHALLOW_ORIFICE as u32, FRZ_SHALLOW_ORIFICE),
+];
+
+/// A flow point, where liquid enters or leaves. Zero it, then set struct_size.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct frz_shallow_flow {
+    /// sizeof(frz_shallow_flow), the same in all flow points of a call.
+    pub struct_size: u32,
+    /// 0 or FRZ_SHALLOW_ON_TRIANGLE.
+    pub flags: u32,
+    /// A frz_shallow_flow_kind.
+    pub kind: u32,
+    /// With FRZ_SHALLOW_ON_TRIANGLE: index of the triangle, among those that frz_mesh_read lists as FRZ_MESH_TRIANGLES; else 0.
+    pub triangle: u32,
+    /// With FRZ_SHALLOW_ON_TRIANGLE: barycentric coordinates of the position on the triangle, finite, with a sum of 1; otherwise ignored.
+    pub shares: [f64; 3],
+    /// Without FRZ_SHALLOW_ON_TRIANGLE: the position (m). It acts on the nearest ground above or below it.
+    pub at: [f64; 3],
+    /// It acts on cells whose centres lie within this distance of the position, seen from above (m), 0 or more; on the nearest cell if
+    /// there are none.
+    pub radius: f64,
+    /// Volume per second (m3/s), 0 or more: 1 ml/s is 1e-6. For an orifice the maximum.
+    pub rate: f64,
+    /// Volume that an absorber takes (m3), 0 or more; otherwise ignored.
+    pub capacity: f64,
+    /// Frequency at which the rate pulses (Hz), 0 or more; 0: it does not.
+    pub pulse_frequency: f64,
+    /// Amplitude of the pulse as a share of the rate, 0 to 1: a sine from the start of the simulated time.
+    pub pulse_share: f64,
+    /// For an orifice: its area (m2) times the share of it that the jet fills, 0.6 to 0.65 for a sharp edge, 0 or more; otherwise ignored.
+    pub opening: f64,
+}
+
+unsafe impl Sized32 for frz_shallow_flow {
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
+    const NAME: &'static str = "frz_shallow_flow";
+}
+
+impl frz_shallow_flow {
+    const NONE: Self = Self {
+        struct_size: 0,
+        flags: 0,
+        kind: 0,
+        triangle: 0,
+        shares: [0.0; 3],
+        at: [0.0; 3],
+        radius: 0.0,
+        rate: 0.0,
+        capacity: 0.0,
+        pulse_frequency: 0.0,
+        pulse_share: 0.0,
+        opening: 0.0,
+    };
+}
+
+/// A flow point, and the triangle that it moves with.
+pub(in crate::capi) struct Attached {
+    /// The flow point at its current position.
+    pub point: FlowPoint,
+    /// Index of the triangle, and the barycentric coordinates on it.
+    pub on: Option<(u32, [f64; 3])>,
+}
+
+impl Attached {
+    /// The flow points of a host.
+    ///
+    /// # Safety
+    /// As [`each_sized`].
+    pub(in crate::capi) unsafe fn all(
+        flows: *const frz_shallow_flow,
+        count: usize,
+        terrain: &Terrain,
+    ) -> Outcome<Vec<Self>> {
+        let mut attached = Vec::with_capacity(count.min(1 << 16));
+        let take = |given: frz_shallow_flow| {
+            attached.push(Self::of(&given, terrain)?);
+            Ok(())
+        };
+        // SAFETY: guaranteed by the caller.
+        unsafe { each_sized(flows, count, ["flow", "flows"], frz_shallow_flow::NONE, take) }?;
+        Ok(attached)
+    }
+
+    pub fn of(given: &frz_shallow_flow, terrain: &Terrain) -> Outcome<Self> {
+        no_flags(given.flags, FRZ_SHALLOW_ON_TRIANGLE)?;
+        let kind = match meaning("kind", "frz_shallow_flow_kind", given.kind, &KINDS)? {
+            FRZ_SHALLOW_SOURCE => Kind::Source,
+            FRZ_SHALLOW_DRAIN => Kind::Drain,
+            FRZ_SHALLOW_ABSORBER => Kind::Absorber(given.capacity),
+            FRZ_SHALLOW_ORIFICE => Kind::Orifice(given.opening),
+        };
+        let is_attached = given.flags & FRZ_SHALLOW_ON_TRIANGLE != 0;
+        let on = is_attached.then_some((given.triangle, given.shares));
+        if let Some((_, shares)) = &on {
+            let sum: f64 = shares.iter().sum();
+            if sum.is_nan() || (sum - 1.0).abs() >= 1e-6 {
+                return Err(Failure::argument(format!("the sum of the shares {shares:?} is not 1")));
+            }
+        }
+        let at = match &on {
+            None => given.at,
+            Some(on) => terrain.position(on)?,
+        };
+        let pulse = Pulse { frequency: given.pulse_frequency, share: given.pulse_share };
+        let pulse = (pulse.frequency != 0.0).then_some(pulse);
+        Ok(Self { point: FlowPoint { kind, at, radius: given.radius, rate: given.rate, pulse }, on })
+    }
+}
