@@ -28,8 +28,8 @@ pub mod tiles;
 mod vorticity;
 mod window;
 
+pub use crate::flow::advection::scheme::Keeping;
 pub use crate::flow::advection::scheme::Scheme;
-pub use advection::conserve::Keeping;
 pub use advection::paths::FARTHEST;
 pub use pressure::Solved;
 pub use solids::{Faces, Solids};

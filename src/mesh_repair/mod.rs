@@ -44,7 +44,7 @@ use crate::geometry::{Coord, DVec3, TriMesh, Vec3};
 pub use source::Source;
 
 pub use self::attributes::carried as carry_attributes;
-pub use self::attributes::traced::Traced;
+pub use self::attributes::charts::Traced;
 pub(super) use self::attributes::weights::weights;
 pub(super) use self::cut::Shape;
 pub(super) use self::cut::exact::{GridEdge, end};

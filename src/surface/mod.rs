@@ -72,7 +72,7 @@ pub use track::easing::{Eased, Leads, eased};
 pub use track::easing_limit::{Displaced, uncrossed};
 pub use track::lookahead::{Outlook, displaced};
 pub use track::project::{Foot, foot};
-pub use tracker::Tracker;
+pub use tracked_mesh::Tracker;
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;

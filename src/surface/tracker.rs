@@ -14,49 +14,22 @@ use super::particles::agreement::warn_of_tears;
 use super::particles::grid::cell_of;
 use super::particles::paths::Paths;
 use super::remesh::drift::Drift;
-use super::remesh::{Size, sizes};
+use super::remesh::sizes;
 use super::report::StepReport;
 use super::topology::coverage::Cover;
 use super::topology::lost_vertices::gather;
 use super::topology::particle_count::Crowd;
 use super::topology::uncovered_parts::{Apart, Lacking, Parts, Wanted};
 use super::track::advect::{advect, validate_step};
+use super::track::ahead::Ahead;
 use super::track::deep_detail::{Deep, covers, sorted};
 use super::track::fade::fade;
-use super::track::prefetch::Ahead;
 use super::track::project::foot;
-use super::tracked_mesh::REACH;
+use super::tracked_mesh::{REACH, Tracker};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::check::topology::Topology;
 use crate::geometry::{DVec3, TriMesh};
-
-/// A detailed mesh that follows particles.
-#[derive(Debug, Clone)]
-pub struct Tracker {
-    pub(super) params: Params,
-    /// Positions of vertices (m).
-    pub(super) vertices: Vec<DVec3>,
-    pub(super) triangles: Vec<[u32; 3]>,
-    /// Distance from the surface that each vertex keeps (m); NaN: it was too far from the surface to have one.
-    pub(super) delta: Vec<f32>,
-    /// Detail retention: share 0..=1 of each vertex' detail that never fades; empty: none.
-    pub(super) lasting: Vec<f32>,
-    /// Vertices where the last step found a change.
-    pub(super) flags: Vec<bool>,
-    /// Vertices beside which the mesh has not covered the surface since the first frame: that is no change.
-    pub(super) bare: Vec<bool>,
-    /// Distance from the surface up to which distances are known (r).
-    pub(super) reach: f64,
-    /// Whether the triangles are no longer the initial ones.
-    pub(super) is_rebuilt: bool,
-    /// Lengths (m) of the shortest and of the longest edge around each vertex at its birth; empty if the mesh is not rebuilt.
-    pub(super) sizes: Vec<Size>,
-    /// Displacements of the vertices over the last steps; empty if the mesh is not rebuilt.
-    pub(super) drift: Drift,
-    /// Prefetched data of the coming particles.
-    pub(super) ahead: Ahead,
-}
 
 /// Successive reaches of the band around vertices that do not find the surface at the first frame (r).
 const TRIES: [f64; 2] = [5.0, REACH[1]];
@@ -162,86 +135,6 @@ impl Tracker {
             REACH[1],
             self.params.spacing
         )))
-    }
-
-    /// Sets the parameters from the next step on.
-    ///
-    /// # Errors
-    /// A parameter out of range, another spacing or cell, or a different `rebuild` flag; the old parameters are then kept.
-    pub fn set_params(&mut self, params: Params) -> Result<()> {
-        params.validate()?;
-        for (name, old, new) in
-            [("spacing", self.params.spacing, params.spacing), ("cell", self.params.cell, params.cell)]
-        {
-            if old != new {
-                return Err(Error::argument(format!("{name} = {new} cannot change, it is {old}")));
-            }
-        }
-        if self.params.rebuild != params.rebuild {
-            return Err(Error::argument("whether the mesh is rebuilt cannot change"));
-        }
-        self.params = params;
-        Ok(())
-    }
-
-    /// Sets the detail retention of each vertex, 0 (fades as fast as the parameters say) to 1 (never fades); empty: 0 everywhere.
-    ///
-    /// # Errors
-    /// A count other than that of the vertices; a share out of range, reported with its vertex, counted from 1.
-    pub fn set_lasting(&mut self, shares: Vec<f32>) -> Result<()> {
-        let count = self.vertices.len();
-        if !shares.is_empty() && shares.len() != count {
-            return Err(Error::argument(format!(
-                "there are {count} vertices, but {} shares of detail",
-                shares.len()
-            )));
-        }
-        if let Some(at) = shares.iter().position(|share| !(0.0..=1.0).contains(share)) {
-            let what = format!("detail of vertex {} is {}, not within 0 to 1", at + 1, shares[at]);
-            return Err(Error::argument(what));
-        }
-        self.lasting = shares;
-        Ok(())
-    }
-
-    /// The current parameters.
-    pub fn params(&self) -> &Params {
-        &self.params
-    }
-
-    /// The mesh (m).
-    pub fn mesh(&self) -> TriMesh {
-        TriMesh {
-            positions: self.vertices.iter().map(|position| position.cast()).collect(),
-            triangles: self.triangles.clone(),
-        }
-    }
-
-    /// The triangles: the initial ones, until a step changes them.
-    pub fn triangles(&self) -> &[[u32; 3]] {
-        &self.triangles
-    }
-
-    /// Whether any step, or [`Tracker::resculpt`], has changed vertices or triangles: by rebuilding, or only by splitting, collapsing or
-    /// flipping edges.
-    pub fn is_rebuilt(&self) -> bool {
-        self.is_rebuilt
-    }
-
-    /// Positions of the vertices (m).
-    pub fn vertices(&self) -> &[DVec3] {
-        &self.vertices
-    }
-
-    /// Distance from the particles' surface that each vertex keeps (m), negative inside; NaN: it was too far away to have one.
-    pub fn delta(&self) -> &[f32] {
-        &self.delta
-    }
-
-    /// Vertices at which the last step found a change: those that it could not project, and those beside surface that the mesh does not
-    /// cover.
-    pub fn flags(&self) -> &[bool] {
-        &self.flags
     }
 
     /// Follows the particles from one frame to the next, `dt` (s) later. A step that fails or is cancelled leaves the mesh as it was.

@@ -1,5 +1,7 @@
 //! .vdb files: written atomically, with the same bytes for the same grids.
 
+pub use super::grid_info::GridInfo;
+pub use super::write_options::{Compression, WriteOptions};
 use std::path::Path;
 
 use super::bridge::ffi;
@@ -7,60 +9,9 @@ use super::distances;
 use super::grid::{FloatGrid, GridClass, MetaValue, to_meta};
 use super::reading::{decode, guard, layout};
 use super::vectors::{AnyGrid, GridRef};
+use super::write_options::{codec_number, named_by_content};
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::io::files::hash::Hasher;
-
-/// Compression of values.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Compression {
-    /// Uncompressed.
-    None,
-    /// Zip: small, slow.
-    Zip,
-    /// Blosc: fast.
-    #[default]
-    Blosc,
-}
-
-/// Options for writing a file.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct WriteOptions {
-    /// Codec.
-    pub compression: Compression,
-    /// 16-bit values: for caches that are only rendered.
-    pub half: bool,
-    /// Metadata of the file itself.
-    pub metadata: Vec<(String, MetaValue)>,
-}
-
-/// The description of a grid in a file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GridInfo {
-    /// Name.
-    pub name: String,
-    /// OpenVDB's type name, for instance `Tree_float_5_4_3`.
-    pub value_type: String,
-    /// Class: "level set", "fog volume", "unknown" ...
-    pub class: String,
-    /// Edge of a cell along x (m).
-    pub voxel: f64,
-    /// Active voxels, if the file states them.
-    pub active_voxels: Option<u64>,
-    /// Minimum and maximum active voxel, if the file states them.
-    pub bbox: Option<([i32; 3], [i32; 3])>,
-    /// Memory when loaded (bytes), if the file states it.
-    pub memory: Option<u64>,
-    /// Whether values are stored in 16 bits.
-    pub half: bool,
-    /// Codecs.
-    pub compression: String,
-    /// All metadata.
-    pub metadata: Vec<(String, MetaValue)>,
-}
-
-/// Position of the random identifier in a file: 36 characters.
-const UUID: std::ops::Range<usize> = 21..57;
 
 /// Writes grids to a file, atomically.
 ///
@@ -105,27 +56,6 @@ pub fn any_to_bytes(grids: &[GridRef<'_>], options: &WriteOptions) -> Result<Vec
     let meta: Vec<ffi::Meta> = options.metadata.iter().map(|(key, value)| to_meta(key, value)).collect();
     let bytes = ffi::grids_to_bytes(&pointers, &vectors, codec, options.half, &meta).map_err(super::fail)?;
     Ok(named_by_content(&bytes))
-}
-
-/// The number of a codec on the C++ side.
-pub(super) fn codec_number(compression: Compression) -> i32 {
-    match compression {
-        Compression::None => 0,
-        Compression::Zip => 1,
-        Compression::Blosc => 2,
-    }
-}
-
-/// The bytes of a file, with the random identifier replaced by one derived from the rest.
-pub(super) fn named_by_content(bytes: &cxx::CxxString) -> Vec<u8> {
-    let mut bytes = bytes.as_bytes().to_vec();
-    if bytes.len() < UUID.end {
-        return bytes;
-    }
-    let digits = Hasher::default().add(&bytes[..UUID.start]).add(&bytes[UUID.end..]).finish();
-    let name = [&digits[..8], &digits[8..12], &digits[12..16], &digits[16..20], &digits[20..]].join("-");
-    bytes[UUID].copy_from_slice(name.as_bytes());
-    bytes
 }
 
 /// Descriptions of a file's grids, of any type, sorted by name; values are not read, except in a stream, which has no offsets to its grids.

@@ -7,12 +7,15 @@ mod bridge;
 pub mod distances;
 pub mod file;
 mod grid;
+pub(crate) mod grid_info;
 mod leaf;
 pub mod level_set;
+mod point_arrays;
 pub mod points;
 pub mod reading;
 mod refusal;
 mod vectors;
+pub(crate) mod write_options;
 
 pub use grid::{FloatGrid, GridClass, MetaValue, Ready, Tile};
 pub use leaf::{Leaf, LeafMut, Probe, Vectors};

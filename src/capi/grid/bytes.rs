@@ -10,8 +10,8 @@ use crate::capi::ffi::views::{Plain, frz_view, meaning, required_text, text, wri
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{creates, enter, frz_context};
 use crate::context::Context;
-use crate::vdb::file::{self, Compression, WriteOptions};
-use crate::vdb::{AnyGrid, GridRef};
+use crate::vdb::write_options::{Compression, WriteOptions};
+use crate::vdb::{AnyGrid, GridRef, file};
 
 /// Compression of the values of a .vdb file.
 #[repr(u32)]

@@ -1,6 +1,7 @@
 //! The mesh of a tracker as it is displayed before the liquid merges or splits.
 
-use super::mesh::{frz_particles, frz_tracker, particles};
+use super::follower::frz_tracker;
+use super::mesh::{frz_particles, particles};
 use crate::capi::ffi::guard::{Failure, frz_status, guard};
 use crate::capi::ffi::handle::change;
 use crate::capi::ffi::views::{finite, frz_span};

@@ -1,29 +1,11 @@
 //! The current mesh of a tracker, and how the last step changed it.
 
-use super::mesh::{Follower, frz_tracker};
+use super::follower::{Follower, frz_tracker};
 use crate::capi::ffi::guard::{frz_status, guard};
 use crate::capi::ffi::handle::{clear, read, required};
 use crate::capi::ffi::views::{frz_span, meaning};
 use crate::geometry::DVec3;
 use crate::mesh_repair::Source;
-use crate::surface::Change;
-
-/// How a step changed the mesh.
-pub(in crate::capi) struct Edits {
-    /// For each vertex its index before the step; `None`: it is new.
-    pub origins: Vec<Option<u32>>,
-    /// For each triangle its origin.
-    pub sources: Vec<Source>,
-    /// Positions (m) to which the step took the previous vertices.
-    pub before: Vec<DVec3>,
-}
-
-impl From<Change> for Edits {
-    fn from(change: Change) -> Self {
-        let Change { origins, sources, before, .. } = change;
-        Self { origins, sources, before }
-    }
-}
 
 /// Vertex arrays that frz_tracker_read copies, in the order of the mesh that the tracker was created with until a step or
 /// frz_tracker_resculpt changes it.

@@ -2,22 +2,18 @@
 
 use std::ffi::c_void;
 
-use super::edits::Edits;
+use super::follower::{Follower, frz_tracker};
 pub use super::params::{frz_tracker_params, frz_tracker_params_init};
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{Noun, change, clear, destroy, read, required};
+use crate::capi::ffi::handle::{change, clear, destroy, read, required};
 use crate::capi::ffi::saved::{Saved, resumed};
 use crate::capi::ffi::views::{Sized32, fill, finite, frz_view, sized};
 use crate::capi::mesh::triangles::{frz_mesh, no_flags};
 use crate::capi::runtime::context::{creates, enter, frz_context};
+use crate::capi::tracker::follower::Edits;
 use crate::geometry::check::orientation::{Closing, Orientation};
 use crate::geometry::check::topology::Topology;
 use crate::surface::{Change, Outlook, Particles, Tracker, estimate_spacing};
-
-/// A detailed mesh that follows the particles of a liquid.
-pub struct frz_tracker {
-    _opaque: [u8; 0],
-}
 
 /// The particles of a liquid at one time. Their order does not matter.
 #[repr(C)]
@@ -112,19 +108,6 @@ impl frz_tracker_report {
     };
 }
 
-/// The value of a tracker's handle.
-pub(in crate::capi) struct Follower {
-    /// The mesh.
-    pub tracker: Tracker,
-    /// How the last step changed it; `None`: no triangle changed, or there was no step yet.
-    pub edits: Option<Edits>,
-    /// Steps computed in advance.
-    pub outlook: Outlook,
-    pub saved: Saved,
-    /// Whether a warning about the particles was logged.
-    pub has_warned: bool,
-}
-
 /// Refuses to rebuild a restored mesh that is not closed, as [`Tracker::new`] does at the first frame.
 fn check_closed(tracker: &Tracker) -> Outcome {
     let triangles = tracker.triangles();
@@ -133,12 +116,6 @@ fn check_closed(tracker: &Tracker) -> Outcome {
         return Ok(());
     }
     Err(Failure::argument("the mesh is not closed and 2-manifold by index, as it must be to be rebuilt"))
-}
-
-impl Noun for frz_tracker {
-    type Value = Follower;
-    const NAME: &'static str = "tracker";
-    const TAG: u32 = 0x6672_7a08;
 }
 
 /// Particles from a host's arrays, checked.

@@ -3,6 +3,8 @@
 // In the order of the header.
 pub mod params;
 
+pub mod follower;
+
 pub mod mesh;
 
 pub mod eased;

@@ -1,6 +1,7 @@
 //! Where the liquid at the vertices of a tracker's mesh was at the first frame.
 
-use super::mesh::{frz_particles, frz_tracker, particles};
+use super::follower::frz_tracker;
+use super::mesh::{frz_particles, particles};
 use crate::capi::ffi::guard::{Failure, frz_status, guard};
 use crate::capi::ffi::handle::read;
 use crate::capi::ffi::views::frz_span;

@@ -1,7 +1,7 @@
 //! Replacing a tracker's mesh by one that was edited by hand.
 
-use super::edits::Edits;
-use super::mesh::{frz_particles, frz_tracker, particles};
+use super::follower::{Edits, frz_tracker};
+use super::mesh::{frz_particles, particles};
 use crate::capi::ffi::guard::{frz_status, guard};
 use crate::capi::ffi::handle::{change, read};
 use crate::capi::mesh::triangles::frz_mesh;

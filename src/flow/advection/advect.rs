@@ -9,9 +9,9 @@
 
 use rayon::prelude::*;
 
-use super::conserve::{self, Keeping};
+use super::conserve;
 use super::paths::{At, Live, Paths, Ways, trace};
-use super::scheme::{Scheme, Way};
+use super::scheme::{Keeping, Scheme, Way};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::flow::Flow;

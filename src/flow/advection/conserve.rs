@@ -10,6 +10,7 @@
 use rayon::prelude::*;
 
 use super::paths::{Extent, Paths};
+use super::scheme::Keeping;
 use crate::context::Context;
 use crate::error::Result;
 use crate::flow::pressure::stencil::row_of;
@@ -17,15 +18,6 @@ use crate::flow::tiles::{Field, Tile, Tiles, neighbour_at};
 use crate::flow::window::{max, min};
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::Lanes;
-
-/// What happens to a density besides advection.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Keeping {
-    /// Share 0..=1 of the mass that remains.
-    pub share: f32,
-    /// Densities below this fade over several steps; their mass goes to neighbouring density.
-    pub least: f32,
-}
 
 /// Largest factor of a hat, and then of all density, in a round: if nearly all the mist of a tile was cut off, its mass must not return in
 /// the remainder.

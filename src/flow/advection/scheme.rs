@@ -1,6 +1,5 @@
 //! How values are advected.
 
-use super::conserve::Keeping;
 use crate::flow::Flow;
 
 /// Advection scheme.
@@ -26,4 +25,13 @@ pub struct Way<'a> {
     pub around: Option<&'a Flow>,
     /// How the density conserves its mass; none: only as well as the scheme does.
     pub keeping: Option<Keeping>,
+}
+
+/// What happens to a density besides advection.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Keeping {
+    /// Share 0..=1 of the mass that remains.
+    pub share: f32,
+    /// Densities below this fade over several steps; their mass goes to neighbouring density.
+    pub least: f32,
 }

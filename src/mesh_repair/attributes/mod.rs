@@ -4,6 +4,7 @@
 //! vertex of the nearest position, the corners of a new triangle of positions on a single old triangle, its chart, so that it never crosses
 //! a seam. Where the liquid's position at the first frame is known, the mesh of that frame is used first (`attributes/traced.rs`).
 
+pub(in crate::mesh_repair) mod charts;
 mod texture;
 pub(in crate::mesh_repair) mod traced;
 pub(in crate::mesh_repair) mod weights;
@@ -14,7 +15,8 @@ use super::Source;
 use crate::geometry::check::deviation::NearestTree;
 use crate::geometry::mesh::attributes::{DetailedMesh, MeshArray, On};
 use crate::geometry::{DVec3, TriMesh, Uvs, Vec3};
-use traced::{Traced, is_mask};
+use charts::Traced;
+use traced::is_mask;
 use weights::{Weights, alone, between, blended, heaviest, weights};
 
 /// Vertices or triangles of a task.

@@ -8,7 +8,7 @@
 //! those triangles, and the difference is spread over the new geometry: the texture continues without a seam and without a row of stretched
 //! triangles. Spreading stops at torn triangles.
 
-use super::traced::{Chart, Charts, longest};
+use super::charts::{Chart, Charts, longest};
 use super::weights::{Weights, between};
 use crate::geometry::{TriMesh, Uvs};
 

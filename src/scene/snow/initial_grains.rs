@@ -5,7 +5,6 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::grain_params::params;
-use super::inputs::Inputs;
 use super::stages::grain_files::{changes_since, partial};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -76,23 +75,24 @@ impl Drift {
         Ok(Some(drift))
     }
 
-    /// Positions (m) and velocities (m/s) of the grains that are neither in a layer nor below the ground, for a radius (m).
+    /// Positions (m) and velocities (m/s) of the grains that are neither in a layer nor below the ground, a mesh and the height of a floor (m), for
+    /// a radius (m).
     ///
     /// # Errors
     /// Errors of the grid; cancel.
     pub fn outside(
         &self,
         ctx: &Context,
-        inputs: &Inputs,
+        (ground, floor): (Option<&TriMesh>, Option<f64>),
         layer: &FloatGrid,
         radius: f64,
     ) -> Result<(Vec<DVec3>, Vec<[f32; 3]>)> {
         let deep = DEEP * 2.0 * radius;
         let mut distances = Vec::new();
         layer.sample_linear(ctx, &self.positions, &mut distances)?;
-        let ground = inputs.ground().map(|mesh| (mesh, Bvh::new(mesh)));
+        let ground = ground.map(|mesh| (mesh, Bvh::new(mesh)));
         let is_below = |position: &DVec3| {
-            inputs.floor().is_some_and(|floor| position.y < floor - deep)
+            floor.is_some_and(|floor| position.y < floor - deep)
                 || ground.as_ref().is_some_and(|(mesh, tree)| is_below(mesh, tree, *position, deep))
         };
         let is_outside =

@@ -11,7 +11,8 @@
 
 use xxhash_rust::xxh3::xxh3_128;
 
-use super::{LAST, MOST_FLUX, Put, SEAL, SUMS, Saved, is_over, part, parts, refused};
+use super::encoding::{Put, SUMS, part, parts, refused};
+use super::{LAST, MOST_FLUX, SEAL, Saved, is_over};
 use crate::error::{Error, Result};
 use crate::numeric::bytes::Reader;
 use crate::shallow::Shallow;

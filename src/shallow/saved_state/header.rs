@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Put, heads};
+use super::encoding::Put;
 use crate::error::Result;
 use crate::numeric::bytes::Reader;
 use crate::shallow::columns::STRIP;
@@ -142,4 +142,13 @@ impl Header {
         let counts = Counts { runs, strips, rows, points, links, heads, parcels, packets, lips, scalars };
         Ok(Self { border, terrain, counts, times, still, sums, since, tick })
     }
+}
+
+/// Active strips that have the head of a full column.
+pub(in crate::shallow::saved_state) fn heads(
+    shallow: &Shallow,
+) -> impl Iterator<Item = (usize, &[f32; STRIP])> {
+    let all = shallow.flow.heads().as_chunks::<STRIP>().0;
+    let strips = runs(shallow.flow.active()).flatten().map(move |strip| (strip, &all[strip]));
+    strips.filter(|(_, heads)| heads.iter().fold(0, |any, head| any | head.to_bits()) != 0)
 }

@@ -19,6 +19,7 @@
 //! | hash of everything above | [`SEAL`] |
 
 mod detail;
+mod encoding;
 mod header;
 mod scalars;
 
@@ -37,15 +38,15 @@ use super::system::Shallow;
 use crate::error::{Error, Result};
 use crate::numeric::bytes::Reader;
 use crate::numeric::cpu::dispatch;
-use header::{ARRAYS, Counts, HEADER, Header, MAGIC, SEAL, SHARE, VERSION};
+use encoding::{Put, SUMS, get, part, parts, refused};
+use header::{ARRAYS, Counts, HEADER, Header, MAGIC, SEAL, SHARE, VERSION, heads};
 use scalars::Scalars;
 
 /// Upper bound of a flux (units a step): K limits transfers to the donor's depth.
 const MOST_FLUX: f32 = 2.0 * TOP as f32;
 /// Valid length of the last step (s): the next one's share of a flux must be finite.
 const LAST: RangeInclusive<f64> = 1e-20..=1e6;
-/// Valid sums of units, three of which fit 64 bits; and units that a flow point has pending.
-const SUMS: RangeInclusive<i64> = -(1 << 61)..=1 << 61;
+
 const WAITING: RangeInclusive<f64> = -1e18..=1e18;
 
 impl Shallow {
@@ -159,13 +160,6 @@ impl Shallow {
             tick: self.falls.tick,
         }
     }
-}
-
-/// Active strips that have the head of a full column.
-fn heads(shallow: &Shallow) -> impl Iterator<Item = (usize, &[f32; STRIP])> {
-    let all = shallow.flow.heads().as_chunks::<STRIP>().0;
-    let strips = runs(shallow.flow.active()).flatten().map(move |strip| (strip, &all[strip]));
-    strips.filter(|(_, heads)| heads.iter().fold(0, |any, head| any | head.to_bits()) != 0)
 }
 
 /// A complete state, in its parts.
@@ -284,7 +278,7 @@ impl<'a> Saved<'a> {
             && !is_over(left, 1.0)
             && !is_over(heads, f32::MAX)
             && !self.has_bad_columns(columns)
-            && self.scalars.has_good_numbers(self)
+            && self.scalars.has_good_numbers(self.lips(), self.depths())
     }
 
     fn has_good_falls(&self, shallow: &Shallow) -> bool {
@@ -315,7 +309,7 @@ impl<'a> Saved<'a> {
         self.packets.iter().map(Packet::from_bytes)
     }
 
-    fn lips(&self) -> impl Iterator<Item = Waiting> {
+    fn lips(&self) -> impl Iterator<Item = Waiting> + Clone {
         self.lips.iter().map(Waiting::from_bytes)
     }
 
@@ -324,7 +318,7 @@ impl<'a> Saved<'a> {
     }
 
     /// The five arrays of each run, in shares of a strip.
-    fn arrays(&self) -> impl Iterator<Item = (Range<usize>, [&'a [[u8; SHARE]]; ARRAYS])> {
+    fn arrays(&self) -> impl Iterator<Item = (Range<usize>, [&'a [[u8; SHARE]]; ARRAYS])> + Clone {
         let mut rest = self.shares;
         self.runs().map(move |run| {
             let arrays = std::array::from_fn(|_| {
@@ -334,6 +328,11 @@ impl<'a> Saved<'a> {
             });
             (run, arrays)
         })
+    }
+
+    /// Depths of all columns.
+    fn depths(&self) -> impl Iterator<Item = &'a [u8; 4]> + Clone {
+        self.arrays().flat_map(|(_, [depth, ..])| depth.as_flattened().as_chunks::<4>().0)
     }
 
     /// Applies the state.
@@ -418,40 +417,6 @@ fn is_in_order(mut ranges: impl Iterator<Item = Range<usize>>, count: usize) -> 
     })
 }
 
-/// The bytes still to be written.
-struct Put<'a>(&'a mut [u8]);
-
-impl Put<'_> {
-    fn bytes(&mut self, bytes: &[u8]) {
-        self.next(bytes.len()).copy_from_slice(bytes);
-    }
-
-    fn numbers<T: Copy, const N: usize>(&mut self, numbers: &[T], bytes: impl Fn(T) -> [u8; N]) {
-        let to = self.next(N * numbers.len()).as_chunks_mut().0;
-        to.iter_mut().zip(numbers).for_each(|(to, number)| *to = bytes(*number));
-    }
-
-    fn next(&mut self, count: usize) -> &mut [u8] {
-        let (next, rest) = std::mem::take(&mut self.0).split_at_mut(count);
-        self.0 = rest;
-        next
-    }
-}
-
-fn get<T, const N: usize>(bytes: &[u8], to: &mut [T], number: impl Fn([u8; N]) -> T) {
-    to.iter_mut().zip(bytes.as_chunks().0).for_each(|(to, bytes)| *to = number(*bytes));
-}
-
-/// The next elements of N bytes.
-fn parts<'a, const N: usize>(from: &mut Reader<'a>, count: usize) -> Result<&'a [[u8; N]]> {
-    Ok(from.bytes(count * N)?.as_chunks().0)
-}
-
-/// Some bytes of an element.
-fn part<const N: usize>(element: &[u8], at: usize) -> [u8; N] {
-    std::array::from_fn(|byte| element[at + byte])
-}
-
 fn code_of_border(border: Border) -> u32 {
     match border {
         Border::Closed => 0,
@@ -467,8 +432,4 @@ fn code_of_kind(kind: Kind) -> u32 {
         Kind::Absorber(_) => 2,
         Kind::Orifice(_) => 3,
     }
-}
-
-fn refused(what: &str) -> Error {
-    Error::Bytes(format!("the saved state {what}"))
 }

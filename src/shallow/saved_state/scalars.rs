@@ -9,8 +9,8 @@
 
 use std::ops::Range;
 
+use super::encoding::{Put, get, part, parts, refused};
 use super::header::{Counts, SCALAR, SHARE};
-use super::{Put, Saved, get, part, parts, refused};
 use crate::error::Result;
 use crate::numeric::bytes::Reader;
 use crate::shallow::columns::STRIP;
@@ -103,7 +103,11 @@ impl<'a> Scalars<'a> {
     }
 
     /// Whether all numbers are valid for a liquid.
-    pub(super) fn has_good_numbers(&self, saved: &Saved) -> bool {
+    pub(super) fn has_good_numbers<'b>(
+        &self,
+        lips: impl Iterator<Item = Waiting> + Clone,
+        depths: impl Iterator<Item = &'b [u8; 4]> + Clone,
+    ) -> bool {
         self.iter().all(|part| {
             let due = part.number(24);
             (0.0..1e30).contains(&due)
@@ -112,8 +116,8 @@ impl<'a> Scalars<'a> {
                     .into_iter()
                     .flatten()
                     .all(|amount| WAITING.contains(&i64::from_le_bytes(*amount)))
-                && part.lips.iter().zip(saved.lips()).all(|(amount, lip)| lip.units > 0 || *amount == [0; 8])
-                && part.has_good_amounts(saved)
+                && part.lips.iter().zip(lips.clone()).all(|(amount, lip)| lip.units > 0 || *amount == [0; 8])
+                && part.has_good_amounts(depths.clone())
         })
     }
 
@@ -166,8 +170,7 @@ impl Part<'_> {
     }
 
     /// Whether amounts are integers within the range that the saved depths allow, plus a tolerance for rounding, and 0 without liquid.
-    fn has_good_amounts(&self, saved: &Saved) -> bool {
-        let depths = saved.arrays().flat_map(|(_, [depth, ..])| depth.as_flattened().as_chunks::<4>().0);
+    fn has_good_amounts<'b>(&self, depths: impl Iterator<Item = &'b [u8; 4]>) -> bool {
         let amounts = self.shares.as_flattened().as_chunks::<8>().0;
         depths.zip(amounts).fold(true, |good, (depth, amount)| {
             let (depth, amount) = (i32::from_le_bytes(*depth), f64::from_le_bytes(*amount));

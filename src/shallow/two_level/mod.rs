@@ -7,6 +7,7 @@
 //! become a coarse one, or the reverse (`shift.rs`), and fluxes persist (`momentum.rs`). Nothing is lost. `surface/` writes one mesh of
 //! both.
 
+mod buffers;
 mod frame;
 mod ground;
 mod momentum;
@@ -29,11 +30,10 @@ use super::terrain::Solids;
 use super::terrain::shapes::Shape;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use buffers::{Momentum, Shift};
 use ground::Ground;
-use momentum::Momentum;
 use rests::Rests;
 use seam::Seam;
-use shift::Shift;
 
 /// Tolerance for a side of a box to count as a side of cells (coarse cells).
 const ROUNDING: f64 = 1e-6;

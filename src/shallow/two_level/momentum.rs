@@ -3,17 +3,10 @@
 //! A coarse pipe is that of two sides, with half of its volume each; the flux within a coarse cell is the mean of its inflow and outflow.
 
 use super::Detail;
+use super::buffers::Momentum;
 use crate::shallow::Shallow;
 use crate::shallow::columns::STRIP;
 use crate::shallow::columns::grid::Cells;
-
-/// Fluxes through sides of fine cells (fine units a step): for each cell of some boxes the sides to the east and south, layer by layer.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Momentum {
-    boxes: Vec<Cells>,
-    layers: usize,
-    fluxes: Vec<f32>,
-}
 
 /// The pipe of a side.
 enum Side {

@@ -5,34 +5,12 @@
 //! coarse column later.
 
 use super::Detail;
+use super::buffers::Moving;
 use super::rests::{Load, change, of_column};
 use crate::error::Result;
 use crate::shallow::Shallow;
 use crate::shallow::columns::grid::Cells;
 use crate::shallow::remap::Parcel;
-
-/// Scratch buffers.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Shift {
-    /// Liquid that goes into coarse columns, and liquid that goes into fine ones.
-    leaving: Vec<Moving>,
-    entering: Vec<Moving>,
-    /// Held liquid in fine cells and in coarse ones, which waits for room.
-    held: [Vec<Parcel>; 2],
-}
-
-/// Liquid of a coarse column whose cells change.
-#[derive(Debug, Clone, Copy)]
-struct Moving {
-    /// Coarse cell.
-    cell: [usize; 2],
-    layer: usize,
-    /// In fine units.
-    load: Load,
-    /// Surface (units), and eight times its rise from the middle of the coarse cell to that of a fine one, along x and along z.
-    eta: i64,
-    rises: [i64; 2],
-}
 
 impl Detail {
     /// Hands the cells that were near, or are now, to the other liquid.

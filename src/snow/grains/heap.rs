@@ -3,15 +3,16 @@
 use rayon::prelude::*;
 
 use super::colliders::field::Seen;
+use super::colliders::renewal;
 use super::colliders::search::{Scratch, Search, Travel};
 pub use super::colliders::set::{Colliders, Floor, Pose};
 pub use super::colliders::shell::Shell;
-use super::colliders::touch;
-use super::colliders::touch::Touch;
+use super::colliders::touch::{FIRST_SHELL, Touch};
 pub use super::params::Division;
-use super::solver::contacts::{Held, MOST as MOST_GRAINS};
+use super::solver::contacts::MOST as MOST_GRAINS;
+use crate::snow::grains::solver::pairs::Held;
 
-use super::solver::layout::{At, Layout, NONE, SUB_STEPS_AHEAD, holds, locate, order, settle, world};
+use super::solver::layout::{Layout, SUB_STEPS_AHEAD, holds, locate, order, settle, world};
 use super::solver::rest;
 use super::solver::rows::{Row, Shared, V, norm};
 use super::solver::solve::{Motion, sub_step};
@@ -19,6 +20,7 @@ use super::solver::trapped;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
+use crate::snow::grains::solver::blocks::{At, NONE};
 use crate::snow::grains::solver::collide::Coefficients;
 
 /// Grains between two steps.
@@ -155,7 +157,7 @@ impl Heap {
         colliders: &mut Colliders<'_>,
     ) -> Result<()> {
         let dt = division.dt / division.sub_steps as f64;
-        for (number, (shell, _)) in (touch::FIRST_SHELL..).zip(&mut colliders.shells) {
+        for (number, (shell, _)) in (FIRST_SHELL..).zip(&mut colliders.shells) {
             shell.collider = number;
         }
         let mut pose = Vec::new();
@@ -295,7 +297,7 @@ impl Heap {
             let found = field.touches(layout, &due, &self.rows, reach)?;
             due.iter().zip(found).for_each(|(&index, found)| fresh[index as usize].extend(found));
         }
-        touch::renew(&mut layout.blocks, fresh);
+        renewal::renew(&mut layout.blocks, fresh);
         Ok(())
     }
 

@@ -432,7 +432,7 @@ impl Grains {
             let position = position.map(|x| x / VOXEL);
             let voxel = position.map(|x| (x + 0.5).floor());
             cells.push(
-                [0, 1, 2].map(|axis| at[axis] * (solver::layout::EDGE / VOXEL) as i32 + voxel[axis] as i32),
+                [0, 1, 2].map(|axis| at[axis] * (solver::blocks::EDGE / VOXEL) as i32 + voxel[axis] as i32),
             );
             offsets.push([0, 1, 2].map(|axis| position[axis] - voxel[axis]));
         }

@@ -6,12 +6,11 @@ use super::affine_fit::{Near, sums};
 use super::grid::Cells;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::geometry::Coord;
-use crate::geometry::DVec3;
+use crate::geometry::{Coord, DVec3};
 use crate::mesh_repair::Source;
 use crate::surface::Particles;
 use crate::surface::topology::change::Change;
-use crate::surface::tracker::Tracker;
+use crate::surface::tracked_mesh::Tracker;
 
 /// Radius within which particles count (spacings): that of advection's maps. It is doubled, at most this often, where there are none.
 const RADIUS: i32 = 3;

@@ -125,10 +125,10 @@ impl Fans<'_, '_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Source;
     use super::super::tests::{Body, sphere};
     use super::*;
     use crate::geometry::TriMesh;
+    use crate::mesh_repair::Source;
 
     #[test]
     fn ridges_and_corners_are_told_from_smooth_positions() {

@@ -2,9 +2,9 @@
 //! index: two neighbours are merged only if the link condition holds (Dey, Edelsbrunner, Guha and Nekhayev 1999, "Topology preserving edge
 //! contraction").
 
-use super::improvable::mean;
-use super::{Improvable, Size, Source};
+use super::improvable::{Improvable, Size, mean};
 use crate::geometry::DVec3;
+use crate::mesh_repair::Source;
 
 /// For a vertex around which no triangle was added or removed.
 const NONE: u32 = u32::MAX;

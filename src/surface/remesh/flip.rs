@@ -58,10 +58,10 @@ impl Fans<'_, '_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Source;
     use super::super::tests::Body;
     use super::*;
     use crate::geometry::DVec3;
+    use crate::mesh_repair::Source;
 
     /// Two triangles along an edge, the second of which is rotated about it (degrees).
     fn kite(height: f64, turn: f64) -> Body {

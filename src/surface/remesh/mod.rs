@@ -24,14 +24,13 @@ mod strain;
 
 pub use improvable::Improvable;
 pub use improvable::Size;
-use improvable::{is_long, is_short};
 use rayon::prelude::*;
 
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::DVec3;
-use crate::mesh_repair::Source;
 use fans::Fans;
+use improvable::{is_long, is_short};
 
 /// How often an edge and its parts may be halved in a frame: a stray vertex may make it arbitrarily long.
 const ROUNDS: usize = 5;

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use super::shape::{least_angle, normal};
+use super::*;
 use crate::context::Pool;
 use crate::error::Error;
 use crate::geometry::check::topology::Topology;
 use crate::geometry::test_meshes;
-use crate::surface::remesh::*;
+use crate::mesh_repair::Source;
 
 /// The drift of a vertex of which nothing is known: so large that no edge rests, and, unlike NaN, equal to itself.
 const UNKNOWN: [f32; 3] = [f32::INFINITY; 3];

@@ -7,13 +7,13 @@ use super::hidden::Everywhere;
 use super::uncovered_parts::is_near;
 use crate::context::Context;
 use crate::error::Result;
-use crate::geometry::Coord;
-use crate::geometry::DVec3;
+use crate::geometry::{Coord, DVec3};
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::params::Params;
 use crate::surface::particles::grid::cell_of;
-use crate::surface::tracker::{Covered, Next, Tracker};
+use crate::surface::tracked_mesh::Tracker;
+use crate::surface::tracker::{Covered, Next};
 
 impl Tracker {
     /// The changed mesh where it no longer fits.

@@ -7,8 +7,7 @@ use crate::geometry::{Coord, DVec3};
 use crate::numeric::blocks::DIM;
 use crate::surface::level_set::band::reach_in;
 use crate::surface::particles::grid::cell_of;
-use crate::surface::tracked_mesh::{DRIFT, REACH, WIDER};
-use crate::surface::tracker::Tracker;
+use crate::surface::tracked_mesh::{DRIFT, REACH, Tracker, WIDER};
 
 /// Blocks of the band, ascending, and its reach in each (cells).
 pub type Deep = Vec<(Coord, f32)>;

@@ -1,6 +1,6 @@
 //! A mesh without liquid: before the first particles appear, and when all are gone.
 
-use super::prefetch::Ahead;
+use super::ahead::Ahead;
 use crate::context::Context;
 use crate::error::Result;
 use crate::surface::Particles;
@@ -9,7 +9,7 @@ use crate::surface::particles::paths::Paths;
 use crate::surface::remesh::drift::Drift;
 use crate::surface::report::StepReport;
 use crate::surface::topology::change::{Change, Unfit};
-use crate::surface::tracker::Tracker;
+use crate::surface::tracked_mesh::Tracker;
 
 impl Tracker {
     /// A mesh without vertices: that of frames before the first particles. If it is rebuilt, a step to particles creates it from their

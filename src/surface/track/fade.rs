@@ -3,7 +3,7 @@
 //! Delta halves in a given time, and shrinks with the strain of the mesh around a vertex. Detail retention slows both; at 1 nothing fades.
 
 use crate::geometry::DVec3;
-use crate::surface::tracker::Tracker;
+use crate::surface::tracked_mesh::Tracker;
 
 /// The distance that each vertex keeps after a step of `dt` (s) in which its vertices are carried to `carried` (m).
 pub fn fade(tracker: &Tracker, carried: &[DVec3], dt: f64) -> Vec<f32> {

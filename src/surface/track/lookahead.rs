@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::surface::Particles;
 use crate::surface::report::StepReport;
-use crate::surface::tracker::Tracker;
+use crate::surface::tracked_mesh::Tracker;
 
 /// The coming steps of a tracker.
 #[derive(Debug, Default)]

@@ -2,35 +2,11 @@
 
 use std::sync::Arc;
 
+use super::ahead::Ahead;
 use crate::context::Context;
 use crate::error::Result;
-use crate::geometry::DVec3;
 use crate::surface::Particles;
-use crate::surface::level_set::implicit::Implicit;
-use crate::surface::level_set::isosurface::Isosurface;
-use crate::surface::tracker::Tracker;
-
-/// The implicit function and the triangles of its zero set.
-type Surface = Arc<(Implicit, Isosurface)>;
-
-/// Data of the coming particles.
-#[derive(Debug, Clone, Default)]
-pub(in crate::surface) struct Ahead {
-    /// Particles whose surface is to be computed during the next step.
-    wanted: Option<Arc<Particles>>,
-    /// Particles whose surface is ready, and that surface.
-    ready: Option<(Arc<Particles>, Surface)>,
-}
-
-impl Ahead {
-    /// The surface of particles at these positions, if it is ready.
-    pub fn ready(&self, positions: &[DVec3]) -> Option<Surface> {
-        self.ready
-            .as_ref()
-            .filter(|(own, _)| *own.positions == *positions)
-            .map(|(_, surface)| surface.clone())
-    }
-}
+use crate::surface::tracked_mesh::Tracker;
 
 impl Tracker {
     /// Prefetches the particles of the step after next: while the mesh is rebuilt, their surface is computed on idle threads. The result is

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::geometry::TriMesh;
 use crate::surface::Particles;
 use crate::surface::report::StepReport;
-use crate::surface::tracker::Tracker;
+use crate::surface::tracked_mesh::Tracker;
 
 impl Tracker {
     /// Replaces its mesh by an edited one (m), of any vertices and triangles, at the time of `particles`: those to which its last step went,

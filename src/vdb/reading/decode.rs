@@ -10,10 +10,10 @@ use super::layout::{self, Fault, Layout};
 use crate::error::{Error, Result};
 use crate::geometry::Points;
 use crate::vdb::bridge::ffi;
-use crate::vdb::file::GridInfo;
 use crate::vdb::grid::{FloatGrid, from_meta};
-use crate::vdb::points;
-use crate::vdb::refusal::is_of_memory;
+use crate::vdb::grid_info::GridInfo;
+use crate::vdb::point_arrays;
+use crate::vdb::refusal::cannot_read;
 use crate::vdb::vectors::AnyGrid;
 
 /// OpenVDB's names of the grid types that can be read; a suffix means that values are stored in 16 bits.
@@ -106,22 +106,6 @@ fn stored(bytes: &[u8]) -> Told<Source<'static>> {
     ffi::read_bytes(bytes).map(Source::Stored).map_err(|error| cannot_read(&error))
 }
 
-/// The error for data that OpenVDB could not read.
-pub(in crate::vdb) fn cannot_read(error: &cxx::Exception) -> String {
-    let what = error.what();
-    log::info!("OpenVDB: {}", crate::error::one_line(what));
-    let told = |words: &[&str]| words.iter().any(|word| what.contains(word));
-    if is_of_memory(what) {
-        "the .vdb file is damaged, or needs more memory than it may take".into()
-    } else if told(&["LookupError", "non-registered", "not registered", "unregistered"]) {
-        "the .vdb file is damaged, or holds a kind of grid that frazil does not know".into()
-    } else if told(&["no longer supported", "unsupported"]) {
-        "the .vdb file is of a version that frazil does not read".into()
-    } else {
-        "the .vdb file cannot be read, it is cut short or damaged".into()
-    }
-}
-
 /// As [`crate::vdb::file::describe`].
 pub(in crate::vdb) fn describe(path: &Path) -> Result<Vec<GridInfo>> {
     headers(&source(path)?).map_err(|what| Error::file(path, what))
@@ -170,7 +154,7 @@ pub(in crate::vdb) fn read_points(path: &Path, name: Option<&str>) -> Result<(Po
     let mut source = source(path)?;
     let read = choose(&source, name, Kinds::Points).and_then(|chosen| {
         let grid = found(&mut source, &chosen, Kinds::Points)?.points;
-        if grid.is_null() { Err(ASTRAY.to_string()) } else { points::of_grid(&grid) }
+        if grid.is_null() { Err(ASTRAY.to_string()) } else { point_arrays::of_grid(&grid) }
     });
     read.map_err(|what| Error::file(path, what))
 }

@@ -24,9 +24,9 @@ use super::parcel::{Contents, unpack};
 use crate::error::{Error, Result, one_line};
 use crate::geometry::Points;
 use crate::io::records::manifest;
-use crate::vdb::file::GridInfo;
 use crate::vdb::grid::FloatGrid;
-use crate::vdb::points;
+use crate::vdb::grid_info::GridInfo;
+use crate::vdb::point_arrays;
 use crate::vdb::vectors::AnyGrid;
 
 /// Memory limit of a child: for any file (bytes), and for each byte of the file. The maximum per byte is that of a node above the leaves,
@@ -121,7 +121,7 @@ impl Guard {
     pub fn read_points(&self, path: &Path, name: Option<&str>) -> Result<Points> {
         match self.ask(path, name.map_or(Wanted::FirstPoints, Wanted::NamedPoints))? {
             Contents::Points(points, skipped) => {
-                points::warn_of(path, &skipped);
+                point_arrays::warn_of(path, &skipped);
                 Ok(points)
             }
             _ => Err(astray(path)),

@@ -3,6 +3,7 @@
 mod child;
 pub(in crate::vdb) mod decode;
 pub mod guard;
+mod head;
 #[doc(hidden)]
 pub mod layout;
 mod mapping;

@@ -3,9 +3,9 @@
 use std::fs::File;
 use std::io::Write;
 
-use super::parcel::{ALIGN, Cursor, Head};
+use super::head::{ALIGN, Cursor, Head};
 use crate::geometry::points::{Attribute, Column, Points, Values};
-use crate::vdb::points::kind;
+use crate::vdb::point_arrays::kind;
 
 /// A type whose values pass through a parcel as bytes.
 ///

@@ -10,7 +10,7 @@ use std::path::Path;
 use super::imports::all_sources;
 
 /// Files in circles that are still there. It only ever gets smaller.
-const FILES_IN_CIRCLES: usize = 98;
+const FILES_IN_CIRCLES: usize = 58;
 
 type Module = Vec<String>;
 
@@ -29,7 +29,10 @@ fn modules() -> BTreeMap<Module, (String, bool)> {
             continue;
         }
         let text = fs::read_to_string(&path).unwrap();
-        let code = text.split("#[cfg(test)]\nmod").next().unwrap();
+        let tests = text.match_indices("\n#[cfg(test)]\n").map(|(at, _)| at).find(|at| {
+            text[*at..].lines().nth(2).is_some_and(|line| line.contains("mod ") && line.ends_with('{'))
+        });
+        let code = &text[..tests.unwrap_or(text.len())];
         let code =
             code.lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n");
         all.insert(module, (code, is_folder));

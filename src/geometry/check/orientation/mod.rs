@@ -7,57 +7,16 @@
 //! is out is decided where they are used.
 
 mod nesting;
+mod outcome;
 mod pieces;
 
 use super::edges::{edge_uses, imbalance, is_same_edge, parts_of};
 use super::topology::collapsed;
 use crate::geometry::mesh::weld::Weld;
 use crate::geometry::{DVec3, DetailedMesh, TriMesh};
+use outcome::Fate;
+pub use outcome::{Closing, Doubts, Orientation};
 use pieces::Pieces;
-
-/// What an open part bounds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Closing {
-    /// Its loops are capped by cones.
-    Caps,
-    /// All below its upward-facing triangles is solid.
-    Below,
-}
-
-/// What happens to a triangle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Fate {
-    Stays,
-    Turned,
-    /// It duplicates an earlier one.
-    LeftOut,
-}
-
-/// What remains ambiguous.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Doubts {
-    /// Parts with only one side, where no choice makes all triangles agree.
-    pub one_sided: usize,
-    /// Non-manifold edges that do not determine which side is out.
-    pub crowded_edges: usize,
-    /// Inside-out parts whose inner parts may or may not be cavities.
-    pub nested: usize,
-}
-
-/// Which triangles of a mesh must be flipped or left out.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Orientation {
-    /// Empty: all triangles stay.
-    fates: Vec<Fate>,
-    /// Whether each triangle belongs to an open part; empty: none does.
-    open: Vec<bool>,
-    /// Signed volume of the closed parts (m3), before and after they were turned.
-    volumes: [f64; 2],
-    /// Parts turned as a whole.
-    pub turned_parts: usize,
-    /// What remains ambiguous.
-    pub doubts: Doubts,
-}
 
 impl Orientation {
     /// The orientation of triangles over vertices at positions (m), which must be finite; `same` names the vertex that each one is joined

@@ -1,7 +1,7 @@
 //! The parts of a mesh, even if it has doubled triangles, triangles that disagree, or non-manifold edges.
 
 use super::nesting::{ASLANT, Shape, Turns, turns};
-use super::{Closing, Fate, Orientation};
+use super::outcome::{Closing, Fate, Orientation};
 use crate::geometry::check::duplicates::{Doubles, copies};
 use crate::geometry::check::edges::{
     Agreement, Use, agree, edge_uses, imbalance, is_same_edge, parts_of, sound,

@@ -12,7 +12,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::estimate::memory;
-use super::stage::liquid_over_time::Course;
 use super::{Point, Shallow};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -72,7 +71,7 @@ impl Inputs {
     /// Reads the terrain of the first frame and the meshes on it, after checking that no file of any frame is missing.
     ///
     /// # Errors
-    /// Errors in files or keys, with file and key: a source inside solid, liquid that does not fit; cells that need more memory than the
+    /// Errors in files or keys, with file and key: liquid that does not fit; cells that need more memory than the
     /// context allows; cancel.
     pub fn load(ctx: &Context, scene: &Scene) -> Result<Self> {
         let (shallow, frames) = (scene.shallow()?, scene.shot.frames);
@@ -161,8 +160,6 @@ impl Inputs {
             warnings,
         };
         inputs.warnings.iter().for_each(|warning| log::warn!("{warning}"));
-        // Refuses a source inside solid before anything is written.
-        Course::begin(ctx, (scene, shallow, &inputs))?;
         Ok(inputs)
     }
 

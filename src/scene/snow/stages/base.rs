@@ -16,7 +16,8 @@ use crate::scene::{BaseMode, Scene, moving};
 use crate::snow::base_layer::{BaseLayer, Changes, Grids, Params, StepReport};
 use crate::sweep::{Body, TOLERANCE};
 use crate::vdb::FloatGrid;
-use crate::vdb::file::{WriteOptions, to_bytes};
+use crate::vdb::file::to_bytes;
+use crate::vdb::write_options::WriteOptions;
 
 /// The layer of a scene, pressed by its objects.
 pub struct Base<'a> {

@@ -104,8 +104,12 @@ impl<'a> Grains<'a> {
         let path = initial_grains::file(self.scene).unwrap_or(&self.scene.path);
         let frame = self.scene.shot.frames.first;
         let all = drift.positions.len();
-        let (positions, velocities) =
-            drift.outside(ctx, self.inputs, &layer.surface, grains.params().radius)?;
+        let (positions, velocities) = drift.outside(
+            ctx,
+            (self.inputs.ground(), self.inputs.floor()),
+            &layer.surface,
+            grains.params().radius,
+        )?;
         let left_out = all - positions.len();
         if left_out > 0 {
             log::warn!(

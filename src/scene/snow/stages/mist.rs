@@ -23,7 +23,8 @@ use crate::scene::{Role, Scene, System, moving};
 use crate::snow::base_layer;
 use crate::snow::mist::{self, Around, Grids, Params, Source, Start, StepReport, Surroundings, Wind};
 use crate::sweep::Body;
-use crate::vdb::file::{WriteOptions, any_to_bytes};
+use crate::vdb::file::any_to_bytes;
+use crate::vdb::write_options::WriteOptions;
 use crate::vdb::{FloatGrid, GridRef, file};
 
 /// Name of the stage, and of the kind of its files.

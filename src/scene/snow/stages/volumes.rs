@@ -22,7 +22,8 @@ use crate::scene::snow::keys::volumes::Needs;
 use crate::scene::{Scene, VolumesOutput};
 use crate::snow::base_layer::Grids;
 use crate::snow::render_volumes::{fog, united};
-use crate::vdb::file::{WriteOptions, to_bytes};
+use crate::vdb::file::to_bytes;
+use crate::vdb::write_options::WriteOptions;
 use crate::vdb::{FloatGrid, level_set};
 
 /// The stage for a scene.

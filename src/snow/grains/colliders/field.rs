@@ -5,8 +5,9 @@ use rayon::prelude::*;
 use super::touch::{BASE, Touch};
 use crate::error::Result;
 use crate::numeric::blocks::{DIM, offset};
-use crate::snow::grains::solver::contacts::SKIN;
-use crate::snow::grains::solver::layout::{At, Block, EDGE, Layout};
+use crate::snow::grains::solver::blocks::{At, Block, EDGE};
+use crate::snow::grains::solver::layout::Layout;
+use crate::snow::grains::solver::pairs::SKIN;
 use crate::snow::grains::solver::rows::{Row, V, dot, norm, scaled};
 use crate::vdb::{FloatGrid, Probe};
 

@@ -4,8 +4,9 @@ use super::nearby::Nearby;
 use super::shell::Shell;
 use super::touch::Touch;
 use crate::geometry::DVec3;
-use crate::snow::grains::solver::contacts::SKIN;
-use crate::snow::grains::solver::layout::{Block, EDGE, world};
+use crate::snow::grains::solver::blocks::{Block, EDGE};
+use crate::snow::grains::solver::layout::world;
+use crate::snow::grains::solver::pairs::SKIN;
 use crate::snow::grains::solver::rest;
 use crate::snow::grains::solver::rows::{Row, Shared, V, dot, norm, scaled, sub};
 

@@ -32,19 +32,19 @@ impl Floor {
     /// Touches of a block's members near the floor.
     pub(in crate::snow::grains) fn touches(
         &self,
-        block: &crate::snow::grains::solver::layout::Block,
+        block: &crate::snow::grains::solver::blocks::Block,
         rows: &[Row],
         diameter: f64,
         reach: f32,
     ) -> Vec<Touch> {
         // Height of the floor above the bottom of the block (diameters).
         let height = (self.height / diameter
-            - f64::from(block.at[1]) * f64::from(crate::snow::grains::solver::layout::EDGE))
+            - f64::from(block.at[1]) * f64::from(crate::snow::grains::solver::blocks::EDGE))
             as f32;
         let near = block.members.iter().filter(|slot| {
             let row = &rows[**slot as usize];
             row.position[1] - height - 0.5
-                < crate::snow::grains::solver::contacts::SKIN + norm(row.velocity) * reach
+                < crate::snow::grains::solver::pairs::SKIN + norm(row.velocity) * reach
         });
         let touch = |&grain: &u32| Touch {
             grain,

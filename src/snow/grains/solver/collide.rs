@@ -1,7 +1,7 @@
 //! One correction of eight pairs of grains: impulses, pushes, and which grains are supported or woken.
 
-use super::contacts::Batch;
 use super::density::SURROUNDED;
+use super::pairs::Batch;
 use super::rest;
 use super::rest::Rest;
 use super::rows::{Part, Row, SUPPORTED, Shared, V};

@@ -8,55 +8,15 @@ use std::sync::LazyLock;
 
 use rayon::prelude::*;
 
-use super::layout::{ALL_CELLS, Block, CELLS, EDGE, Home, Layout, NONE};
+use super::blocks::{ALL_CELLS, Block, CELLS, EDGE, Home, NONE};
+use super::layout::Layout;
+use super::pairs::{Batch, Held, INDEX, other};
 use super::rows::{Row, V, norm, sub};
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lanes::{LANES, Lanes};
 
-/// Maximum gap (diameters) between the anchors of a pair: pairs are found again once a grain is half as far from its anchor. Less than the
-/// edge of a cell minus a diameter.
-pub const SKIN: f32 = 0.25;
-/// The same in blocks with a fast grain, whose pairs last only a sub-step or two: slightly more than the gap at which grains
-/// wake each other.
-pub const THIN_SKIN: f32 = 0.12;
-
-/// Bits of the slot in a code; the bits above are the step to the block of the other grain, two bits per axis.
-const INDEX: u32 = 26;
 /// Maximum number of grains.
 pub const MOST: usize = 1 << INDEX;
-
-/// Eight pairs that share no grain. Unused lanes repeat the first one.
-#[derive(Clone, Copy)]
-pub struct Batch {
-    /// Slots of the owners: for each pair the grain in the later block (by y, x, z) or, within one block, the later member.
-    pub owners: [u32; LANES],
-    /// Slots of the other grains, with the step to their block above.
-    codes: [u32; LANES],
-    /// Impulses on the owners (m/s, for a grain of unit mass).
-    pub impulse: [Lanes; 3],
-}
-
-/// The impulse of a pair between two steps.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Held {
-    /// Slots of the grains.
-    pub grains: [u32; 2],
-    /// On the first grain (m/s).
-    pub impulse: V,
-}
-
-impl Held {
-    /// With the grains swapped.
-    fn turned(self) -> Self {
-        let [a, b] = self.grains;
-        Self { grains: [b, a], impulse: self.impulse.map(|x| -x) }
-    }
-
-    /// With the lower slot first.
-    fn in_order(self) -> Self {
-        if self.grains[0] < self.grains[1] { self } else { self.turned() }
-    }
-}
 
 /// A pair that was found.
 #[derive(Clone, Copy)]
@@ -80,65 +40,6 @@ struct Scratch {
     counts: Vec<u8>,
     /// For each batch itself if it is not full, else a later one to try.
     room: Vec<u32>,
-}
-
-impl Batch {
-    /// Slots of the other grains.
-    #[inline(always)]
-    pub fn others(&self) -> [u32; LANES] {
-        let mut others = self.codes;
-        for code in &mut others {
-            *code = other(*code);
-        }
-        others
-    }
-
-    /// From the owner's block to the other grain's (diameters).
-    #[inline(always)]
-    pub fn shift(&self) -> [Lanes; 3] {
-        let mut shift = [Lanes::default(); 3];
-        for (axis, shift) in shift.iter_mut().enumerate() {
-            for (lane, shift) in shift.0.iter_mut().enumerate() {
-                *shift = ((self.codes[lane] >> (INDEX + 2 * axis as u32) & 3) as i32 - 1) as f32 * EDGE;
-            }
-        }
-        shift
-    }
-
-    /// Visits the pairs that carry an impulse: their slots, the index of the other grain's block in [`Block::near`], and the
-    /// impulse. Unused lanes repeat the first pair.
-    #[inline(always)]
-    fn for_each_held(&self, mut visit: impl FnMut([u32; 2], usize, V)) {
-        for lane in 0..LANES {
-            let impulse = [self.impulse[0].0[lane], self.impulse[1].0[lane], self.impulse[2].0[lane]];
-            if impulse != [0.0; 3] {
-                let bits = self.codes[lane] >> INDEX;
-                let code = 9 * (bits & 3) + 3 * (bits >> 2 & 3) + (bits >> 4);
-                visit([self.owners[lane], other(self.codes[lane])], code as usize, impulse);
-            }
-        }
-    }
-
-    /// The pairs that carry an impulse, each once.
-    pub fn held(&self) -> impl Iterator<Item = Held> + '_ {
-        let held = |lane: usize| Held {
-            grains: [self.owners[lane], other(self.codes[lane])],
-            impulse: [0, 1, 2].map(|axis: usize| self.impulse[axis].0[lane]),
-        };
-        self.lanes().map(held).filter(|held| held.impulse != [0.0; 3])
-    }
-
-    /// The lanes in use.
-    pub fn lanes(&self) -> impl Iterator<Item = usize> + '_ {
-        let repeats = |lane: usize| self.owners[lane] == self.owners[0] && self.codes[lane] == self.codes[0];
-        (0..LANES).filter(move |&lane| lane == 0 || !repeats(lane))
-    }
-}
-
-/// The slot in a code.
-#[inline(always)]
-fn other(code: u32) -> u32 {
-    code & ((1 << INDEX) - 1)
 }
 
 /// The upper bits of a code: a step of -1 to 1 along each axis.

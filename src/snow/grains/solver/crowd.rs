@@ -11,7 +11,7 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::layout::{At, EDGE, world};
+use super::layout::world;
 use super::rest;
 use super::rows::{Row, V, add};
 use super::surfaces::{Side, Surfaces};
@@ -21,6 +21,7 @@ use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::snow::grains::colliders::set::Colliders;
 use crate::snow::grains::heap::Heap;
+use crate::snow::grains::solver::blocks::{At, EDGE};
 
 /// Edge of a cell (diameters): it holds 2 x 2 x 2 grains side by side.
 const CELL: f32 = 2.0;

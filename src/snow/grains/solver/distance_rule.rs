@@ -6,7 +6,8 @@
 
 use rayon::prelude::*;
 
-use super::layout::{At, world};
+use super::blocks::At;
+use super::layout::world;
 use super::rest;
 use super::rows::{Row, norm};
 use crate::error::Result;

@@ -13,9 +13,10 @@
 
 use rayon::prelude::*;
 
+use super::blocks::Block;
 use super::collide::{Coefficients, Contact, Eight, FARTHEST, STEEP, TOUCHING, collide};
-use super::contacts::Batch;
-use super::layout::{Block, Layout};
+use super::layout::Layout;
+use super::pairs::Batch;
 use super::rest;
 use super::rows::{Part, Row, Shared, V, add, dot, norm, scaled, sub};
 use crate::context::Context;

@@ -1,6 +1,6 @@
 //! The surfaces around grains that are inside a surface or in a crowd.
 
-use super::layout::At;
+use super::blocks::At;
 use super::rows::{V, dot};
 use crate::error::Result;
 use crate::geometry::DVec3;

@@ -4,7 +4,8 @@
 
 use rayon::prelude::*;
 
-use super::layout::{At, Layout, world};
+use super::blocks::At;
+use super::layout::{Layout, world};
 use super::rows::{Row, V, add, dot};
 use super::surfaces::{DEEP, Surfaces};
 use crate::error::Result;
