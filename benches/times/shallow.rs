@@ -7,6 +7,7 @@ use frazil::shallow::params::{Pace, Section};
 use frazil::shallow::pipes::Border;
 use frazil::shallow::surface::heights::minimum_heights::{Distance, Lifts};
 use frazil::shallow::surface::rim::ledges::Ledges;
+use frazil::shallow::surface::rim::silhouette::Silhouette;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 
@@ -210,7 +211,8 @@ fn fitting() {
     for edge in [100, 200, 300] {
         let rough = rough(39, Kind { edge, ..Kind::of(39) });
         let (columns, positions, faces) = (&rough.columns, &rough.positions, &rough.faces);
-        let (mut lifts, mut ledges, distance) = (Lifts::default(), Ledges::default(), Distance::default());
+        let (mut lifts, distance) = (Lifts::default(), Distance::default());
+        let (mut ledges, mut silhouette) = (Ledges::default(), Silhouette::default());
         let near = [edge / 2 - 20..edge / 2 + 20, edge / 2 - 20..edge / 2 + 20];
         let mut times = [f64::MAX; 3];
         for _ in 0..5 {
@@ -223,7 +225,7 @@ fn fitting() {
             let all = lap();
             lifts.update(columns, positions, faces, distance, near.clone()).expect("minimum heights");
             let some = lap();
-            ledges.fit(columns, positions, faces).expect("ledges");
+            silhouette.fit(&mut ledges, columns, positions, faces).expect("ledges");
             let laps = [all, some, lap()];
             times = std::array::from_fn(|at| times[at].min(laps[at]));
         }

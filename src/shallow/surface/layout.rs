@@ -1,5 +1,6 @@
 //! What a surface is made of, how it is laid out, and where it is written.
 
+use super::counts::Counts;
 use super::rim::ledges::Ledges;
 use crate::error::{Error, Result};
 use crate::shallow::scalars::MOST;
@@ -169,15 +170,4 @@ impl Target<'_> {
         }
         Ok(())
     }
-}
-
-/// Size of a mesh.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Count of vertices.
-    pub vertices: usize,
-    /// Of these, extras.
-    pub extras: usize,
-    /// Count of vertex indices: three for each triangle.
-    pub indices: usize,
 }

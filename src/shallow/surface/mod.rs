@@ -24,6 +24,7 @@
 //! these columns is on different layers there.
 
 pub(in crate::shallow) mod buffers;
+pub mod counts;
 pub mod heights;
 pub mod layout;
 pub(in crate::shallow) mod quartets;
@@ -31,12 +32,11 @@ pub mod rim;
 mod self_check;
 
 use super::columns::{Columns, NONE, STRIP};
-use super::scalars::MOST;
 use crate::error::{Error, Result};
 pub use buffers::capacity::bound;
 use buffers::normals::Normals;
 use buffers::vertices::Vertices;
-pub use layout::Counts;
+pub use counts::Counts;
 pub use layout::Depths;
 pub use layout::Indices;
 pub use layout::Layout;

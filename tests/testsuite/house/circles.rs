@@ -10,7 +10,7 @@ use std::path::Path;
 use super::imports::all_sources;
 
 /// Files in circles that are still there. It only ever gets smaller.
-const FILES_IN_CIRCLES: usize = 58;
+const FILES_IN_CIRCLES: usize = 45;
 
 type Module = Vec<String>;
 

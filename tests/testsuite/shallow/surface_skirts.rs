@@ -6,6 +6,7 @@ use frazil::geometry::Vec3;
 use frazil::shallow::columns::Columns;
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::surface::rim::ledges::Ledges;
+use frazil::shallow::surface::rim::silhouette::Silhouette;
 use frazil::shallow::surface::{Depths, Layout, Surface};
 use frazil::shallow::terrain::{Solids, triangles};
 
@@ -189,8 +190,8 @@ fn skirts_end_at_the_silhouette_of_the_ground() {
         let is_wet = |index: usize| columns.is_column(index) && columns.layer(index) == 1;
         (0..columns.len()).map(|index| if is_wet(index) { (0.02 / unit) as i32 } else { 0 }).collect()
     };
-    let mut ledges = Ledges::default();
-    ledges.fit(&columns, &positions, &faces).unwrap();
+    let (mut ledges, mut silhouette) = (Ledges::default(), Silhouette::default());
+    silhouette.fit(&mut ledges, &columns, &positions, &faces).unwrap();
     let mesh = skirted(&columns, &depth, &ledges);
     let hems: Vec<_> = mesh.positions.iter().filter(|[_, y, _]| (y - 0.4).abs() < 1e-5).collect();
     assert!(hems.len() > 60, "{}", hems.len());
@@ -208,17 +209,29 @@ fn skirts_end_at_the_silhouette_of_the_ground() {
     let other = Columns::new(
         &triangles::solids(&turned, &faces, grid, Heights::between(-0.5, 1.0).unwrap()).unwrap(),
     );
-    ledges.fit(&other, &turned, &faces).unwrap();
-    ledges.fit(&columns, &positions, &faces).unwrap();
+    silhouette.fit(&mut ledges, &other, &turned, &faces).unwrap();
+    silhouette.fit(&mut ledges, &columns, &positions, &faces).unwrap();
     let mut copy = Ledges::default();
     copy.copy_from(&ledges);
     for ledges in [&ledges, &copy] {
         assert!(skirted(&columns, &depth, ledges).positions == mesh.positions);
     }
     // Bad meshes.
-    assert!(ledges.fit(&columns, &positions, &[[0, 1, 99]]).unwrap_err().to_string().contains("not there"));
+    assert!(
+        silhouette
+            .fit(&mut ledges, &columns, &positions, &[[0, 1, 99]])
+            .unwrap_err()
+            .to_string()
+            .contains("not there")
+    );
     positions[3].y = f32::NAN;
-    assert!(ledges.fit(&columns, &positions, &faces).unwrap_err().to_string().contains("not finite"));
+    assert!(
+        silhouette
+            .fit(&mut ledges, &columns, &positions, &faces)
+            .unwrap_err()
+            .to_string()
+            .contains("not finite")
+    );
 }
 
 #[test]

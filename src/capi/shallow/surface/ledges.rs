@@ -33,11 +33,12 @@ pub unsafe extern "C" fn frz_shallow_find_ledges(
             }
             let _call = enter_light(context)?;
             let mut spill = change(shallow)?;
-            let Spill { shallow, terrain, ledged: Ledged { ledges, is_current }, .. } = &mut *spill;
+            let Spill { shallow, terrain, ledged: Ledged { ledges, silhouette, is_current }, .. } =
+                &mut *spill;
             let columns = shallow.columns();
             *is_current = false;
             match terrain {
-                Terrain::Mesh(mesh) => ledges.fit(columns, &mesh.positions, &mesh.triangles)?,
+                Terrain::Mesh(mesh) => silhouette.fit(ledges, columns, &mesh.positions, &mesh.triangles)?,
                 _ => ledges.find(columns),
             }
             *is_current = true;

@@ -3,11 +3,14 @@
 use crate::capi::ffi::guard::{Failure, Outcome};
 use crate::shallow::surface::heights::minimum_heights::Lifts;
 use crate::shallow::surface::rim::ledges::Ledges;
+use crate::shallow::surface::rim::silhouette::Silhouette;
 
 /// Ledges of a liquid.
 #[derive(Default)]
 pub(in crate::capi) struct Ledged {
     pub ledges: Ledges,
+    /// Fits them to the ground's mesh.
+    pub silhouette: Silhouette,
     /// Whether they match the current ground.
     pub is_current: bool,
 }

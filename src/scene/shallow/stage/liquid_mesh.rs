@@ -10,6 +10,7 @@ use crate::shallow::free_fall::mesh::{Balls, Target as BallTarget};
 use crate::shallow::scalars::MOST;
 use crate::shallow::surface::heights::minimum_heights::{Distance, Lifts};
 use crate::shallow::surface::rim::ledges::Ledges;
+use crate::shallow::surface::rim::silhouette::Silhouette;
 use crate::shallow::surface::{Counts, Depths, Indices, Layout, Surface, Target};
 
 /// Minimum height of a wet vertex above its ground, in cells: the ground does not show through a film (thesis 4.2.4).
@@ -24,6 +25,7 @@ pub(in crate::scene::shallow) struct Mesher {
     balls: Balls,
     lifts: Lifts,
     ledges: Option<Ledges>,
+    silhouette: Silhouette,
     velocity: Vec<[f32; 2]>,
     concentrations: [Vec<f32>; MOST],
     drops: Vec<Droplet>,
@@ -59,7 +61,7 @@ impl Mesher {
             return Ok(());
         };
         if let Some(ledges) = ledges {
-            ledges.fit(columns, positions, triangles)?;
+            self.silhouette.fit(ledges, columns, positions, triangles)?;
         }
         if of.lifts {
             self.lifts.find(columns, positions, triangles, Distance::default())?;
@@ -72,7 +74,7 @@ impl Mesher {
     /// # Errors
     /// None for a liquid's own columns.
     pub fn draw(&mut self, liquid: &Shallow, opaque_depth: f64) -> Result<Drawn> {
-        let Self { surface, balls, lifts, ledges, velocity, concentrations, drops } = self;
+        let Self { surface, balls, lifts, ledges, velocity, concentrations, drops, .. } = self;
         let columns = liquid.columns();
         velocity.clear();
         velocity.extend((0..columns.len()).map(|index| liquid.velocity(index)));

@@ -1,9 +1,10 @@
 //! Maximum size of a mesh of liquid in given columns.
 
 use crate::shallow::columns::grid::BOTTOMLESS;
+use crate::shallow::columns::{Columns, STRIP};
+use crate::shallow::surface::Counts;
 use crate::shallow::surface::quartets::links::{RING, Scene};
 use crate::shallow::surface::quartets::strips::positions;
-use crate::shallow::surface::{Columns, Counts, STRIP};
 
 /// The maximum counts that the surface of any liquid in these columns can have, so that a host sizes its buffers once. Liquids that fill up
 /// to just below uneven ceilings come close: their surface ends at every step of the ceiling.

@@ -3,11 +3,12 @@
 use std::ops::Range;
 
 use crate::numeric::cpu::dispatch;
+use crate::shallow::columns::STRIP;
+use crate::shallow::surface::Indices;
 use crate::shallow::surface::quartets::links::Scene;
 use crate::shallow::surface::quartets::odd::{Search, each_odd_triangle};
 use crate::shallow::surface::quartets::strips::{Found, some};
 use crate::shallow::surface::rim::boundary::Wall;
-use crate::shallow::surface::{Indices, STRIP};
 
 /// Index count of a pair of triangles.
 const PAIR: usize = 6;

@@ -1,9 +1,9 @@
 //! Normals of wet columns, from the heights of the wet columns that they are linked with on their four sides: central differences,
 //! one-sided where there is no such column.
 
+use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::surface::quartets::links::Scene;
 use crate::shallow::surface::quartets::strips::Found;
-use crate::shallow::surface::{Columns, STRIP};
 
 /// The heights as shown, and the factor that turns their differences into slopes.
 #[derive(Debug, Clone, Copy)]

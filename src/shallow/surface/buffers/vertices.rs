@@ -1,15 +1,17 @@
 //! Writes vertices into the caller's buffers: in order, and without reading them.
 
+use crate::shallow::surface::rim::hem::Hem;
 use std::ops::Range;
 
 use super::normals::{Normals, Shown, upright};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::strip_of;
+use crate::shallow::columns::{NONE, STRIP};
+use crate::shallow::scalars::MOST;
 use crate::shallow::surface::quartets::links::Scene;
 use crate::shallow::surface::quartets::strips::{Found, Span};
 use crate::shallow::surface::rim::boundary::{Around, Wall, walls_of};
-use crate::shallow::surface::rim::ledges::Hem;
-use crate::shallow::surface::{Depths, Layout, MOST, NONE, STRIP, Target, Up};
+use crate::shallow::surface::{Depths, Layout, Target, Up};
 
 /// Velocity at the surface over the mean (Eq. 4.4).
 pub(in crate::shallow) const SURFACE_SPEED: f32 = 1.5;

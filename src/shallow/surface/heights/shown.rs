@@ -3,9 +3,10 @@
 
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::grid::TOP;
+use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::columns::{strip_mut, strip_of};
 use crate::shallow::surface::quartets::strips::Found;
-use crate::shallow::surface::{Columns, Depths, Layout, STRIP};
+use crate::shallow::surface::{Depths, Layout};
 
 /// How heights follow from depths (units).
 struct Rule<'a> {

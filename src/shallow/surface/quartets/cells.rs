@@ -2,8 +2,8 @@
 
 use super::links::Scene;
 use super::strips::Found;
+use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::surface::rim::boundary::{Wall, walls_of};
-use crate::shallow::surface::{Columns, NONE, STRIP};
 
 /// A column, or an extra.
 #[derive(Debug, Clone, Copy)]

@@ -3,7 +3,7 @@
 use super::links::Scene;
 use super::strips::{Found, Span, State, count, some};
 use crate::numeric::cpu::dispatch;
-use crate::shallow::surface::{Columns, STRIP};
+use crate::shallow::columns::{Columns, STRIP};
 
 /// Finds the wet columns, and the strips whose quartets may have one.
 pub(in crate::shallow::surface) fn find_wet(scene: Scene<'_>, active: Option<&[bool]>, found: &mut Found) {

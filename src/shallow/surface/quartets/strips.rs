@@ -1,6 +1,6 @@
 //! State of strips in a frame, one bit per position.
 
-use crate::shallow::surface::{Columns, NONE, STRIP};
+use crate::shallow::columns::{Columns, NONE, STRIP};
 
 /// State of a strip, one bit per position.
 #[derive(Debug, Clone, Copy, Default)]

@@ -2,7 +2,7 @@
 
 use super::cells::{Cells, Entry};
 use super::divide::{OTHERS, divide, three};
-use crate::shallow::surface::NONE;
+use crate::shallow::columns::NONE;
 use crate::shallow::surface::rim::boundary::Wall;
 
 /// Entries of a quartet, and their links.

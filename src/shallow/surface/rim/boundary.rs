@@ -1,8 +1,8 @@
 //! Where the liquid ends: walls, the extra vertices within them, and the averages for dry and extra vertices (thesis 4.2.3).
 
+use crate::shallow::columns::{NONE, STRIP};
 use crate::shallow::surface::quartets::links::{RING, Scene, are_near, cell_at};
 use crate::shallow::surface::quartets::strips::{Found, positions};
-use crate::shallow::surface::{NONE, STRIP};
 
 /// A surface of linked wet columns that ends at a column's solid.
 #[derive(Debug, Clone, Copy)]

@@ -1,18 +1,20 @@
 //! Where the ground of a mesh ends between the middles of the cells: on each side of a column at which films end, how far its triangles
 //! reach along the line to the middle of the next cell, and how high they are there.
 
+use crate::shallow::surface::rim::hem::Hem;
 use std::ops::Range;
 
-use super::ledges::{Hem, Ledges};
-use crate::error::Result;
+use super::ledges::Ledges;
+use crate::error::{Error, Result};
 use crate::geometry::Vec3;
+use crate::shallow::columns::Columns;
 use crate::shallow::columns::grid::Grid;
 use crate::shallow::surface::quartets::links::RING;
-use crate::shallow::surface::{Columns, Depths, Surface};
+use crate::shallow::surface::{Depths, Surface};
 
-/// Finds the silhouette of the ground; reuses its memory.
+/// Fits ledges to the silhouette of the ground's mesh; reuses its memory.
 #[derive(Debug, Default)]
-pub(in crate::shallow::surface) struct Silhouette {
+pub struct Silhouette {
     /// A film on all of the ground (units): where its surface ends, there may be a hem.
     film: Vec<i32>,
     films: Surface,
@@ -25,9 +27,32 @@ pub(in crate::shallow::surface) struct Silhouette {
 }
 
 impl Silhouette {
+    /// Finds the ledges of columns and where the ground ends in the mesh that they were made from: the surface extends to there. 8 ms for
+    /// 380,000 triangles on 200 x 200 cells in several layers (`make bench`).
+    ///
+    /// # Errors
+    /// `Argument`: a vertex that is not finite, or a face with a vertex that does not exist.
+    pub fn fit(
+        &mut self,
+        ledges: &mut Ledges,
+        columns: &Columns,
+        positions: &[Vec3],
+        faces: &[[u32; 3]],
+    ) -> Result<()> {
+        if !positions.iter().all(|at| at.x.is_finite() && at.y.is_finite() && at.z.is_finite()) {
+            return Err(Error::argument("a vertex of the ground is not finite"));
+        }
+        if faces.iter().flatten().any(|&vertex| vertex as usize >= positions.len()) {
+            return Err(Error::argument("a face of the ground has a vertex that is not there"));
+        }
+        ledges.find(columns);
+        ledges.hems.extend_from_slice(self.find(columns, positions, faces)?);
+        Ok(())
+    }
+
     /// Hems of all columns at which films end within the domain, in their order. Vertices must be finite, and faces must have existing
     /// vertices.
-    pub fn find(&mut self, columns: &Columns, positions: &[Vec3], faces: &[[u32; 3]]) -> Result<&[Hem]> {
+    fn find(&mut self, columns: &Columns, positions: &[Vec3], faces: &[[u32; 3]]) -> Result<&[Hem]> {
         self.find_ends_of_films(columns)?;
         if self.hems.is_empty() {
             return Ok(&[]);

@@ -3,12 +3,14 @@
 //! An edge between two wet columns with a triangle on one side only lies between a full quartet and an odd one, or within odd ones. All
 //! other edges are known to be closed, so few are examined.
 
-use super::ledges::{Hem, Ledges};
+use super::ledges::Ledges;
+use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::surface::buffers::vertices::Vertices;
 use crate::shallow::surface::quartets::links::{RING, Scene, cell_at};
 use crate::shallow::surface::quartets::odd::Search;
 use crate::shallow::surface::quartets::strips::{Found, positions, some};
-use crate::shallow::surface::{Columns, Indices, NONE, STRIP, Target};
+use crate::shallow::surface::rim::hem::Hem;
+use crate::shallow::surface::{Indices, Target};
 
 /// The skirts of a surface; reuses its memory.
 #[derive(Debug, Default)]
