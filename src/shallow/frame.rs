@@ -18,13 +18,6 @@ use crate::error::{Error, Result};
 use crate::numeric::cpu::FlushDenormals;
 use crate::numeric::digits;
 
-/// The state at the beginning of a frame, and the steps of the frame before.
-#[derive(Debug, Default)]
-pub(super) struct Kept {
-    state: Vec<u8>,
-    steps: Vec<f64>,
-}
-
 /// Columns times steps from which on a frame may take long: some 20 ms.
 const LONG: f64 = (1 << 21) as f64;
 /// Fixed cost of a step, in columns.

@@ -42,13 +42,13 @@ pub mod terrain;
 pub mod time_step;
 pub mod two_level;
 
+pub use crate::shallow::params::Thickening;
 pub use params::Params;
 pub use readback::body_loads::Load;
 pub use readback::probe::{Reading, View};
 pub use readback::snapshot::Snapshot;
 pub use remap::Moved;
 pub use scalars::{Law, Scalar, ScalarBalance};
-pub use solver::viscosity_by_scalar::Thickening;
 pub use stains::{Staining, Stains};
 pub use system::{Balance, Report, Shallow};
 pub use two_level::Detail;

@@ -3,7 +3,6 @@
 use super::free_fall::Falls;
 use super::material::Liquid;
 use super::pipes::Border;
-use super::solver::viscosity_by_scalar::Thickening;
 use crate::error::{Error, Result};
 
 /// Parameters of the flow.
@@ -123,5 +122,38 @@ impl Params {
             }
             _ => Ok(()),
         }
+    }
+}
+
+/// How viscosity depends on a scalar: it is the liquid's own up to `from`, `times` that from `to` on, and linear in the concentration in
+/// between.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Thickening {
+    /// Index of the scalar: an age for blood that clots; a dye for mixtures.
+    pub scalar: usize,
+    /// Concentration up to which viscosity is the liquid's own, in the scalar's own measure.
+    pub from: f64,
+    /// Concentration from which on it is `times` that; it may be below `from`.
+    pub to: f64,
+    /// 1e-6 to 1e9.
+    pub times: f64,
+}
+
+impl Thickening {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// `Argument`, naming the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        let Self { from, to, times, .. } = *self;
+        if !(from.is_finite() && to.is_finite() && from != to) {
+            return Err(Error::argument(format!(
+                "thickening.from = {from} and thickening.to = {to} are not finite and apart"
+            )));
+        }
+        if !(1e-6..=1e9).contains(&times) {
+            return Err(Error::argument(format!("thickening.times = {times} is not within 1e-6 to 1e9")));
+        }
+        Ok(())
     }
 }

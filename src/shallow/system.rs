@@ -2,7 +2,6 @@
 
 use super::columns::Columns;
 use super::columns::grid::BOTTOMLESS;
-use super::frame::Kept;
 use super::free_fall::Falling;
 use super::params::{Friction, Params, Section};
 use super::pipes::pipe_rules::{Apart, Rules};
@@ -396,3 +395,10 @@ impl Units {
 const BYTES: u64 = 64;
 /// Additional bytes for friction at walls.
 const WALLS: u64 = 108;
+
+/// The state at the beginning of a frame, and the steps of the frame before.
+#[derive(Debug, Default)]
+pub(in crate::shallow) struct Kept {
+    pub state: Vec<u8>,
+    pub steps: Vec<f64>,
+}

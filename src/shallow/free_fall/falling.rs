@@ -4,178 +4,21 @@ use std::ops::Range;
 
 use super::Falls;
 use super::flight::{Air, End};
+use super::in_air::{Falling, SPLASHES};
 use super::packet::Packet;
-use super::rivulets::Threads;
 use super::splash::{Landing, merge, spread};
-use crate::shallow::columns::{Columns, NONE, resize_part};
-use crate::shallow::pipes::Links;
+use super::waiting::{Waiting, add, outward};
+use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::pipes::cliffs::beside;
-use crate::shallow::pipes::joints::Side;
+use crate::shallow::pipes::side::Side;
 use crate::shallow::scalars::amounts::{Account, Act};
 use crate::shallow::scalars::shares::{MOST, integer, take};
 use crate::shallow::solver::Flow;
 use crate::shallow::solver::overflow_edges::Over;
 use crate::shallow::system::Shallow;
 
-/// Bytes of an overflow edge in a saved state.
-pub(in crate::shallow) const LIP: usize = 40;
-/// Intervals after which liquid of less than a drop is released anyway.
-const PATIENCE: u32 = 60;
-/// Capacity for landings: columns for each packet.
-const SPLASHES: usize = 4;
-/// An overflow edge drips if a drop takes longer than this many intervals; otherwise it pours, in a packet each interval.
-const DRIPS: i64 = 8;
 /// Depth at the brink of a free overfall, relative to the critical depth (Rouse 1936).
 const BRINK: f64 = 0.715;
-
-/// Liquid that went over a link and is not a packet yet.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(in crate::shallow) struct Waiting {
-    /// Volume (units), 0 and up, and amount of each scalar; saved states store the amounts separately.
-    pub units: i64,
-    pub amounts: [i64; MOST],
-    /// Outward speed (cells/s), times units.
-    pub impulse: f64,
-    /// Direction of the last fall: from the link's second column.
-    pub is_back: bool,
-    /// Intervals that it has waited.
-    pub waits: u32,
-    /// Smoothed inflow of an interval (units), and the volume at the end of the last interval.
-    pub steady: i64,
-    pub before: i64,
-    /// Lead of its packets within the interval, in 2^-31 of it: scattered by the inflow at the time the flow grew.
-    pub phase: u32,
-    /// Impulse received from other overflow edges; 0 between intervals.
-    pub gathered: i64,
-}
-
-/// All liquid in the air.
-#[derive(Debug, Clone, Default)]
-pub(in crate::shallow) struct Falling {
-    /// In the order of their creation.
-    packets: Vec<Packet>,
-    /// By link; empty without falls.
-    pub(super) waiting: Vec<Waiting>,
-    /// Landings of a step; kept to avoid repeated allocation.
-    landed: Vec<Landing>,
-    pub(super) threads: Threads,
-    /// Seconds since packets were last created, and how many times they were.
-    pub since: f64,
-    pub tick: u64,
-}
-
-impl Falling {
-    /// Nothing in the air, with capacity for what may come.
-    pub fn new(falls: Option<&Falls>, links: usize) -> Self {
-        let Some(falls) = falls else { return Self::default() };
-        Self {
-            packets: Vec::with_capacity(falls.most),
-            waiting: vec![Waiting::default(); links],
-            landed: Vec::with_capacity(SPLASHES * falls.most),
-            threads: Threads::with_room(links),
-            ..Self::default()
-        }
-    }
-
-    /// Memory (bytes).
-    pub fn bytes(&self) -> usize {
-        self.packets.capacity() * (size_of::<Packet>() + SPLASHES * size_of::<Landing>())
-            + size_of_val(&self.waiting[..])
-            + self.threads.bytes()
-    }
-
-    /// All packets.
-    pub fn packets(&self) -> &[Packet] {
-        &self.packets
-    }
-
-    /// The liquid that waits at each link.
-    pub fn waiting(&self) -> &[Waiting] {
-        &self.waiting
-    }
-
-    /// Restores what [`Falling::packets`] and [`Falling::waiting`] returned; the links must be as many.
-    pub fn set(&mut self, packets: impl Iterator<Item = Packet>, waiting: impl Iterator<Item = Waiting>) {
-        self.packets.clear();
-        self.packets.extend(packets);
-        self.waiting.iter_mut().zip(waiting).for_each(|(to, waiting)| *to = waiting);
-    }
-
-    /// Units in the air.
-    pub fn units(&self) -> i64 {
-        let packets: i64 = self.packets.iter().map(|packet| packet.units).sum();
-        packets + self.waiting.iter().map(|waiting| waiting.units).sum::<i64>()
-    }
-
-    /// Amount of a scalar in the air.
-    pub fn amount(&self, scalar: usize) -> i128 {
-        let packets: i128 = self.packets.iter().map(|packet| i128::from(packet.amounts[scalar])).sum();
-        packets + self.waiting.iter().map(|waiting| i128::from(waiting.amounts[scalar])).sum::<i128>()
-    }
-
-    /// Clears all amounts, because the scalars have changed.
-    pub fn forget_amounts(&mut self) {
-        self.loads().for_each(|(_, amounts)| *amounts = [0; MOST]);
-    }
-
-    /// Units and amounts of each packet, and of the liquid that waits at each link.
-    fn loads(&mut self) -> impl Iterator<Item = (i64, &mut [i64; MOST])> {
-        let packets = self.packets.iter_mut().map(|packet| (packet.units, &mut packet.amounts));
-        packets.chain(self.waiting.iter_mut().map(|waiting| (waiting.units, &mut waiting.amounts)))
-    }
-
-    /// Changes the count of a range of links; nothing waits at the new ones.
-    pub fn replace(&mut self, links: Range<usize>, count: usize) {
-        let new = links.start..links.start + count;
-        resize_part(&mut self.waiting, links, count, Waiting::default());
-        self.waiting[new].fill(Waiting::default());
-    }
-}
-
-impl Waiting {
-    /// Its serialised form, for a saved state.
-    pub fn to_bytes(self) -> [u8; LIP] {
-        let last = u64::from(self.waits) | u64::from(self.is_back) << 32 | u64::from(self.phase) << 33;
-        let mut bytes = [0; LIP];
-        let numbers =
-            [self.units as u64, self.impulse.to_bits(), last, self.steady as u64, self.before as u64];
-        bytes.as_chunks_mut().0.iter_mut().zip(numbers).for_each(|(to, number)| *to = number.to_le_bytes());
-        bytes
-    }
-
-    /// Reads what [`Waiting::to_bytes`] wrote; amounts are 0.
-    pub fn from_bytes(bytes: &[u8; LIP]) -> Self {
-        let [units, impulse, last, steady, before] =
-            std::array::from_fn(|at| u64::from_le_bytes(bytes.as_chunks().0[at]));
-        Self {
-            units: units as i64,
-            amounts: [0; MOST],
-            impulse: f64::from_bits(impulse),
-            is_back: last >> 32 & 1 != 0,
-            waits: last as u32,
-            steady: steady as i64,
-            before: before as i64,
-            phase: (last >> 33) as u32,
-            gathered: 0,
-        }
-    }
-
-    /// Whether it is valid for a link.
-    pub fn is_of(&self, columns: &Columns, links: &Links, link: usize) -> bool {
-        let is_void = links.to[link] == NONE;
-        let is_lip = !is_void
-            || !self.is_back
-                && outward(links, link, false)
-                    .cell(columns.cell(links.from[link] as usize), columns.grid.size)
-                    .is_some();
-        let steady = 0..i64::MAX / 8;
-        self.units >= 0
-            && (0.0..1e60).contains(&self.impulse)
-            && steady.contains(&self.steady)
-            && steady.contains(&self.before)
-            && (!self.is_awake() || is_lip)
-    }
-}
 
 impl Shallow {
     /// Finds the overflow edges of the next step.
@@ -197,7 +40,8 @@ impl Shallow {
         if self.falls.since >= falls.interval * (1.0 - 1e-9) {
             self.falls.since = 0.0;
             self.falls.tick += 1;
-            self.falls.gather_threads(&self.columns, &self.pipes.links);
+            let Falling { threads, waiting, .. } = &mut self.falls;
+            threads.gather(&self.columns, &self.pipes.links, waiting);
             self.let_go(&falls, 0..self.pipes.links.len(), false);
         }
     }
@@ -418,34 +262,6 @@ impl Packet {
     fn landing(&self, column: usize) -> Landing {
         Landing { column: column as u32, units: self.units, amounts: self.amounts }
     }
-}
-
-/// Adds amounts to others.
-pub(super) fn add(to: &mut [i64; MOST], amounts: &[i64; MOST]) {
-    to.iter_mut().zip(amounts).for_each(|(to, amount)| *to = to.saturating_add(*amount));
-}
-
-impl Waiting {
-    fn goes(&self, least: f64, all: bool) -> bool {
-        let most = self.units.max(DRIPS * self.steady);
-        all || most as f64 >= least || self.waits >= PATIENCE
-    }
-
-    /// Whether liquid waits there, or arrived recently.
-    pub(super) fn is_awake(&self) -> bool {
-        self.units > 0 || self.steady > 0
-    }
-
-    /// Resets it after its liquid has left.
-    pub(super) fn clear(&mut self) {
-        let Self { is_back, steady, phase, .. } = *self;
-        *self = Self { is_back, steady, phase, ..Self::default() };
-    }
-}
-
-/// The side that liquid falls over, seen from the donor.
-fn outward(links: &Links, link: usize, is_back: bool) -> Side {
-    if is_back { links.sides[link].opposite() } else { links.sides[link] }
 }
 
 /// The speed (cells/s) at which liquid arrives at an overflow edge from the column behind it, through a regular pipe; 0 if none does.

@@ -5,10 +5,10 @@
 //! one with the most is the next. The recent flow of a rivulet counts, so that it stays where it is. All comparisons are in integers, and
 //! equal edges stay separate: a turned or mirrored scene has the same rivulets.
 
-use super::falling::{Falling, Waiting, add};
+use super::waiting::{Waiting, add};
 use crate::shallow::columns::Columns;
 use crate::shallow::pipes::Links;
-use crate::shallow::pipes::joints::Side;
+use crate::shallow::pipes::side::Side;
 
 /// A rivulet takes the liquid of overflow edges within this distance (m); of the order of the capillary length, sqrt(sigma / (rho g)), 2.7
 /// mm for water.
@@ -139,21 +139,20 @@ impl Threads {
     }
 }
 
-impl Falling {
+impl Threads {
     /// Gives what waits at overflow edges to the rivulets near them, and updates the inflow of each in this interval.
-    pub(super) fn gather_threads(&mut self, columns: &Columns, links: &Links) {
-        let Self { threads, waiting, .. } = self;
-        threads.find(columns, links, waiting);
-        for lip in threads.lips.iter().filter(|lip| lip.into != OWN) {
+    pub fn gather(&mut self, columns: &Columns, links: &Links, waiting: &mut [Waiting]) {
+        self.find(columns, links, waiting);
+        for lip in self.lips.iter().filter(|lip| lip.into != OWN) {
             let given = &mut waiting[lip.link as usize];
             let Waiting { units, amounts, impulse, .. } = *given;
             given.clear();
-            let taker = &mut waiting[threads.lips[lip.into as usize].link as usize];
+            let taker = &mut waiting[self.lips[lip.into as usize].link as usize];
             taker.units += units;
             add(&mut taker.amounts, &amounts);
             taker.gathered += impulse.round() as i64;
         }
-        for lip in &threads.lips {
+        for lip in &self.lips {
             let own = &mut waiting[lip.link as usize];
             // A sum of integers, so that it does not depend on an order.
             own.impulse += own.gathered as f64;

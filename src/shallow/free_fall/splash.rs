@@ -4,7 +4,7 @@
 //! drop, it would form a spike and leave ripples of a cell's size. Equal parts go to the surrounding columns at about the same height that
 //! are open towards its own.
 
-use super::falling::add;
+use super::waiting::add;
 use crate::shallow::columns::Columns;
 use crate::shallow::scalars::MOST;
 use crate::shallow::scalars::shares::part;

@@ -1,6 +1,6 @@
 //! Cliffs: where liquid may fall freely, even pipes between columns of one layer are links.
 
-use super::joints::Side;
+use super::side::Side;
 use crate::shallow::columns::{Columns, NONE, STRIP};
 
 /// Pipes between bases that differ by more than this (units) may be free falls.

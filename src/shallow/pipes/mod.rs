@@ -4,53 +4,22 @@
 //! the one to its east and the one to its south, so that they are arrays beside the columns. All others are *links*, in a list: between
 //! layers, to the outside, and, where liquid may fall freely, over cliffs.
 
+mod border;
 pub(super) mod cliffs;
 pub(super) mod joints;
+pub(in crate::shallow) mod links;
 pub(in crate::shallow) mod pipe_rules;
+pub(in crate::shallow) mod side;
 mod slopes;
 
-use std::ops::Range;
+pub use border::Border;
+pub(super) use links::Ends;
+pub use links::Links;
 
+use super::columns::Columns;
 use super::columns::per_column::{Array, PerColumn};
-use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
-use joints::{Finder, Side};
+use joints::Finder;
 use pipe_rules::Rules;
-
-/// What lies beyond the border of the domain.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Border {
-    /// A wall.
-    #[default]
-    Closed,
-    /// Nothing: liquid flows off along the slope of the ground near the border, and is counted as lost.
-    Open,
-    /// Liquid at rest, at the height to which the domain was last filled: waves leave and are not reflected. Outflow and inflow are
-    /// counted. The border is open before the first filling, and where the ground is higher.
-    Absorbing,
-}
-
-/// The pipes that are not regular, by the row of their owner.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Links {
-    /// The column that gives where the flux is positive.
-    pub from: Vec<u32>,
-    /// The other column, or [`NONE`]: the outside.
-    pub to: Vec<u32>,
-    /// The side of the first column that each link crosses.
-    pub(super) sides: Vec<Side>,
-    /// As [`Pipes::east`].
-    pub open: Vec<f32>,
-    /// Surface outside (units), where `to` is [`NONE`].
-    pub level: Vec<i32>,
-    /// First link of each row, and the end of the last.
-    pub rows: Vec<u32>,
-    /// Columns with links, row by row.
-    pub columns: Vec<u32>,
-    /// First of those columns of each row, and the end of the last.
-    pub column_rows: Vec<u32>,
-    /// Maximum count of pipes of a column.
-    pub most: usize,
-}
 
 /// All pipes of a terrain.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,133 +59,6 @@ impl Pipes {
         let lists = [&links.rows, &links.columns, &links.column_rows];
         let lists: usize = lists.iter().map(|list| size_of_val(&list[..])).sum();
         self.east.bytes() + self.south.bytes() + ends + numbers + lists
-    }
-}
-
-/// Ends of links by column; kept to avoid repeated allocation.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Ends {
-    /// Bits of the positions in each strip that have links.
-    marks: Vec<u16>,
-    /// Rank of the first column of each strip among those that have links.
-    firsts: Vec<u32>,
-    /// Count of links of each of these columns.
-    counts: Vec<u32>,
-}
-
-impl Ends {
-    /// The rank of a column among all columns with links.
-    fn rank(&self, column: u32) -> usize {
-        let (strip, position) = (column as usize / STRIP, column as usize % STRIP);
-        let before = self.marks[strip] & ((1 << position) - 1);
-        self.firsts[strip] as usize + before.count_ones() as usize
-    }
-}
-
-impl Links {
-    pub(super) fn add(&mut self, from: usize, to: u32, side: Side, open: f32, level: i32) {
-        self.from.push(from as u32);
-        self.to.push(to);
-        self.sides.push(side);
-        self.open.push(open);
-        self.level.push(level);
-    }
-
-    /// Lists the columns with links.
-    pub(super) fn list_columns(&mut self, columns: &Columns, ends: &mut Ends) {
-        let all = || self.from.iter().chain(self.to.iter().filter(|&&to| to != NONE)).copied();
-        ends.marks.clear();
-        ends.marks.resize(columns.strips().len(), 0);
-        all().for_each(|end| ends.marks[end as usize / STRIP] |= 1 << (end as usize % STRIP));
-        self.columns.clear();
-        self.column_rows.clear();
-        self.column_rows.push(0);
-        ends.firsts.clear();
-        for row in 0..columns.grid.size[1] {
-            for strip in columns.row(row) {
-                ends.firsts.push(self.columns.len() as u32);
-                let mut marks = ends.marks[strip];
-                while marks != 0 {
-                    self.columns.push((strip * STRIP) as u32 + marks.trailing_zeros());
-                    marks &= marks - 1;
-                }
-            }
-            self.column_rows.push(self.columns.len() as u32);
-        }
-        ends.counts.clear();
-        ends.counts.resize(self.columns.len(), 0);
-        for end in all() {
-            let rank = ends.rank(end);
-            ends.counts[rank] += 1;
-        }
-        self.most = 4 + ends.counts.iter().copied().max().unwrap_or(0) as usize;
-    }
-
-    /// Replaces the links of some rows. Column indices in the rows behind grow by `shift`, modulo 2^32.
-    pub(super) fn replace_rows(&mut self, rows: Range<usize>, new: &Self, shift: u32) {
-        let old = self.rows[rows.start] as usize..self.rows[rows.end] as usize;
-        let (first, len) = (old.start, new.len());
-        resize_part(&mut self.from, old.clone(), len, 0);
-        resize_part(&mut self.to, old.clone(), len, 0);
-        resize_part(&mut self.sides, old.clone(), len, Side::East);
-        resize_part(&mut self.open, old.clone(), len, 0.0);
-        resize_part(&mut self.level, old.clone(), len, 0);
-        let part = first..first + len;
-        self.from[part.clone()].copy_from_slice(&new.from);
-        self.to[part.clone()].copy_from_slice(&new.to);
-        self.sides[part.clone()].copy_from_slice(&new.sides);
-        self.open[part.clone()].copy_from_slice(&new.open);
-        self.level[part.clone()].copy_from_slice(&new.level);
-        if shift != 0 {
-            let behind = [&mut self.from[part.end..], &mut self.to[part.end..]];
-            let ends = behind.into_iter().flatten().filter(|end| **end != NONE);
-            ends.for_each(|end| *end = end.wrapping_add(shift));
-        }
-        for (row, end) in rows.clone().zip(&new.rows[1..]) {
-            self.rows[row + 1] = first as u32 + end;
-        }
-        let grows = (part.end as u32).wrapping_sub(old.end as u32);
-        self.rows[rows.end + 1..].iter_mut().for_each(|end| *end = end.wrapping_add(grows));
-    }
-
-    /// Removes all links; rows are counted from the first one added.
-    pub(super) fn clear(&mut self) {
-        self.from.clear();
-        self.to.clear();
-        self.sides.clear();
-        self.open.clear();
-        self.level.clear();
-        self.rows.clear();
-        self.rows.push(0);
-    }
-
-    /// Count of links.
-    pub fn len(&self) -> usize {
-        self.from.len()
-    }
-
-    /// Whether there is no link.
-    pub fn is_empty(&self) -> bool {
-        self.from.is_empty()
-    }
-
-    /// The outside surface (units) of a link that leads there, and whether it is that of the liquid at rest beyond the border, `still`.
-    #[inline]
-    pub fn outside(&self, columns: &Columns, link: usize, still: i32) -> (i32, bool) {
-        let from = self.from[link] as usize;
-        let is_still = still > columns.bases()[from]
-            && self.sides[link].cell(columns.cell(from), columns.grid.size).is_none();
-        if is_still { (still, true) } else { (self.level[link], false) }
-    }
-
-    /// The links that a row owns: from its columns to others of the row, to the next row, or to the outside.
-    pub fn row(&self, row: usize) -> Range<usize> {
-        self.rows[row] as usize..self.rows[row + 1] as usize
-    }
-
-    /// The columns of a row that have links.
-    pub fn columns_of(&self, row: usize) -> &[u32] {
-        &self.columns[self.column_rows[row] as usize..self.column_rows[row + 1] as usize]
     }
 }
 
@@ -309,7 +151,7 @@ mod tests {
         assert_eq!(level(2, 0), 7 * METRE);
         assert_eq!(level(2, 1), 8 * METRE);
         assert_eq!(level(0, 1), 10 * METRE, "it does not rise outside");
-        assert_eq!(links.to, vec![NONE; links.len()]);
+        assert_eq!(links.to, vec![crate::shallow::columns::NONE; links.len()]);
     }
 
     #[test]

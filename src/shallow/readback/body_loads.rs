@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::shallow::columns::Columns;
 use crate::shallow::columns::grid::Grid;
-use crate::shallow::pipes::joints::Side;
+use crate::shallow::pipes::side::Side;
 use crate::shallow::solver::SLACK;
 use crate::shallow::system::Shallow;
 use crate::shallow::terrain::shapes::Shape;

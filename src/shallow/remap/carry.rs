@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::band::Band;
 use super::origins::Origins;
 use crate::shallow::columns::{Columns, NONE, STRIP, Strip, strip_mut, strip_of};
-use crate::shallow::pipes::joints::Side;
+use crate::shallow::pipes::side::Side;
 use crate::shallow::pipes::{Links, Pipes};
 use crate::shallow::solver::Flow;
 

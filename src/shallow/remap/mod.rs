@@ -5,6 +5,7 @@
 //! those beside them are touched; if the count of columns changes, the data of the rows behind is shifted.
 
 mod band;
+mod buffers;
 mod carry;
 mod cells;
 mod dirty;
@@ -18,22 +19,16 @@ use std::ops::Range;
 
 use super::Shallow;
 use super::columns::STRIP;
-use super::columns::stacks::Stacks;
-use super::pipes::joints::Finder;
 use super::pipes::pipe_rules::Rules;
-use super::pipes::{Ends, Links};
 use super::terrain::Solids;
-use super::terrain::ground::Ground;
 use super::terrain::identity::Identity;
 use super::terrain::shapes::Shape;
 use super::terrain::solids::Solid;
 use crate::error::{Error, Result};
-use band::Band;
+pub use buffers::Remap;
 use carry::{Carry, Change};
-use dirty::Dirty;
 pub use held::{Held, Parcel};
-use layout::{Layout, Liquid, Rows};
-use origins::Origins;
+use layout::{Liquid, Rows};
 
 /// Results of a change of the terrain.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -46,32 +41,6 @@ pub struct Moved {
     pub held: f64,
     /// Liquid that fell where there is no longer any ground (m3); it counts as lost.
     pub fallen: f64,
-}
-
-/// Buffers and shapes.
-#[derive(Debug, Clone, Default)]
-pub struct Remap {
-    dirty: Dirty,
-    ground: Ground,
-    band: Band,
-    layout: Layout,
-    origins: Origins,
-    carry: Carry,
-    stacks: Stacks,
-    finder: Finder,
-    ends: Ends,
-    /// New links of the rows that change.
-    links: Links,
-    pub(super) held: Held,
-}
-
-impl Remap {
-    /// With capacity for so many parcels of waiting liquid, besides those of a moving terrain.
-    pub(super) fn new(parcels: usize) -> Self {
-        let mut remap = Self::default();
-        remap.held.reserve(parcels);
-        remap
-    }
 }
 
 impl Shallow {

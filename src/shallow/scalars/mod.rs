@@ -6,6 +6,7 @@
 //! uniform one stays uniform.
 
 pub(super) mod amounts;
+mod law;
 pub(super) mod shares;
 
 use super::columns::STRIP;
@@ -14,32 +15,11 @@ use super::system::Shallow;
 use crate::error::{Error, Result};
 use crate::numeric::cpu::dispatch;
 use amounts::{ACCOUNTS, Account, Amounts};
+pub use law::Law;
+pub use law::Scalar;
+pub(super) use law::check_scalar;
 pub use shares::MOST;
 use shares::{LEVELS, Levels};
-
-/// A quantity that the liquid carries along.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Scalar {
-    /// Its name: not empty, and not that of another scalar.
-    pub name: String,
-    /// How it changes.
-    pub law: Law,
-    /// Concentrations are within -range to range, in the scalar's own measure, and are stored in steps of 2^-20 of it; 1e-9 to 1e9. For
-    /// example 1 for a dye, 100 (K) for a temperature above that of the room, 3600 (s) for an age.
-    pub range: f64,
-}
-
-/// How a scalar changes besides being carried.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Law {
-    /// It does not: dye, salt, heat.
-    Dye,
-    /// Decays by half in each half-life (s), above 0: heat that is lost to a room.
-    Decays(f64),
-    /// The time (s) since the liquid came in, averaged over the liquid of a column, clamped to `range`; the age of liquid that comes in is
-    /// its concentration.
-    Ages,
-}
 
 /// Where all of a scalar is: concentration x volume (its own measure x m3).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -68,45 +48,6 @@ pub struct ScalarBalance {
     pub dried: f64,
     /// Unaccounted for (in smallest amounts): 0.
     pub error: i128,
-}
-
-impl Scalar {
-    /// A dye, of concentrations from 0 to 1.
-    pub fn dye(name: &str) -> Self {
-        Self { name: name.into(), law: Law::Dye, range: 1.0 }
-    }
-
-    /// Checks the numbers.
-    ///
-    /// # Errors
-    /// `Argument`, naming the field and its range.
-    pub fn validate(&self) -> Result<()> {
-        if self.name.is_empty() {
-            return Err(Error::argument("name is empty"));
-        }
-        if !(1e-9..=1e9).contains(&self.range) {
-            return Err(Error::argument(format!("range = {} is not within 1e-9 to 1e9", self.range)));
-        }
-        match self.law {
-            Law::Decays(half) if !(1e-6..=1e12).contains(&half) => {
-                Err(Error::argument(format!("a half-life of {half} s is not within 1e-6 to 1e12")))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// A concentration in levels.
-    fn level(&self, concentration: f64) -> Result<i32> {
-        if concentration.abs() <= self.range {
-            Ok((concentration / self.range * LEVELS).round() as i32)
-        } else {
-            let Self { name, range, .. } = self;
-            Err(Error::argument(format!(
-                "a concentration of {concentration} of {name:?} is not within {} to {range}",
-                -range
-            )))
-        }
-    }
 }
 
 impl Shallow {
@@ -275,14 +216,6 @@ impl Sums {
             dried: cubic(of(Account::Dried)),
             error: came - went - inside - held - falling,
         }
-    }
-}
-
-pub(super) fn check_scalar(scalar: usize, count: usize) -> Result<()> {
-    if scalar < count {
-        Ok(())
-    } else {
-        Err(Error::argument(format!("there is no scalar {scalar} among {count}")))
     }
 }
 

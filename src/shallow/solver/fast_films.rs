@@ -275,9 +275,3 @@ pub fn light(step: &Step, depth: [f32; 2], flux: f32) -> f32 {
 fn packed(east: f32, south: f32) -> u32 {
     east.to_bits() >> 16 | south.to_bits() & 0xffff_0000
 }
-
-/// Unpacks the factors of `packed`.
-#[inline(always)]
-pub fn unpacked(both: u32) -> [f32; 2] {
-    [both << 16, both & 0xffff_0000].map(f32::from_bits)
-}

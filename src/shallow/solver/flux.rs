@@ -4,7 +4,6 @@
 //! dx H reads w' = zeta w + (dt^2 g unit / dx^2) H (eta_i - eta_j), and Eq. 4.5 w'' = w' H^2 / (H^2 + 3 dt nu (1 + S^2)^2); in Eq. 4.5 H is
 //! the donor's depth.
 
-use super::fast_films::unpacked;
 use crate::shallow::columns::{STRIP, strip_from, strip_mut, strip_of};
 
 /// The coefficients of a step that all pipes share.
@@ -324,6 +323,12 @@ fn flux_strip<K: Kind, const LIGHT: bool, const RESTS: bool, const AXIS: usize>(
         flux[x] = f;
         [transfer[x], left[x]] = split(f, left[x]);
     }
+}
+
+/// Unpacks the factors of `packed`.
+#[inline(always)]
+pub fn unpacked(both: u32) -> [f32; 2] {
+    [both << 16, both & 0xffff_0000].map(f32::from_bits)
 }
 
 #[cfg(test)]

@@ -1,70 +1,17 @@
 //! Flow through links: pipes between layers, and out of the domain. They are few, and processed one at a time.
 
-use crate::shallow::columns::{Columns, NONE, STRIP, resize_part};
 use std::ops::Range;
 
 use super::fast_films;
 use super::flux::{Kind, Step, flux_of, lesser, split};
+use super::link_flow::beyond;
 use super::overflow_edges::{Fall, Lips, edge};
 use super::rows::band_views::LinkPart;
+use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::pipes::Links;
-use crate::shallow::scalars::MOST as SCALARS;
 
 /// Clamp on transfers, beyond any column's depth (units): their sums fit 64 bits.
 const MOST: f32 = 2.1e9;
-
-/// The flow through each link.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct LinkFlow {
-    /// Flux (units a step).
-    pub flux: Vec<f32>,
-    /// Remainder of the transfer (units).
-    pub left: Vec<f32>,
-    /// Transfer in this step (units).
-    pub transfer: Vec<f32>,
-    /// Amounts of each scalar that fell freely over each link in the last step.
-    pub fallen: [Vec<f64>; SCALARS],
-    /// Units that have left the domain so far.
-    pub lost: i64,
-    /// Units that have entered over an absorbing border.
-    pub gained: i64,
-}
-
-impl LinkFlow {
-    /// No flow.
-    pub fn new(links: &Links) -> Self {
-        let none = vec![0.0; links.len()];
-        Self { flux: none.clone(), left: none.clone(), transfer: none, ..Self::default() }
-    }
-
-    /// Sets the count of scalars of liquid that falls freely.
-    pub(super) fn carry(&mut self, scalars: usize) {
-        for (at, fallen) in self.fallen.iter_mut().enumerate() {
-            *fallen = vec![0.0; if at < scalars { self.flux.len() } else { 0 }];
-        }
-    }
-
-    /// Replaces a range of links by others with these fluxes and remainders.
-    pub(in crate::shallow) fn replace(
-        &mut self,
-        part: Range<usize>,
-        flux: &[f32],
-        left: &[f32],
-        scalars: usize,
-    ) {
-        let new = part.start..part.start + flux.len();
-        for numbers in [&mut self.flux, &mut self.left, &mut self.transfer] {
-            resize_part(numbers, part.clone(), new.len(), 0.0);
-        }
-        for fallen in self.fallen.iter_mut().take(scalars) {
-            resize_part(fallen, part.clone(), new.len(), 0.0);
-            fallen[new.clone()].fill(0.0);
-        }
-        self.flux[new.clone()].copy_from_slice(flux);
-        self.left[new.clone()].copy_from_slice(left);
-        self.transfer[new].fill(0.0);
-    }
-}
 
 /// Units that crossed the border of the domain.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -206,13 +153,6 @@ impl LinkPart<'_> {
             }
         }
     }
-}
-
-/// The far end of a link that leaves the domain: its surface and its depth above the base of the link's column (units), and whether it is
-/// liquid at rest.
-pub(super) fn beyond(links: &Links, columns: &Columns, link: usize, still: i32) -> (i32, i32, bool) {
-    let (eta, is_still) = links.outside(columns, link, still);
-    (eta, if is_still { eta - columns.bases()[links.from[link] as usize] } else { 0 }, is_still)
 }
 
 /// The flux of a wave that leaves over the border (units a step): a surface that is `fall` above the one at rest flows out at the speed of

@@ -1,7 +1,7 @@
 //! Overflow edges (`Lips`): links that liquid falls freely from. What goes over one does not arrive at its other end in the same step, and
 //! the liquid there does not push back.
 
-use super::links::LinkFlow;
+use super::link_flow::LinkFlow;
 use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::pipes::Links;
 use crate::shallow::pipes::cliffs::Cliffs;

@@ -5,8 +5,8 @@
 //! its pipes do, including those that its neighbours own. It sleeps when its neighbours rest, too (`active.rs`). A step would leave it as
 //! it is, to the bit: so results do not depend on which strips sleep, and strips of 16 cells along x are as good as any others.
 
-use super::links::{LinkFlow, beyond};
-use super::pressurised::network::full_of;
+use super::full::full_of;
+use super::link_flow::{LinkFlow, beyond};
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
 use crate::shallow::pipes::{Links, Pipes};
 

@@ -5,46 +5,14 @@
 
 use super::Flow;
 use super::active::runs;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::per_column::{Array, PerColumn};
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
+use crate::shallow::params::Thickening;
 use crate::shallow::pipes::{Links, Pipes};
 use crate::shallow::scalars::check_scalar;
 use crate::shallow::scalars::shares::{LEVELS, level};
-
-/// How viscosity depends on a scalar: it is the liquid's own up to `from`, `times` that from `to` on, and linear in the concentration in
-/// between.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Thickening {
-    /// Index of the scalar: an age for blood that clots; a dye for mixtures.
-    pub scalar: usize,
-    /// Concentration up to which viscosity is the liquid's own, in the scalar's own measure.
-    pub from: f64,
-    /// Concentration from which on it is `times` that; it may be below `from`.
-    pub to: f64,
-    /// 1e-6 to 1e9.
-    pub times: f64,
-}
-
-impl Thickening {
-    /// Checks the numbers.
-    ///
-    /// # Errors
-    /// `Argument`, naming the field and its range.
-    pub fn validate(&self) -> Result<()> {
-        let Self { from, to, times, .. } = *self;
-        if !(from.is_finite() && to.is_finite() && from != to) {
-            return Err(Error::argument(format!(
-                "thickening.from = {from} and thickening.to = {to} are not finite and apart"
-            )));
-        }
-        if !(1e-6..=1e9).contains(&times) {
-            return Err(Error::argument(format!("thickening.times = {times} is not within 1e-6 to 1e9")));
-        }
-        Ok(())
-    }
-}
 
 /// The openness of pipes in a frame, if viscosity depends on a scalar; otherwise empty.
 #[derive(Debug, Clone)]

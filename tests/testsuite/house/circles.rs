@@ -9,9 +9,6 @@ use std::path::Path;
 
 use super::imports::all_sources;
 
-/// Files in circles that are still there. It only ever gets smaller.
-const FILES_IN_CIRCLES: usize = 45;
-
 type Module = Vec<String>;
 
 /// A file's module, and its code without comments and unit tests.
@@ -228,7 +225,6 @@ fn circles(needs: &BTreeMap<Module, BTreeSet<Module>>) -> Vec<Vec<&Module>> {
 fn files_need_each_other_in_no_circle() {
     let needs = needs();
     let groups = circles(&needs);
-    let count: usize = groups.iter().map(Vec::len).sum();
     let name = |module: &Module| module.join("::");
     let within = |group: &Vec<&Module>, module: &Module| {
         let inside = needs[module].iter().filter(|to| group.contains(to)).map(name).collect::<Vec<_>>();
@@ -238,7 +234,7 @@ fn files_need_each_other_in_no_circle() {
         .iter()
         .map(|group| group.iter().map(|module| within(group, module)).collect::<Vec<_>>().join("\n"));
     let said: Vec<String> = said.collect();
-    assert!(count <= FILES_IN_CIRCLES, "{count} files in {} circles:\n{}", groups.len(), said.join("\n\n"));
+    assert!(groups.is_empty(), "{} circles:\n{}", groups.len(), said.join("\n\n"));
 }
 
 #[test]

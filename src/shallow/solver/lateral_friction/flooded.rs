@@ -5,7 +5,8 @@ use super::Walls;
 use super::beside::{self, Room};
 use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::solver::flux::{Step, lesser};
-use crate::shallow::solver::pressurised::network::{At, State};
+use crate::shallow::solver::pressurised::edges::At;
+use crate::shallow::solver::pressurised::network::State;
 
 /// Friction of a pipe.
 #[derive(Debug, Clone, Copy, PartialEq)]

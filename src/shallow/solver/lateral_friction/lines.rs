@@ -8,11 +8,12 @@
 
 use std::ops::Range;
 
-use super::{Liquid, Numbers, spread, within};
+use super::buffers::{Lines, Numbers};
+use super::{Liquid, spread, within};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_mut, strip_of};
-use crate::shallow::solver::fast_films::{NORMAL, unpacked};
-use crate::shallow::solver::flux::{Step, greater, lesser};
+use crate::shallow::solver::fast_films::NORMAL;
+use crate::shallow::solver::flux::{Step, greater, lesser, unpacked};
 use crate::shallow::solver::pressurised::network::Network;
 
 /// Maximum reductions: a pipe is coupled to all within 16 cells.
@@ -20,18 +21,6 @@ const MOST: usize = 4;
 /// Below this sum of a and b, neighbours take their values of the last step.
 const LAGS: f32 = 0.5;
 const ZEROS: [f32; STRIP] = [0.0; STRIP];
-
-/// Lines of pipes to the east, which lie along z, and of pipes to the south, along x.
-#[derive(Debug, Clone, Default)]
-pub struct Lines {
-    /// r, a, b of all pipes in both directions, and those of the next reduction.
-    now: [[Numbers; 3]; 2],
-    next: [[Numbers; 3]; 2],
-    /// Fluxes (units in this step).
-    solved: [Numbers; 2],
-    /// The strips at the present distance (rows) before and behind, or [`NONE`]; and those of the next reduction.
-    far: [[Vec<u32>; 2]; 2],
-}
 
 /// The inputs of a pass over strips.
 struct Pass<'a> {

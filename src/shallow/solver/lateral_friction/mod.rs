@@ -15,9 +15,11 @@
 //! no lateral friction. Where two rows have only such columns, nothing is computed.
 
 mod beside;
+mod buffers;
 mod flooded;
 mod lines;
 
+pub use buffers::Walls;
 use std::ops::Range;
 
 use super::active::Active;
@@ -27,36 +29,11 @@ use super::pressurised::network::Network;
 use crate::shallow::columns::grid::TOP;
 use crate::shallow::columns::{Columns, STRIP, strip_of};
 use crate::shallow::pipes::{Links, Pipes};
-use lines::Lines;
 
 /// Steps of a frame after which the surroundings of columns are found again.
 const STEPS: u32 = 8;
 /// Minimum columns for strips to be divided among threads.
 const LEAST: usize = 64 * STRIP;
-
-/// Lateral friction of pipes.
-#[derive(Debug, Clone, Default)]
-pub struct Walls {
-    /// Whether it is enabled.
-    is_on: bool,
-    /// Count of column indices that the lists hold.
-    len: usize,
-    /// Steps since the frame began.
-    age: u32,
-    /// Whether each row may have pipes with friction during these steps.
-    rows: Vec<bool>,
-    /// Their active strips, and whether each was included when the surroundings of columns were found.
-    strips: Vec<u32>,
-    known: Vec<bool>,
-    /// Whether each strip has ceilings, or positions without a column.
-    roofed: Vec<bool>,
-    /// Positions of each strip from which links lead to the east, south, west and north.
-    linked: Vec<[u16; 4]>,
-    has_links: bool,
-    /// Across x, then across z: total contact and walls of each column ([`beside::Around`]), contact before it, and contact behind it.
-    beside: [[Numbers; 3]; 2],
-    lines: Lines,
-}
 
 /// The liquid whose friction is computed.
 #[derive(Clone, Copy)]
@@ -74,38 +51,6 @@ pub struct Liquid<'a> {
     pub row_depths: &'a [i32],
     /// Whether the work is divided among threads.
     pub is_divided: bool,
-}
-
-/// Numbers by column index, with padding before the first and behind the last. Each list has a different offset within a page
-/// (`columns/per_column.rs`).
-#[derive(Debug, Clone, Default)]
-struct Numbers {
-    before: usize,
-    list: Vec<f32>,
-}
-
-impl Numbers {
-    fn fit(&mut self, position: usize, len: usize) {
-        self.before = STRIP + 48 * position;
-        self.list.clear();
-        self.list.resize(self.before + len + 2 * STRIP, 0.0);
-    }
-
-    /// The numbers from the first column on.
-    fn all(&self) -> &[f32] {
-        &self.list[self.before..]
-    }
-
-    fn all_mut(&mut self) -> &mut [f32] {
-        &mut self.list[self.before..]
-    }
-
-    /// A strip of numbers, starting some positions before that of a strip.
-    #[inline(always)]
-    fn before(&self, strip: usize, positions: usize) -> &[f32; STRIP] {
-        let at = self.before + strip * STRIP - positions;
-        self.list[at..].first_chunk().expect("a strip")
-    }
 }
 
 impl Walls {

@@ -3,8 +3,8 @@
 //! Each iteration reads and writes all nodes several times: so their numbers are kept in separate arrays, and neighbours are found without
 //! the pipes.
 
-use super::heads::{GIVE, LINK_SCALE, Node, scaled};
-use super::network::{At, Edge};
+use super::edges::{At, Edge};
+use super::nodes::{GIVE, LINK_SCALE, Node, scaled};
 use crate::shallow::columns::NONE;
 use crate::shallow::solver::stop::Stop;
 

@@ -7,55 +7,24 @@
 
 use std::ops::Range;
 
+use super::edges::{At, Edge};
 use super::gradients::Gradients;
-use super::heads::{EQUAL, Node, section};
-use crate::shallow::columns::grid::TOP;
+use super::nodes::{EQUAL, Node, section};
 use crate::shallow::columns::per_column::{Array, PerColumn};
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
 use crate::shallow::pipes::Pipes;
 use crate::shallow::solver::flux::Step;
+use crate::shallow::solver::full::full_of;
 use crate::shallow::solver::lateral_friction::Walls;
-use crate::shallow::solver::links::LinkFlow;
-use crate::shallow::solver::overflow_edges::{Fall, Lips, edge};
-use crate::shallow::solver::rows::bands::Filling;
+use crate::shallow::solver::link_flow::LinkFlow;
+use crate::shallow::solver::overflow_edges::{Fall, Lips};
+use crate::shallow::solver::rows::filling::Filling;
 use crate::shallow::solver::stop::Stop;
 use crate::shallow::solver::transfers::limiter;
 use crate::shallow::solver::transfers::limiter::Party;
 
-/// A column is full when its missing liquid is at most its height (base to ceiling) divided by this.
-pub const SLACK: i32 = 128;
-
 /// Columns of a network for which capacity is reserved from the beginning.
 const ROOM: usize = 1024;
-
-/// A pipe of the network: its index in the array that holds it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::shallow::solver) enum At {
-    /// To the east of a column.
-    East(u32),
-    /// To the south of a column.
-    South(u32),
-    /// A link.
-    Link(u32),
-}
-
-/// A pipe of the network.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::shallow::solver) struct Edge {
-    pub at: At,
-    /// Parties at both ends, or [`NONE`]: outside.
-    pub ends: [u32; 2],
-    /// Flux at equal heads, and flux per unit of head difference (units a step).
-    pub kept: f64,
-    pub conductance: f64,
-    /// Surface outside (units), where one end is outside.
-    pub outside: f64,
-    /// Flux (units a step), and the remainder of its transfer.
-    pub flux: f64,
-    pub left: f64,
-    /// Transfer (units).
-    pub units: i64,
-}
 
 /// The network of a step.
 #[derive(Debug, Clone)]
@@ -93,19 +62,6 @@ pub struct State<'a> {
     pub lips: &'a Lips,
     /// Lateral friction of pipes.
     pub walls: &'a Walls,
-}
-
-impl Edge {
-    /// Makes the pipe an overflow edge, out of a column.
-    fn fall(&mut self, columns: &Columns, giver: u32, fall: Fall) {
-        self.outside = f64::from(columns.bases()[giver as usize] - edge(columns));
-        // Earlier flow in the opposite direction does not return.
-        let outward = |flow: f64| if fall == Fall::Ahead { flow.max(0.0) } else { flow.min(0.0) };
-        (self.kept, self.left) = (outward(self.kept), outward(self.left));
-        if fall == Fall::Back {
-            self.ends.swap(0, 1);
-        }
-    }
 }
 
 impl Network {
@@ -479,17 +435,6 @@ impl Network {
             (flux[at as usize], left[at as usize]) = (edge.flux as f32, edge.left as f32);
         }
     }
-}
-
-/// Which columns of a strip are full, given bases, ceilings and depths.
-#[inline]
-pub(in crate::shallow::solver) fn full_of([base, ceiling, depth]: [&[i32; STRIP]; 3]) -> [i32; STRIP] {
-    let mut full = [0; STRIP];
-    for x in 0..STRIP {
-        let room = ceiling[x] - base[x];
-        full[x] = i32::from((depth[x] > 0) & (ceiling[x] < TOP) & (room - depth[x] <= room / SLACK));
-    }
-    full
 }
 
 /// A transfer rounded to whole units, and clamped: a restored state may exceed all bounds, and sums must fit 64 bits.

@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::pipes::Links;
 use crate::shallow::scalars::MOST;
-use crate::shallow::solver::links::LinkFlow;
+use crate::shallow::solver::link_flow::LinkFlow;
 
 /// Rows that a band sees beyond its own: three of whose transfers are found, and one of which only depths are read.
 pub const BEYOND: usize = 4;

@@ -5,10 +5,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::band_views::{BEYOND, Copy, Part, Parts};
 use super::buffers::Rows;
+use super::filling::Filling;
 use super::{Ground, Stepped};
 use crate::shallow::columns::{Columns, STRIP, strip_of};
 use crate::shallow::solver::flux::Step;
-use crate::shallow::solver::pressurised::network::SLACK;
+use crate::shallow::solver::full::SLACK;
 use crate::shallow::solver::transfers::scale;
 
 /// Minimum columns for a step to be divided among threads: below, starting them takes longer than they save.
@@ -24,13 +25,6 @@ struct Band {
     before: Copy,
     behind: Copy,
     stepped: Stepped,
-}
-
-/// For each row, whether columns might fill up to their ceiling in a step, and whether some might be full.
-#[derive(Clone, Copy)]
-pub struct Filling<'a> {
-    pub may_fill: &'a [bool],
-    pub may_be_full: &'a [bool],
 }
 
 /// The bands of a domain.

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use super::positions::PAD;
 use crate::shallow::columns::{Columns, STRIP};
-use crate::shallow::solver::transfers::scalars::Lanes;
 
 /// Rows that have buffers at a time: a power of two, at least the five in use.
 pub const RING: usize = 8;
@@ -99,4 +98,23 @@ impl Rows {
 /// Length of a buffer for the widest of some rows.
 fn room(columns: &Columns, rows: Range<usize>) -> usize {
     rows.map(|row| columns.row(row).len()).max().unwrap_or(0) * STRIP + 2 * PAD
+}
+
+/// Values of a scalar in the rows that a band is working on; indexed as in `Buffer`.
+#[derive(Debug, Clone)]
+pub(in crate::shallow::solver) struct Lane {
+    /// Concentrations (levels).
+    pub(in crate::shallow::solver) level: [Vec<f64>; RING],
+    /// Amounts that move to the south, of a row and the one before.
+    pub(in crate::shallow::solver) south: [Vec<f64>; 2],
+    /// Amounts that move to the east.
+    pub(in crate::shallow::solver) east: Vec<f64>,
+}
+
+/// All scalars.
+#[derive(Debug, Clone, Default)]
+pub struct Lanes {
+    pub(in crate::shallow::solver) lanes: Vec<Lane>,
+    /// Stands in for absent neighbours.
+    pub(in crate::shallow::solver) none: Vec<f64>,
 }

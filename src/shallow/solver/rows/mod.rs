@@ -9,78 +9,25 @@
 pub(in crate::shallow::solver) mod band_views;
 pub(in crate::shallow) mod bands;
 pub(in crate::shallow::solver) mod buffers;
+pub(in crate::shallow::solver) mod filling;
+mod ground;
 pub(in crate::shallow::solver) mod positions;
 
-use super::active::Active;
-use super::fast_films::Fast;
 use super::flux::{Carried, Kind, Of, Row, Step, flux_row, greater, solved_row};
-use super::lateral_friction::Walls;
 use super::links::{Outside, indices_of};
-use super::overflow_edges::Lips;
-use super::pressurised::network::Network;
 use super::transfers::inflow_limit::most_through_links;
 use super::transfers::scale;
 use super::transfers::whole_units::{find_woken, move_units};
 use crate::numeric::cpu::dispatch;
-use crate::shallow::columns::{Columns, NONE, STRIP};
-use crate::shallow::pipes::Pipes;
+use crate::shallow::columns::{NONE, STRIP};
 use crate::shallow::scalars::MOST;
-use crate::shallow::scalars::amounts::{Act, Changes};
+use crate::shallow::scalars::amounts::Changes;
 use band_views::Parts;
 use buffers::{Buffer, RING, Rows, SWEEPS};
+pub use ground::Ground;
+pub use ground::Stepped;
+pub(super) use ground::each_link;
 use positions::{PAD, Place};
-
-/// The inputs of a step.
-pub struct Ground<'a> {
-    /// Columns.
-    pub columns: &'a Columns,
-    /// Pipes between them.
-    pub pipes: &'a Pipes,
-    /// Active strips.
-    pub active: &'a Active,
-    /// Flow through full columns.
-    pub network: &'a Network,
-    /// Films with reduced inertia.
-    pub fast: &'a Fast,
-    /// Lateral friction of pipes.
-    pub walls: &'a Walls,
-    /// Overflow edges: links that liquid falls freely from.
-    pub lips: &'a Lips,
-    /// Whether slow liquid may come to rest.
-    pub may_rest: bool,
-    /// Rows with columns that may fill up.
-    pub may_fill: &'a [bool],
-    /// Minimum room of each row's columns (units).
-    pub room: &'a [f32],
-    /// Changes of scalars by their laws.
-    pub acts: &'a [Act],
-}
-
-impl Ground<'_> {
-    /// Whether there is nothing to do in a row.
-    #[inline(always)]
-    fn is_idle(&self, row: usize) -> bool {
-        let links = &self.pipes.links;
-        row >= self.columns.grid.size[1]
-            || self.active.row(row).is_empty()
-                && (links.row(row).is_empty() && links.columns_of(row).is_empty() || self.active.rests(row))
-                && self.network.is_empty()
-    }
-}
-
-/// Results of a band in a step.
-#[derive(Debug, Clone, Default)]
-pub struct Stepped {
-    /// Counts of rows with columns that would have given more than they had, with columns that would have received more than they had room
-    /// for, and with fast films that were limited.
-    pub scaled: [u32; 3],
-    /// Units that crossed the border.
-    pub outside: Outside,
-    /// Strips that became wet.
-    pub woken: Vec<u32>,
-    /// Changes of scalars.
-    pub carried: [Changes; MOST],
-}
 
 impl Rows {
     /// One step of a band of rows; `deepest` receives the maximum depth of each (units).
@@ -391,24 +338,5 @@ impl Rows {
         let Buffer { east, south, .. } = &ring[row % RING];
         carried.move_links(ground, parts, row, changes);
         carried.move_row(ground, parts, row, [east, south], changes);
-    }
-}
-
-/// Calls `add` with each column of a row that gives or receives through a link, and how much.
-pub(super) fn each_link(
-    ground: &Ground,
-    parts: &Parts,
-    row: usize,
-    gives: bool,
-    mut add: impl FnMut(u32, i64),
-) {
-    let links = &ground.pipes.links;
-    if links.columns_of(row).is_empty() {
-        return;
-    }
-    let within = indices_of(ground.columns, row);
-    for owner in row.saturating_sub(1).max(parts.first)..row + 1 {
-        let part = parts.see(owner);
-        part.links.each(links, ground.lips, (owner, part.first_link), &within, gives, &mut add);
     }
 }

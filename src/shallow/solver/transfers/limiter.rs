@@ -5,7 +5,7 @@
 //! them too little room as receivers; the next round corrects that.
 
 use crate::shallow::columns::NONE;
-use crate::shallow::solver::pressurised::network::Edge;
+use crate::shallow::solver::pressurised::edges::Edge;
 use crate::shallow::solver::stop::Stop;
 
 /// Rounds in which inflow is cut in proportion; after these it is cut to 0.

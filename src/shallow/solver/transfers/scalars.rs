@@ -10,30 +10,12 @@ use crate::shallow::columns::{NONE, STRIP, strip_mut, strip_of};
 use crate::shallow::scalars::amounts::{Act, Changes};
 use crate::shallow::scalars::shares::{LEVELS, MOST, integer, level, nearest, share};
 use crate::shallow::solver::overflow_edges::{Fall, Lips};
-use crate::shallow::solver::pressurised::network::{At, Network};
+use crate::shallow::solver::pressurised::edges::At;
+use crate::shallow::solver::pressurised::network::Network;
 use crate::shallow::solver::rows::Ground;
 use crate::shallow::solver::rows::band_views::{Parts, indices};
-use crate::shallow::solver::rows::buffers::RING;
+use crate::shallow::solver::rows::buffers::{Lane, Lanes, RING};
 use crate::shallow::solver::rows::positions::Place;
-
-/// Values of a scalar in the rows that a band is working on; indexed as in `Buffer`.
-#[derive(Debug, Clone)]
-struct Lane {
-    /// Concentrations (levels).
-    level: [Vec<f64>; RING],
-    /// Amounts that move to the south, of a row and the one before.
-    south: [Vec<f64>; 2],
-    /// Amounts that move to the east.
-    east: Vec<f64>,
-}
-
-/// All scalars.
-#[derive(Debug, Clone, Default)]
-pub struct Lanes {
-    lanes: Vec<Lane>,
-    /// Stands in for absent neighbours.
-    none: Vec<f64>,
-}
 
 impl Lanes {
     /// For so many scalars, in rows of so many numbers.

@@ -1,0 +1,97 @@
+//! All liquid in the air.
+
+use std::ops::Range;
+
+use super::Falls;
+use super::packet::Packet;
+use super::rivulets::Threads;
+use super::splash::Landing;
+use super::waiting::Waiting;
+use crate::shallow::columns::resize_part;
+use crate::shallow::scalars::shares::MOST;
+
+/// Capacity for landings: columns for each packet.
+pub(in crate::shallow::free_fall) const SPLASHES: usize = 4;
+
+/// All liquid in the air.
+#[derive(Debug, Clone, Default)]
+pub(in crate::shallow) struct Falling {
+    /// In the order of their creation.
+    pub packets: Vec<Packet>,
+    /// By link; empty without falls.
+    pub(in crate::shallow::free_fall) waiting: Vec<Waiting>,
+    /// Landings of a step; kept to avoid repeated allocation.
+    pub(super) landed: Vec<Landing>,
+    pub(in crate::shallow::free_fall) threads: Threads,
+    /// Seconds since packets were last created, and how many times they were.
+    pub since: f64,
+    pub tick: u64,
+}
+
+impl Falling {
+    /// Nothing in the air, with capacity for what may come.
+    pub fn new(falls: Option<&Falls>, links: usize) -> Self {
+        let Some(falls) = falls else { return Self::default() };
+        Self {
+            packets: Vec::with_capacity(falls.most),
+            waiting: vec![Waiting::default(); links],
+            landed: Vec::with_capacity(SPLASHES * falls.most),
+            threads: Threads::with_room(links),
+            ..Self::default()
+        }
+    }
+
+    /// Memory (bytes).
+    pub fn bytes(&self) -> usize {
+        self.packets.capacity() * (size_of::<Packet>() + SPLASHES * size_of::<Landing>())
+            + size_of_val(&self.waiting[..])
+            + self.threads.bytes()
+    }
+
+    /// All packets.
+    pub fn packets(&self) -> &[Packet] {
+        &self.packets
+    }
+
+    /// The liquid that waits at each link.
+    pub fn waiting(&self) -> &[Waiting] {
+        &self.waiting
+    }
+
+    /// Restores what [`Falling::packets`] and [`Falling::waiting`] returned; the links must be as many.
+    pub fn set(&mut self, packets: impl Iterator<Item = Packet>, waiting: impl Iterator<Item = Waiting>) {
+        self.packets.clear();
+        self.packets.extend(packets);
+        self.waiting.iter_mut().zip(waiting).for_each(|(to, waiting)| *to = waiting);
+    }
+
+    /// Units in the air.
+    pub fn units(&self) -> i64 {
+        let packets: i64 = self.packets.iter().map(|packet| packet.units).sum();
+        packets + self.waiting.iter().map(|waiting| waiting.units).sum::<i64>()
+    }
+
+    /// Amount of a scalar in the air.
+    pub fn amount(&self, scalar: usize) -> i128 {
+        let packets: i128 = self.packets.iter().map(|packet| i128::from(packet.amounts[scalar])).sum();
+        packets + self.waiting.iter().map(|waiting| i128::from(waiting.amounts[scalar])).sum::<i128>()
+    }
+
+    /// Clears all amounts, because the scalars have changed.
+    pub fn forget_amounts(&mut self) {
+        self.loads().for_each(|(_, amounts)| *amounts = [0; MOST]);
+    }
+
+    /// Units and amounts of each packet, and of the liquid that waits at each link.
+    pub fn loads(&mut self) -> impl Iterator<Item = (i64, &mut [i64; MOST])> {
+        let packets = self.packets.iter_mut().map(|packet| (packet.units, &mut packet.amounts));
+        packets.chain(self.waiting.iter_mut().map(|waiting| (waiting.units, &mut waiting.amounts)))
+    }
+
+    /// Changes the count of a range of links; nothing waits at the new ones.
+    pub fn replace(&mut self, links: Range<usize>, count: usize) {
+        let new = links.start..links.start + count;
+        resize_part(&mut self.waiting, links, count, Waiting::default());
+        self.waiting[new].fill(Waiting::default());
+    }
+}

@@ -1,0 +1,75 @@
+//! What scalars are, and how they change.
+
+use super::shares::LEVELS;
+use crate::error::{Error, Result};
+
+/// A quantity that the liquid carries along.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scalar {
+    /// Its name: not empty, and not that of another scalar.
+    pub name: String,
+    /// How it changes.
+    pub law: Law,
+    /// Concentrations are within -range to range, in the scalar's own measure, and are stored in steps of 2^-20 of it; 1e-9 to 1e9. For
+    /// example 1 for a dye, 100 (K) for a temperature above that of the room, 3600 (s) for an age.
+    pub range: f64,
+}
+
+impl Scalar {
+    /// A dye, of concentrations from 0 to 1.
+    pub fn dye(name: &str) -> Self {
+        Self { name: name.into(), law: Law::Dye, range: 1.0 }
+    }
+
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// `Argument`, naming the field and its range.
+    pub fn validate(&self) -> Result<()> {
+        if self.name.is_empty() {
+            return Err(Error::argument("name is empty"));
+        }
+        if !(1e-9..=1e9).contains(&self.range) {
+            return Err(Error::argument(format!("range = {} is not within 1e-9 to 1e9", self.range)));
+        }
+        match self.law {
+            Law::Decays(half) if !(1e-6..=1e12).contains(&half) => {
+                Err(Error::argument(format!("a half-life of {half} s is not within 1e-6 to 1e12")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// A concentration in levels.
+    pub fn level(&self, concentration: f64) -> Result<i32> {
+        if concentration.abs() <= self.range {
+            Ok((concentration / self.range * LEVELS).round() as i32)
+        } else {
+            let Self { name, range, .. } = self;
+            Err(Error::argument(format!(
+                "a concentration of {concentration} of {name:?} is not within {} to {range}",
+                -range
+            )))
+        }
+    }
+}
+
+/// How a scalar changes besides being carried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Law {
+    /// It does not: dye, salt, heat.
+    Dye,
+    /// Decays by half in each half-life (s), above 0: heat that is lost to a room.
+    Decays(f64),
+    /// The time (s) since the liquid came in, averaged over the liquid of a column, clamped to `range`; the age of liquid that comes in is
+    /// its concentration.
+    Ages,
+}
+
+pub(in crate::shallow) fn check_scalar(scalar: usize, count: usize) -> Result<()> {
+    if scalar < count {
+        Ok(())
+    } else {
+        Err(Error::argument(format!("there is no scalar {scalar} among {count}")))
+    }
+}

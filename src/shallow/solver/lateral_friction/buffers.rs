@@ -1,0 +1,71 @@
+//! What lateral friction keeps from step to step.
+
+use crate::shallow::columns::STRIP;
+
+/// Lateral friction of pipes.
+#[derive(Debug, Clone, Default)]
+pub struct Walls {
+    /// Whether it is enabled.
+    pub(super) is_on: bool,
+    /// Count of column indices that the lists hold.
+    pub(super) len: usize,
+    /// Steps since the frame began.
+    pub(super) age: u32,
+    /// Whether each row may have pipes with friction during these steps.
+    pub(super) rows: Vec<bool>,
+    /// Their active strips, and whether each was included when the surroundings of columns were found.
+    pub(super) strips: Vec<u32>,
+    pub(super) known: Vec<bool>,
+    /// Whether each strip has ceilings, or positions without a column.
+    pub(super) roofed: Vec<bool>,
+    /// Positions of each strip from which links lead to the east, south, west and north.
+    pub(super) linked: Vec<[u16; 4]>,
+    pub(super) has_links: bool,
+    /// Across x, then across z: total contact and walls of each column ([`beside::Around`]), contact before it, and contact behind it.
+    pub(super) beside: [[Numbers; 3]; 2],
+    pub(super) lines: Lines,
+}
+
+/// Lines of pipes to the east, which lie along z, and of pipes to the south, along x.
+#[derive(Debug, Clone, Default)]
+pub struct Lines {
+    /// r, a, b of all pipes in both directions, and those of the next reduction.
+    pub(super) now: [[Numbers; 3]; 2],
+    pub(super) next: [[Numbers; 3]; 2],
+    /// Fluxes (units in this step).
+    pub(super) solved: [Numbers; 2],
+    /// The strips at the present distance (rows) before and behind, or [`NONE`]; and those of the next reduction.
+    pub(super) far: [[Vec<u32>; 2]; 2],
+}
+
+/// Numbers by column index, with padding before the first and behind the last. Each list has a different offset within a page
+/// (`columns/per_column.rs`).
+#[derive(Debug, Clone, Default)]
+pub(super) struct Numbers {
+    pub(super) before: usize,
+    pub(super) list: Vec<f32>,
+}
+
+impl Numbers {
+    pub fn fit(&mut self, position: usize, len: usize) {
+        self.before = STRIP + 48 * position;
+        self.list.clear();
+        self.list.resize(self.before + len + 2 * STRIP, 0.0);
+    }
+
+    /// The numbers from the first column on.
+    pub fn all(&self) -> &[f32] {
+        &self.list[self.before..]
+    }
+
+    pub fn all_mut(&mut self) -> &mut [f32] {
+        &mut self.list[self.before..]
+    }
+
+    /// A strip of numbers, starting some positions before that of a strip.
+    #[inline(always)]
+    pub fn before(&self, strip: usize, positions: usize) -> &[f32; STRIP] {
+        let at = self.before + strip * STRIP - positions;
+        self.list[at..].first_chunk().expect("a strip")
+    }
+}

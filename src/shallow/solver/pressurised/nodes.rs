@@ -1,0 +1,65 @@
+//! Full columns, as nodes of the network.
+
+use crate::shallow::columns::{Columns, NONE};
+
+/// Heads closer than this (units) are equal, like surfaces that differ by less than a unit: liquid at rest stays at rest.
+pub(in crate::shallow::solver) const EQUAL: f64 = 0.5;
+
+/// Regularisation of the diagonal, as part of the conductance: just enough that a closed cavity has a solution.
+pub(in crate::shallow::solver) const GIVE: f64 = 1e-12;
+
+/// Fractions of a unit in which flows through links are summed.
+pub(in crate::shallow::solver) const LINK_SCALE: f64 = 65536.0;
+
+/// A full column in the system of heads.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::shallow::solver) struct Node {
+    /// Its pipes to the east, west, south and north, or [`NONE`].
+    pub edges: [u32; 4],
+    /// Whether it is still in the system.
+    pub is_held: bool,
+    /// Head above its surface (units).
+    pub over: f64,
+    /// Right side: the inflow required, less the inflow without heads; and the diagonal of the system.
+    pub right: f64,
+    pub diagonal: f64,
+    /// Sum over links, in 1/65536 unit.
+    pub linked: i64,
+}
+
+impl Node {
+    /// A node with the head above its surface of the last step.
+    pub fn new(over: f64) -> Self {
+        Self { edges: [NONE; 4], is_held: true, over, right: 0.0, diagonal: 0.0, linked: 0 }
+    }
+}
+
+/// Fixed-point value of a link's number, clamped so that any sum of such values fits 64 bits.
+pub(in crate::shallow::solver) fn scaled(number: f64) -> i64 {
+    (number * LINK_SCALE).clamp(-1e16, 1e16) as i64
+}
+
+/// The height of a pipe's section (units): the depth of the last donor, within the opening between both columns.
+pub(in crate::shallow::solver) fn section(
+    columns: &Columns,
+    depth: &[i32],
+    i: usize,
+    j: Option<usize>,
+    flux: f32,
+) -> f64 {
+    let (base, ceiling) = (columns.bases(), columns.ceilings());
+    let Some(j) = j else { return f64::from(depth[i]) };
+    let opening = ceiling[i].min(ceiling[j]) - base[i].max(base[j]);
+    let eta = |k: usize| base[k] + depth[k];
+    let gives = match flux.partial_cmp(&0.0) {
+        Some(std::cmp::Ordering::Greater) => depth[i],
+        Some(std::cmp::Ordering::Less) => depth[j],
+        // The result is the same from either end.
+        _ => match eta(i).cmp(&eta(j)) {
+            std::cmp::Ordering::Greater => depth[i],
+            std::cmp::Ordering::Less => depth[j],
+            std::cmp::Ordering::Equal => depth[i].min(depth[j]),
+        },
+    };
+    f64::from(gives.min(opening))
+}

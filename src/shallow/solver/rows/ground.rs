@@ -1,0 +1,84 @@
+//! The inputs of a step, and its results.
+
+use super::band_views::Parts;
+use crate::shallow::columns::Columns;
+use crate::shallow::pipes::Pipes;
+use crate::shallow::scalars::MOST;
+use crate::shallow::scalars::amounts::{Act, Changes};
+use crate::shallow::solver::active::Active;
+use crate::shallow::solver::fast_films::Fast;
+use crate::shallow::solver::lateral_friction::Walls;
+use crate::shallow::solver::links::{Outside, indices_of};
+use crate::shallow::solver::overflow_edges::Lips;
+use crate::shallow::solver::pressurised::network::Network;
+
+/// The inputs of a step.
+pub struct Ground<'a> {
+    /// Columns.
+    pub columns: &'a Columns,
+    /// Pipes between them.
+    pub pipes: &'a Pipes,
+    /// Active strips.
+    pub active: &'a Active,
+    /// Flow through full columns.
+    pub network: &'a Network,
+    /// Films with reduced inertia.
+    pub fast: &'a Fast,
+    /// Lateral friction of pipes.
+    pub walls: &'a Walls,
+    /// Overflow edges: links that liquid falls freely from.
+    pub lips: &'a Lips,
+    /// Whether slow liquid may come to rest.
+    pub may_rest: bool,
+    /// Rows with columns that may fill up.
+    pub may_fill: &'a [bool],
+    /// Minimum room of each row's columns (units).
+    pub room: &'a [f32],
+    /// Changes of scalars by their laws.
+    pub acts: &'a [Act],
+}
+
+impl Ground<'_> {
+    /// Whether there is nothing to do in a row.
+    #[inline(always)]
+    pub fn is_idle(&self, row: usize) -> bool {
+        let links = &self.pipes.links;
+        row >= self.columns.grid.size[1]
+            || self.active.row(row).is_empty()
+                && (links.row(row).is_empty() && links.columns_of(row).is_empty() || self.active.rests(row))
+                && self.network.is_empty()
+    }
+}
+
+/// Results of a band in a step.
+#[derive(Debug, Clone, Default)]
+pub struct Stepped {
+    /// Counts of rows with columns that would have given more than they had, with columns that would have received more than they had room
+    /// for, and with fast films that were limited.
+    pub scaled: [u32; 3],
+    /// Units that crossed the border.
+    pub outside: Outside,
+    /// Strips that became wet.
+    pub woken: Vec<u32>,
+    /// Changes of scalars.
+    pub carried: [Changes; MOST],
+}
+
+/// Calls `add` with each column of a row that gives or receives through a link, and how much.
+pub(in crate::shallow::solver) fn each_link(
+    ground: &Ground,
+    parts: &Parts,
+    row: usize,
+    gives: bool,
+    mut add: impl FnMut(u32, i64),
+) {
+    let links = &ground.pipes.links;
+    if links.columns_of(row).is_empty() {
+        return;
+    }
+    let within = indices_of(ground.columns, row);
+    for owner in row.saturating_sub(1).max(parts.first)..row + 1 {
+        let part = parts.see(owner);
+        part.links.each(links, ground.lips, (owner, part.first_link), &within, gives, &mut add);
+    }
+}
