@@ -24,15 +24,17 @@ mod schema;
 pub mod shallow;
 pub mod snow;
 pub mod surface;
+mod systems;
 
 pub use objects::Objects;
-pub use schema::{FrameChoice, Frames, Override, Value, Values, reference, template};
+pub use schema::{FrameChoice, Frames, Override, Value, Values};
 pub use shallow::Shallow;
 #[cfg(feature = "vdb")]
 pub use snow::{
     Forecast, Inputs, Rebuild, RebuildGrains, Walk, changes_since, check_memory, estimate, partial,
 };
 pub use surface::Surface;
+pub use systems::{reference, template};
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use super::run::{
     Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
 };
-use super::schema::keys::settings_of;
 use super::{Role, Scene, moving};
 use crate::context::Context;
 use crate::error::Result;
@@ -15,6 +14,7 @@ use crate::io::records::manifest::Keeps;
 use crate::io::usd::materials::Look;
 use crate::io::{mesh, usd};
 use crate::motion::Drawn;
+use crate::scene::run::settings::settings_of;
 use crate::sweep::Body;
 
 /// The moving objects of a scene.

@@ -12,7 +12,7 @@ mod own_files;
 mod pass;
 mod plan;
 mod runner;
-mod settings;
+pub(in crate::scene) mod settings;
 mod stage;
 mod stored;
 mod usd;

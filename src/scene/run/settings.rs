@@ -2,6 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::error::Result;
+use crate::io::files::sequence::Pattern;
+use crate::io::records::input_hashes::Seen;
+use crate::scene::schema::key::Key;
+use crate::scene::schema::key::Scope::{First, Object};
+use crate::scene::schema::values::path;
+use crate::scene::{Role, Scene};
+
 /// Former values longer than this are not reported.
 const LONG: usize = 80;
 /// Prefix of a hash instead of a file's name: the same content under another name is the same input.
@@ -27,6 +35,58 @@ pub(in crate::scene) fn changed(before: &Settings, after: &Settings) -> Vec<Stri
 /// A key as `--set` names it: `object.1.scale`, not `object[1].scale`.
 fn named(key: &str) -> String {
     key.replace('[', ".").replace(']', "")
+}
+
+/// The settings that a stage depends on, with the content of the objects' files instead of their names. Only objects with these roles
+/// count, each according to its role. Of the frames only the first counts: a shot may be extended.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn settings_of(scene: &Scene, stage: &str, seen: &Seen, roles: &[Role]) -> Result<Settings> {
+    let mut settings: Settings = scene
+        .values
+        .iter()
+        .filter(|(key, _, _)| key.scope(stage).is_some())
+        .filter(|(key, object, _)| {
+            match object.and_then(|index| scene.objects.get(index)).map(|object| object.role) {
+                None => true,
+                Some(role) if !roles.contains(&role) => false,
+                Some(Role::Static) => key.name == "role" || key.scope(stage) == Some(Object),
+                Some(_) => true,
+            }
+        })
+        .map(|(key, object, value)| (path(key, object), value.to_string()))
+        .collect();
+    for (index, object) in scene.objects.iter().enumerate().filter(|(_, o)| roles.contains(&o.role)) {
+        let content = match (Pattern::parse(&object.file), object.role) {
+            (None, _) => seen.hash(&object.file)?,
+            (Some(pattern), Role::Static) => {
+                let at = f64::from(scene.shot.frames.first) - object.offset;
+                let [below, above] =
+                    [at.floor(), at.ceil()].map(|frame| seen.hash(&pattern.path(frame as i32)));
+                below? + &above?
+            }
+            (Some(_), _) => "of each frame".to_string(),
+        };
+        settings.insert(format!("object[{}].file", index + 1), format!("{CONTENT}{content}"));
+    }
+    settings.insert("shot.frames".into(), scene.shot.frames.first.to_string());
+    // Other versions may compute different results.
+    settings.insert("frazil".into(), env!("CARGO_PKG_VERSION").into());
+    Ok(settings)
+}
+
+/// Those of a stage's settings that determine its first state.
+pub fn first_of(keys: &[Key], settings: &Settings, stage: &str) -> Settings {
+    let is_first = |path: &str| {
+        let (table, name) = path.rsplit_once('.').unwrap_or_default();
+        // The index is dropped: `object[1]`.
+        let table = table.split('[').next().unwrap_or(table);
+        let declared = keys.iter().find(|key| key.table == table && key.name == name);
+        declared.is_some_and(|key| key.scope(stage) == Some(First))
+    };
+    let own = settings.iter().filter(|(path, _)| is_first(path));
+    own.map(|(path, value)| (path.clone(), value.clone())).collect()
 }
 
 #[cfg(test)]

@@ -31,12 +31,17 @@ impl std::str::FromStr for Override {
 
 impl Override {
     /// As it was typed.
-    pub(super) fn text(&self) -> &str {
+    pub(in crate::scene) fn text(&self) -> &str {
         &self.text
     }
 
     /// Puts the value into a document; `position` is its position for messages.
-    pub(super) fn apply<'i>(&'i self, root: &mut DeTable<'i>, position: usize, path: &Path) -> Result<()> {
+    pub(in crate::scene) fn apply<'i>(
+        &'i self,
+        root: &mut DeTable<'i>,
+        position: usize,
+        path: &Path,
+    ) -> Result<()> {
         // What is not TOML is taken as text: names of files and choices need no quotes.
         let value = match DeValue::parse(&self.value) {
             Ok(value) => moved(value.into_inner(), position),

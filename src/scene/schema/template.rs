@@ -2,29 +2,17 @@
 
 use super::key::{Example, Fallback, Key, Kind, heading, is_many};
 use super::keys::{self, tables};
-use super::resolved::line;
+
 use super::toml_table::with_value;
 use super::values::any_of;
-use crate::scene::System;
 use std::fmt::Write;
 
-/// A commented starter scene: every key of a system; optional ones are commented out.
-pub fn template(system: System) -> String {
-    template_of(system, keys::of(system))
-}
-
-/// A table of a system's keys in Markdown: type, unit, range, default and meaning.
-pub fn reference(system: System) -> String {
-    reference_of(keys::of(system))
-}
-
-pub(super) fn template_of(system: System, keys: &[Key]) -> String {
+pub fn template_of([title, name]: [&str; 2], keys: &[Key]) -> String {
     let mut out = format!(
         "# {}: `frazil check shot.toml`, then `frazil {} shot.toml -o cache/`.\n\
          # SI units, Y up, degrees where a key ends in _deg; paths are relative to this file.\n\
          # Lines that begin with # show defaults, or examples; uncomment them to change a value.\n",
-        system.title(),
-        system.name(),
+        title, name,
     );
     for table in tables(keys) {
         let keys_of = || keys.iter().filter(|key| key.table == table);
@@ -76,7 +64,7 @@ fn cells(key: &Key) -> String {
     }
 }
 
-pub(super) fn reference_of(keys: &[Key]) -> String {
+pub fn reference_of(keys: &[Key]) -> String {
     let mut out = String::new();
     for table in tables(keys) {
         let many = if is_many(table) { ", as many as there are" } else { "" };
@@ -138,4 +126,9 @@ fn short(bound: f64) -> String {
 /// A number with five digits, for people to read.
 pub(in crate::scene) fn rounded(number: f64) -> f64 {
     format!("{number:.4e}").parse().unwrap_or(number)
+}
+
+/// An assignment followed by its meaning as a comment.
+pub(in crate::scene) fn line(assignment: &str, meaning: &str) -> String {
+    format!("{assignment:<32} # {meaning}\n")
 }

@@ -94,12 +94,12 @@ pub fn path(key: &Key, object: Option<usize>) -> String {
 
 impl Values {
     /// No values yet, for these keys.
-    pub(super) fn new(keys: &'static [Key]) -> Self {
+    pub(in crate::scene) fn new(keys: &'static [Key]) -> Self {
         Self { keys, values: BTreeMap::new() }
     }
 
     /// The declared keys.
-    pub(super) fn keys(&self) -> &'static [Key] {
+    pub(in crate::scene) fn keys(&self) -> &'static [Key] {
         self.keys
     }
 
@@ -107,7 +107,7 @@ impl Values {
     ///
     /// # Errors
     /// A key that is missing, a wrong type or a value out of range, with file and line.
-    pub(super) fn read(&mut self, name: &str, object: Option<usize>, table: &Table) -> Result<()> {
+    pub(in crate::scene) fn read(&mut self, name: &str, object: Option<usize>, table: &Table) -> Result<()> {
         for (position, key) in self.keys.iter().enumerate().filter(|(_, key)| key.table == name) {
             let allowed = !key.of_characters || self.path_of(object, name, "file").is_some_and(is_gltf);
             if !allowed && table.has(key.name) {
@@ -208,7 +208,7 @@ impl Values {
     }
 
     /// Every file that is named.
-    pub(super) fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+    pub(in crate::scene) fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         self.values.values_mut().filter_map(|value| match value {
             Value::File(path) => Some(path),
             _ => None,

@@ -358,7 +358,7 @@ const ROLES: &[Role] = &[];
 
 #[cfg(test)]
 mod tests {
-    use super::super::schema::{keys, template};
+    use super::super::systems::keys::{self, template};
     use super::*;
     use crate::scene::{Scene, System};
     use crate::shallow::Thickening;

@@ -18,12 +18,12 @@ use crate::io::records::manifest::Keeps;
 use crate::io::usd::materials::Look;
 use crate::io::usd::primvars;
 use crate::io::{mesh, usd};
+use crate::scene::Scene;
+use crate::scene::run::settings::{first_of, settings_of};
 use crate::scene::run::{
     CONTENT, Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Report, Settings, Stage, Stepped, Stepping,
     Stored, To, Volume,
 };
-use crate::scene::schema::keys::{first_of, settings_of};
-use crate::scene::{Scene, System};
 use crate::shallow;
 use crate::shallow::remap::Moved;
 use liquid_mesh::{Drawn, Mesher};
@@ -190,7 +190,7 @@ impl Stage for Liquid<'_> {
     }
 
     fn of_first_state(&self, settings: &Settings) -> Settings {
-        first_of(System::Shallow, settings, NAME)
+        first_of(self.scene.values.keys(), settings, NAME)
     }
 
     fn reads(&self, frame: i32) -> Reads {

@@ -93,7 +93,7 @@ impl Stage for Base<'_> {
     }
 
     fn of_first_state(&self, settings: &Settings) -> Settings {
-        settings::of_layer(settings)
+        settings::of_layer(self.scene.values.keys(), settings)
     }
 
     fn reads(&self, frame: i32) -> Reads {

@@ -13,16 +13,16 @@ use crate::geometry::{Points, TriMesh};
 use crate::io::particles::ply;
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::points;
+use crate::scene::run::settings::{first_of, settings_of};
 use crate::scene::run::{
     Clip, FrameFiles, Kind, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
 };
 use crate::scene::schema::key::OBJECT;
-use crate::scene::schema::keys::{first_of, settings_of};
 use crate::scene::snow::estimate::grains::Forecast;
 use crate::scene::snow::grain_params::params;
 use crate::scene::snow::initial_grains;
 use crate::scene::snow::inputs::Inputs;
-use crate::scene::{self, Role, Scene, System, moving};
+use crate::scene::{self, Role, Scene, moving};
 use crate::snow::base_layer::Grids;
 use crate::snow::grains::{self, Base, Ground, Object, StepReport, Surroundings};
 use crate::sweep::Body;
@@ -219,7 +219,7 @@ impl Stage for Grains<'_> {
     }
 
     fn of_first_state(&self, settings: &Settings) -> Settings {
-        first_of(System::Snow, settings, "grains")
+        first_of(self.scene.values.keys(), settings, "grains")
     }
 
     fn upstream(&self) -> &'static [&'static str] {

@@ -12,14 +12,14 @@ use crate::geometry::{DVec3, Points, TriMesh};
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::{Field, Holds};
 use crate::motion::{Keys, Rigid};
+use crate::scene::run::settings::{first_of, settings_of};
 use crate::scene::run::{
     FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
-use crate::scene::schema::keys::{first_of, settings_of};
 use crate::scene::snow::inputs::Inputs;
 use crate::scene::snow::keys::mist::mist_params;
 use crate::scene::snow::wind::wind_file;
-use crate::scene::{Role, Scene, System, moving};
+use crate::scene::{Role, Scene, moving};
 use crate::snow::base_layer;
 use crate::snow::mist::{self, Around, Grids, Params, Source, Start, StepReport, Surroundings, Wind};
 use crate::sweep::Body;
@@ -252,7 +252,7 @@ impl Stage for Mist<'_> {
     }
 
     fn of_first_state(&self, settings: &Settings) -> Settings {
-        first_of(System::Snow, settings, NAME)
+        first_of(self.scene.values.keys(), settings, NAME)
     }
 
     fn upstream(&self) -> &'static [&'static str] {

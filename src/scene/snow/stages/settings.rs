@@ -3,10 +3,9 @@
 use crate::error::Result;
 use crate::io::records::input_hashes::Seen;
 use crate::scene::run::Settings;
+use crate::scene::run::settings::settings_of;
 use crate::scene::schema::key::{Key, Scope};
-use crate::scene::schema::keys;
-use crate::scene::schema::keys::settings_of;
-use crate::scene::{Layer, Role, Scene, System, run};
+use crate::scene::{Layer, Role, Scene, run};
 
 /// The settings that the base depends on. Of the frames only the first counts: a shot may be extended.
 ///
@@ -26,8 +25,8 @@ pub(in crate::scene::snow) fn of_base(scene: &Scene, seen: &Seen) -> Result<Sett
 
 /// The settings that determine the layer before the first frame: stored frames cannot continue another layer. Static objects are numbered
 /// separately, as other objects may be added or removed.
-pub(in crate::scene::snow) fn of_layer(all: &Settings) -> Settings {
-    let is_first = |key: &str| declared(key).is_some_and(|key| key.scope("base") == Some(Scope::First));
+pub(in crate::scene::snow) fn of_layer(keys: &[Key], all: &Settings) -> Settings {
+    let is_first = |key: &str| declared(keys, key).is_some_and(|key| key.scope("base") == Some(Scope::First));
     let of_snow = all.iter().filter(|(key, _)| is_first(key));
     let mut out: Settings = of_snow.map(|(key, value)| (key.clone(), value.clone())).collect();
     let index = |key: &str| key.strip_prefix("object[")?.strip_suffix("].role")?.parse::<usize>().ok();
@@ -50,15 +49,17 @@ pub(in crate::scene::snow) fn of_layer(all: &Settings) -> Settings {
 }
 
 /// The key that a path in settings names: `snow.noise.size`, `object[1].scale`.
-fn declared(path: &str) -> Option<&'static Key> {
+fn declared<'a>(keys: &'a [Key], path: &str) -> Option<&'a Key> {
     let (table, name) = path.rsplit_once('.')?;
     let table = table.split('[').next().unwrap_or(table);
-    keys::of(System::Snow).iter().find(|key| key.table == table && key.name == name)
+    keys.iter().find(|key| key.table == table && key.name == name)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::System;
+    use crate::scene::systems::keys;
     use run::changed;
 
     fn settings(all: &[(&str, &str)]) -> Settings {
@@ -68,9 +69,16 @@ mod tests {
     #[test]
     fn static_objects_make_the_layer_wherever_they_stand() {
         const ROLES: [(&str, &str); 2] = [("object[1].role", "\"static\""), ("object[3].role", "\"static\"")];
-        let rock = |scale| of_layer(&settings(&[ROLES[0], ("object[1].scale", scale)]));
-        let later = of_layer(&settings(&[("object[2].scale", "3.0"), ROLES[1], ("object[3].scale", "1.0")]));
-        let none = of_layer(&settings(&[("object[1].scale", "3.0"), ("object[1].role", "\"collide\"")]));
+        let rock =
+            |scale| of_layer(keys::of(System::Snow), &settings(&[ROLES[0], ("object[1].scale", scale)]));
+        let later = of_layer(
+            keys::of(System::Snow),
+            &settings(&[("object[2].scale", "3.0"), ROLES[1], ("object[3].scale", "1.0")]),
+        );
+        let none = of_layer(
+            keys::of(System::Snow),
+            &settings(&[("object[1].scale", "3.0"), ("object[1].role", "\"collide\"")]),
+        );
         assert_eq!(changed(&rock("1.0"), &later), Vec::<String>::new());
         assert_eq!(changed(&rock("1.0"), &rock("2.0")), ["static object 1: scale was 1.0"]);
         assert_eq!(changed(&rock("1.0"), &none), ["static object 1: scale was 1.0"]);
@@ -80,6 +88,6 @@ mod tests {
     #[test]
     fn only_what_makes_the_layer_is_of_the_layer() {
         let all = settings(&[("snow.depth", "0.3"), ("snow.min_crumb", "0"), ("output.half", "true")]);
-        assert_eq!(of_layer(&all).into_keys().collect::<Vec<_>>(), ["snow.depth"]);
+        assert_eq!(of_layer(keys::of(System::Snow), &all).into_keys().collect::<Vec<_>>(), ["snow.depth"]);
     }
 }

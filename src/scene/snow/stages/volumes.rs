@@ -11,10 +11,10 @@ use crate::geometry::{DVec3, Points, TriMesh};
 use crate::io::mesh;
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::{self, Field, Holds};
+use crate::scene::run::settings::settings_of;
 use crate::scene::run::{
     Clip, FrameFiles, Kind, Prims, Report, Settings, Stage, Stepped, Stepping, Stored, To, Volume,
 };
-use crate::scene::schema::keys::settings_of;
 use crate::scene::snow::Inputs;
 use crate::scene::snow::estimate::memory;
 use crate::scene::snow::grain_params::params;

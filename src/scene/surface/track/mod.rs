@@ -21,11 +21,11 @@ use crate::io::usd::materials::Look;
 use crate::io::usd::primvars;
 use crate::io::{mesh, usd};
 use crate::mesh_repair::Traced;
+use crate::scene::Scene;
+use crate::scene::run::settings::{first_of, settings_of};
 use crate::scene::run::{
     CONTENT, Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Settings, Stage, Stepped, Stepping, Stored, To,
 };
-use crate::scene::schema::keys::{first_of, settings_of};
-use crate::scene::{Scene, System};
 use tracked_shot::{At, Walk, reads};
 
 /// Name of the stage, and of the kind of its files.
@@ -145,7 +145,7 @@ impl Stage for Track<'_> {
     }
 
     fn of_first_state(&self, settings: &Settings) -> Settings {
-        first_of(System::Surface, settings, NAME)
+        first_of(self.scene.values.keys(), settings, NAME)
     }
 
     fn reads(&self, frame: i32) -> Reads {

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use toml::de::DeTable;
 
-use super::key::{Fallback, Key, heading, is_many};
-use super::keys::{self, tables};
-use super::overrides::Override;
-use super::toml_table::{Document, Table};
-use super::values::Values;
 use crate::error::{Error, Result};
+use crate::scene::schema::key::{Fallback, Key, heading, is_many};
+use crate::scene::schema::keys;
+use crate::scene::schema::keys::tables;
+use crate::scene::schema::overrides::Override;
+use crate::scene::schema::toml_table::{Document, Table};
+use crate::scene::schema::values::Values;
 use crate::scene::{Object, Output, Scene, Shallow, Shot, Snow, Surface, System, snow};
 
 impl Scene {
@@ -36,11 +37,11 @@ impl Scene {
     /// # Errors
     /// As [`Scene::read`].
     pub fn parse(text: &str, path: &Path, overrides: &[Override]) -> Result<Self> {
-        Self::parse_keys(text, path, overrides, keys::of)
+        Self::parse_keys(text, path, overrides, super::keys::of)
     }
 
     /// The same with another list of keys.
-    pub(super) fn parse_keys(
+    pub(in crate::scene) fn parse_keys(
         text: &str,
         path: &Path,
         overrides: &[Override],

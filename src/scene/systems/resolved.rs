@@ -1,9 +1,10 @@
 //! Writes a scene with every default filled in and commented: the file next to the output that reproduces it.
 
-use super::key::{Key, heading, is_many};
-use super::keys::tables;
-use super::values::{Value, pose};
 use crate::scene::Scene;
+use crate::scene::schema::key::{Key, heading, is_many};
+use crate::scene::schema::keys::tables;
+use crate::scene::schema::template::line;
+use crate::scene::schema::values::{Value, pose};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -65,11 +66,6 @@ fn lines(key: &Key, value: &Value) -> String {
         }
         value => line(&format!("{} = {value}", key.name), key.meaning),
     }
-}
-
-/// An assignment followed by its meaning as a comment.
-pub(super) fn line(assignment: &str, meaning: &str) -> String {
-    format!("{assignment:<32} # {meaning}\n")
 }
 
 /// A file's path relative to a folder, if both lie in `home`; folder and home must be free of links.

@@ -1,13 +1,13 @@
 //! Typed data shared by all systems, from the values of a scene: the shot, the objects, the output.
 
-use super::toml_table::Table;
-use super::values::{Value, Values};
 use crate::error::Result;
 use crate::motion::{Space, Up};
+use crate::scene::schema::toml_table::Table;
+use crate::scene::schema::values::{Value, Values};
 use crate::scene::{BaseMode, Frames, Object, Output, Role, Shot, VolumesOutput, snow};
 
 impl Shot {
-    pub(super) fn of(values: &Values) -> Self {
+    pub(in crate::scene) fn of(values: &Values) -> Self {
         let frames = match values.get("shot.frames") {
             Some(Value::Frames(frames)) => *frames,
             _ => Frames { first: 0, last: 0 },
@@ -18,7 +18,7 @@ impl Shot {
 
 impl Object {
     /// The objects of a scene, in the file's order.
-    pub(super) fn all_of(values: &Values) -> Vec<Self> {
+    pub(in crate::scene) fn all_of(values: &Values) -> Vec<Self> {
         let is_there = |index: &usize| values.of_object(*index, "file").is_some();
         (0..).take_while(is_there).map(|index| Self::of(values, index)).collect()
     }
@@ -54,7 +54,7 @@ impl Object {
 }
 
 impl Output {
-    pub(super) fn of(values: &Values) -> Self {
+    pub(in crate::scene) fn of(values: &Values) -> Self {
         let holds = |name: &str, text: &str| values.get(name).is_some_and(|value| value.holds(text));
         let flag = |name: &str| values.get(name).and_then(Value::flag).unwrap_or(false);
         let mode = values.get("output.base_mode").and_then(Value::text);
@@ -86,7 +86,7 @@ impl Output {
     ///
     /// # Errors
     /// 16-bit values where changes are stored, which must be exact.
-    pub(super) fn check(table: &Table, values: &Values) -> Result<()> {
+    pub(in crate::scene) fn check(table: &Table, values: &Values) -> Result<()> {
         let output = Self::of(values);
         if snow::has_grains(values) && (output.half || !output.base) {
             let key = if output.half { "half" } else { "base" };
