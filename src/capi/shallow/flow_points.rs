@@ -65,6 +65,7 @@ pub struct frz_shallow_flow {
     pub opening: f64,
 }
 
+// SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_flow {
     const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_flow";

@@ -8,8 +8,6 @@ use crate::capi::ffi::handle::{change, read};
 use crate::capi::ffi::views::{Sized32, fill, frz_view};
 use crate::shallow::Balance;
 
-// SAFETY: numbers.
-
 /// Sets sources, drains and absorbers, replacing those before; what those have moved remains in frz_shallow_balance. An absorber that is
 /// set again is dry. The next frame may allocate.
 ///

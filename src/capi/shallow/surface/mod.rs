@@ -159,10 +159,12 @@ pub(in crate::capi) fn check_buffers(buffers: &[Buffer<'_>], index_bits: u32) ->
 /// As of the span's other buffers: memory that can be written and that nothing else uses, for `'a`.
 pub(in crate::capi) unsafe fn indices_in<'a>(span: &frz_span, index_bits: u32) -> Outcome<Indices<'a>> {
     // SAFETY: guaranteed by the caller.
-    Ok(match index_bits {
-        16 => unsafe { span.numbers("indices", 1) }?.map_or(Indices::None, Indices::U16),
-        _ => unsafe { span.numbers("indices", 1) }?.map_or(Indices::None, Indices::U32),
-    })
+    unsafe {
+        Ok(match index_bits {
+            16 => span.numbers("indices", 1)?.map_or(Indices::None, Indices::U16),
+            _ => span.numbers("indices", 1)?.map_or(Indices::None, Indices::U32),
+        })
+    }
 }
 
 /// Refuses buffers that are too small.
