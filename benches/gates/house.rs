@@ -11,8 +11,12 @@ pub fn run(h: &mut Harness) {
         h.holds("house.stages", tests > 1, &format!("{tests} tests of three stages on one frame loop"));
     }
     if h.wants("house.key") {
-        let tests = passed(&["--lib", "scene::text::tests::"]);
+        let tests = passed(&["--lib", "scene::systems::tests::"]);
         h.holds("house.key", tests > 1, &format!("{tests} tests of a key that is declared in one place"));
+    }
+    if h.wants("house.circles") {
+        let tests = passed(&["--test", "testsuite", "house::circles::"]);
+        h.holds("house.circles", tests > 1, "no file needs, by way of others, a file that needs it");
     }
     if h.wants("house.bare_cli") {
         let tool = Command::new("tools/bare-cli").current_dir(env!("CARGO_MANIFEST_DIR")).output();

@@ -224,6 +224,7 @@ pub const GATES: &[Gate] = &[
     // The rules of CONTRIBUTING.md that tests and tools hold.
     yes("house.stages"),
     yes("house.key"),
+    yes("house.circles"),
     yes("house.bare_cli"),
     // The thesis' table 3.1: whole frames with writing, and the greatest memory of a stage.
     gate("snow.shot.table_3_8a", "s", Most(3.0), Most(1.2)),

@@ -3,7 +3,7 @@
 use frazil::Context;
 use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::{Pace, Section};
+use frazil::shallow::params::{Section, TimeStepping};
 use frazil::shallow::pipes::Border;
 use frazil::shallow::surface::heights::minimum_heights::{Distance, Lifts};
 use frazil::shallow::surface::rim::ledges::Ledges;
@@ -55,7 +55,8 @@ pub fn tables() {
 
 fn example(&(name, edge, floors, step, cell, viscosity, [longest, mean]): &Example) {
     let solids = terrain(edge, floors, cell);
-    let params = Params { liquid: Liquid::new(viscosity), pace: Pace::Realtime(step), ..Params::default() };
+    let params =
+        Params { liquid: Liquid::new(viscosity), pace: TimeStepping::Realtime(step), ..Params::default() };
     let mut all = covered(&context(), &solids, params.clone(), |[x, z], _| {
         1e-3 + 1e-4 * waves([2.0 * z, 2.0 * x], cell)
     });
@@ -123,8 +124,13 @@ fn longest_stable(edge: usize, section: Section, bound: f64) -> f64 {
 fn is_stable(edge: usize, section: Section, step: f64) -> bool {
     let (ctx, cell) = (context(), EDGE / edge as f64);
     let solids = ground([edge; 2], cell, [-0.01, 0.1], |_| 0.0);
-    let params =
-        Params { liquid: Liquid::new(0.0), kept: 1.0, pace: Pace::Exact, section, ..Params::default() };
+    let params = Params {
+        liquid: Liquid::new(0.0),
+        kept: 1.0,
+        pace: TimeStepping::Exact,
+        section,
+        ..Params::default()
+    };
     let mut liquid = rippled(&ctx, &solids, params);
     liquid.replay(&ctx, &vec![step; 500]).expect("steps");
     let unit = solids.heights.unit;
@@ -152,7 +158,7 @@ fn scaling() {
     for edge in [50, 100, 150, 200, 250, 300, 400, 600, 1000] {
         let cell = 0.0005;
         let solids = terrain(edge, 1, cell);
-        let params = Params { pace: Pace::Realtime(0.003), ..Params::default() };
+        let params = Params { pace: TimeStepping::Realtime(0.003), ..Params::default() };
         let mut liquid = covered(&context(), &solids, params, |_, _| 1e-3);
         let frames = Frames::timed(&mut liquid, if edge > 300 { 3 } else { 20 }, |_| ());
         let (mean, columns) = (frames.milliseconds(), liquid.columns().count());
@@ -172,9 +178,11 @@ fn films() {
         "Blood, 1 ml/s for 3 s on an incline of 35 % of 200 x 200 cells of 0.5 mm, which it runs off: by the steps.",
         "steps | steps a frame | deepest on the lower half at the end (mm) | on the incline at the end (ml) | a frame (ms) | rows held back a frame",
     );
-    for (name, pace) in
-        [("exact", Pace::Exact), ("1 ms", Pace::Realtime(1e-3)), ("3 ms", Pace::Realtime(3e-3))]
-    {
+    for (name, pace) in [
+        ("exact", TimeStepping::Exact),
+        ("1 ms", TimeStepping::Realtime(1e-3)),
+        ("3 ms", TimeStepping::Realtime(3e-3)),
+    ] {
         let (cell, edge) = (0.0005, 200);
         let solids = ground([edge; 2], cell, [-0.05, 0.1], |[x, _]| 0.03 - SLOPE * x);
         let params = Params { liquid: Liquid::BLOOD, pace, border: Border::Absorbing, ..Params::default() };

@@ -77,9 +77,9 @@ fn character(path: &Path, origin: &Origin) -> frazil::Result<Vec<Value>> {
     let bounds = rest.bounds().map(|(low, high)| (<[f32; 3]>::from(low), <[f32; 3]>::from(high)));
     let (mut clips, mut gaits) = (Map::new(), Map::new());
     for (name, seconds) in contents.clips {
-        let told = clip_gait(path, &name, seconds)?;
+        let gait = clip_gait(path, &name, seconds)?;
         clips.insert(name.clone(), json!(seconds));
-        gaits.insert(name, told);
+        gaits.insert(name, gait);
     }
     let mut entry = json!({
         "type": "character",
@@ -138,7 +138,7 @@ fn lines(entry: &Value) -> String {
     let mut text = format!("{}\n", entry["file"].as_str().unwrap_or_default());
     for part in entry["holds"].as_array().into_iter().flatten() {
         for (key, value) in part.as_object().into_iter().flatten() {
-            text += &told(key, value, part);
+            text += &row_of(key, value, part);
         }
         text += "\n";
     }
@@ -146,7 +146,7 @@ fn lines(entry: &Value) -> String {
 }
 
 /// One entry as text; clips and trees in one line each.
-fn told(key: &str, value: &Value, part: &Value) -> String {
+fn row_of(key: &str, value: &Value, part: &Value) -> String {
     let line = |name: &str, text: &str| format!("  {name:<22} {text}\n");
     let rows = |rows: Vec<String>| -> String {
         rows.iter().enumerate().map(|(row, text)| line(if row == 0 { key } else { "" }, text)).collect()

@@ -8,7 +8,7 @@ use frazil::io::files::atomic;
 use frazil::io::files::sequence::Pattern;
 use frazil::io::mesh::extension;
 use frazil::io::particles::ply;
-use frazil::io::particles::{self, Cloud};
+use frazil::io::particles::{self, ParticleData};
 use frazil::io::usd::points;
 use frazil::motion::Space;
 use frazil::scene::{FrameChoice, Frames};
@@ -165,7 +165,7 @@ impl Conversion<'_> {
                     // Bit for bit, which regrouping into voxels need not be.
                     return Ok(Read { points, has_voxels: true });
                 }
-                Cloud::from(points)
+                ParticleData::from(points)
             }
             _ => particles::read(path)?,
         };

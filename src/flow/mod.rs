@@ -33,7 +33,7 @@ pub use crate::flow::advection::scheme::Scheme;
 pub use advection::paths::FARTHEST;
 pub use pressure::Solved;
 pub use solids::{Faces, Solids};
-pub use state::Kept;
+pub use state::FlowState;
 pub use tiles::{Coord, Field, Tile, Tiles};
 
 use rayon::prelude::*;

@@ -10,12 +10,12 @@ use crate::numeric::bytes::{Reader, Writer};
 
 /// What a flow carries from step to step.
 #[derive(Debug, Default)]
-pub struct Kept {
+pub struct FlowState {
     tiles: Tiles,
     velocity: [Field; 3],
     density: Field,
     pressure: Field,
-    around: Option<Box<Kept>>,
+    around: Option<Box<FlowState>>,
 }
 
 /// Maximum absolute coordinate of a tile.
@@ -23,7 +23,7 @@ const OUTERMOST: i32 = 1 << 26;
 /// Bytes of a tile of one field.
 const TILE: usize = 4 * 512;
 
-impl Kept {
+impl FlowState {
     /// Copies the persistent state of a flow. Reuses its own memory.
     pub fn become_of(&mut self, flow: &Flow) {
         self.tiles.clone_from(&flow.tiles);
@@ -59,7 +59,7 @@ impl Flow {
     }
 
     /// Restores this flow from `kept`, whose contents are then meaningless; only its memory can be reused.
-    pub fn put_back(&mut self, kept: &mut Kept) {
+    pub fn put_back(&mut self, kept: &mut FlowState) {
         std::mem::swap(&mut self.tiles, &mut kept.tiles);
         std::mem::swap(&mut self.velocity, &mut kept.velocity);
         std::mem::swap(&mut self.density, &mut kept.density);
@@ -90,7 +90,7 @@ impl Flow {
         Ok(())
     }
 
-    fn read(&self, from: &mut Reader<'_>) -> Result<Kept> {
+    fn read(&self, from: &mut Reader<'_>) -> Result<FlowState> {
         let count = from.count(12)?;
         let coords: Vec<Coord> = (0..count).map(|_| from.i32s()).collect::<Result<_>>()?;
         if !coords.is_sorted_by(|a, b| a < b)
@@ -111,6 +111,6 @@ impl Flow {
             Some(around) => Some(Box::new(around.read(from)?)),
             None => None,
         };
-        Ok(Kept { tiles, velocity, density, pressure, around })
+        Ok(FlowState { tiles, velocity, density, pressure, around })
     }
 }

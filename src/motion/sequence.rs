@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::geometry::{DVec3, PolygonMesh, Vec3};
 use crate::io::files::sequence::Pattern;
 use crate::io::mesh;
-use crate::io::records::input_hashes::Seen;
+use crate::io::records::input_hashes::InputHashes;
 
 /// Frames kept in memory: the two around the current time.
 const KEPT: usize = 2;
@@ -27,7 +27,7 @@ pub struct MeshSequence {
     faces: Faces,
     first_path: PathBuf,
     /// Contents of the files when they were read.
-    seen: Arc<Seen>,
+    seen: Arc<InputHashes>,
     /// Subtracted from positions as they are read (the files' unit).
     origin: DVec3,
     /// Whether the frame after the last exists and can be read: the velocities ahead at the last frame need it.
@@ -55,7 +55,7 @@ impl MeshSequence {
         last: i32,
         fps: f64,
         offset: f64,
-        seen: Arc<Seen>,
+        seen: Arc<InputHashes>,
         origin: DVec3,
     ) -> Result<Self> {
         if let Some(missing) = (first..=last).map(|frame| pattern.path(frame)).find(|path| !path.is_file()) {

@@ -2,7 +2,7 @@
 
 use crate::geometry::DVec3;
 use crate::geometry::points::Values;
-use crate::io::particles::Cloud;
+use crate::io::particles::ParticleData;
 
 /// The upward axis of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,7 +55,7 @@ impl Space {
 
     /// Converts points of the file to metres, Y up: positions, voxels, the vectors `v`, `vel`, `velocity` and `rest`, and the radius
     /// `pscale`. Other attributes stay as they are.
-    pub fn bring(&self, cloud: &mut Cloud) {
+    pub fn bring(&self, cloud: &mut ParticleData) {
         if *self == Self::OWN {
             return;
         }

@@ -1,4 +1,4 @@
-//! Scene files (TOML): they describe a shot, are read with every default filled in ([`Scene::read`], `schema/`), checked against their
+//! Scene files (TOML): they describe a shot, are read with every default filled in ([`Scene::read`], `schema/`, `systems/`), checked against their
 //! inputs and run frame by frame.
 //!
 //! [`run`] runs any stage; [`snow`], [`surface`] and [`shallow`] have the inputs, the check and the stages of a system; the stage `objects`

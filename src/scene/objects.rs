@@ -9,7 +9,7 @@ use super::{Role, Scene, moving};
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::{DVec3, TriMesh, Uvs, Vec3};
-use crate::io::records::input_hashes::Seen;
+use crate::io::records::input_hashes::InputHashes;
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::materials::Look;
 use crate::io::{mesh, usd};
@@ -21,7 +21,7 @@ use crate::sweep::Body;
 pub struct Objects<'a> {
     scene: &'a Scene,
     bodies: &'a [Body],
-    seen: &'a Arc<Seen>,
+    seen: &'a Arc<InputHashes>,
     names: Vec<String>,
 }
 
@@ -33,7 +33,7 @@ pub struct Poses {
 
 impl<'a> Objects<'a> {
     /// The objects of a scene; `bodies` are in its order.
-    pub fn new(scene: &'a Scene, bodies: &'a [Body], seen: &'a Arc<Seen>) -> Self {
+    pub fn new(scene: &'a Scene, bodies: &'a [Body], seen: &'a Arc<InputHashes>) -> Self {
         Self { scene, bodies, seen, names: moving::prim_names(scene) }
     }
 

@@ -7,7 +7,7 @@
 use std::sync::atomic::AtomicBool;
 
 use super::clock::Clock;
-use super::params::Pace;
+use super::params::TimeStepping;
 use super::solver::rows::bands::attended;
 use super::solver::stop::Stop;
 use super::system::{Report, Shallow};
@@ -135,8 +135,8 @@ impl Shallow {
     pub(super) fn may_take_long(&mut self, dt: f64, count: Option<usize>) -> bool {
         let steps = match (count, self.params.pace) {
             // Given steps may be so long that columns fill up during the frame; the number of exact steps is only known at the end.
-            (Some(_), _) | (None, Pace::Exact) => return true,
-            (None, Pace::Realtime(longest)) => (dt / longest).max(1.0),
+            (Some(_), _) | (None, TimeStepping::Exact) => return true,
+            (None, TimeStepping::Realtime(longest)) => (dt / longest).max(1.0),
         };
         let [wet, full] = self.flow.work(&self.columns).map(|count| count as f64);
         steps * (EACH + wet + FULL * full) > LONG

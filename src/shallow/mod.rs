@@ -10,14 +10,14 @@
 //! | strip | 16 adjacent columns of one layer along x: the unit of SIMD loads |
 //! | pipe | joins columns of adjacent cells; *regular* pipes join columns of one layer; *links* are all others, and also lead out of the domain |
 //! | donor, receiver | the columns that liquid leaves and enters through a pipe |
-//! | cliff, overflow edge | a drop where liquid may fall freely; a link that it falls from in a step (`Lips` in the code) |
+//! | cliff, overflow edge | a drop where liquid may fall freely; a link that it falls from in a step |
 //! | flux | volume per time through a pipe |
 //! | transfer | what a flux moves in a step, in whole units; its *remainder* waits for the next step |
 //! | unit | the resolution of heights and depths; these are integers, so that liquid is neither lost nor created |
 //! | amount | how much of a scalar a column holds; also an integer |
 //! | head | the height to which a column's liquid would rise: its surface or, if it is full to its ceiling, the equivalent of its pressure |
 //! | rest, active | strips in which no step changes anything are skipped; all others are active |
-//! | packet, rivulet | a parcel of liquid in the air; nearby overflow edges whose packets fall as one stream (`Threads` in the code) |
+//! | packet, rivulet | a parcel of liquid in the air; nearby overflow edges whose packets fall as one stream |
 //! | near | the box of fine cells in a liquid with cells of two sizes (`two_level/`) |
 //!
 //! For the terms of the surface see `surface/mod.rs`.

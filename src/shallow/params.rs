@@ -15,7 +15,7 @@ pub struct Params {
     /// omega: the share of a flux that is kept in a second, 0 to 1. Default: 0.5 (thesis 4.1.1). At 1 only viscosity dissipates.
     pub kept: f64,
     /// How a frame is divided into steps.
-    pub pace: Pace,
+    pub pace: TimeStepping,
     /// What lies beyond the border of the domain. Default: a wall. Fixed at creation.
     pub border: Border,
     /// The cross-section A of a pipe in Eq. 4.1.
@@ -35,7 +35,7 @@ pub struct Params {
 
 /// How a frame is divided into steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Pace {
+pub enum TimeStepping {
     /// As many steps as stability needs.
     Exact,
     /// Steps of at most this length (s): where liquid is too deep for them, its waves slow down. Films on slopes that would move more than
@@ -72,7 +72,7 @@ impl Default for Params {
             liquid: Liquid::BLOOD,
             gravity: [0.0, -9.81, 0.0],
             kept: 0.5,
-            pace: Pace::Realtime(0.003),
+            pace: TimeStepping::Realtime(0.003),
             border: Border::default(),
             section: Section::default(),
             friction: Friction::default(),
@@ -117,7 +117,7 @@ impl Params {
             }
         }
         match self.pace {
-            Pace::Realtime(longest) if !(1e-6..=1.0).contains(&longest) => {
+            TimeStepping::Realtime(longest) if !(1e-6..=1.0).contains(&longest) => {
                 Err(Error::argument(format!("a longest step of {longest} s is not within 0.000001 to 1")))
             }
             _ => Ok(()),

@@ -4,12 +4,12 @@ use super::columns::Columns;
 use super::columns::grid::BOTTOMLESS;
 use super::free_fall::Falling;
 use super::params::{Friction, Params, Section};
-use super::pipes::pipe_rules::{Apart, Rules};
+use super::pipes::pipe_rules::{ExcludedCells, Rules};
 use super::pipes::{Border, Pipes};
 use super::remap::Remap;
 use super::scalars::amounts::Account;
 use super::solver::Flow;
-use super::solver::overflow_edges::Lips;
+use super::solver::overflow_edges::OverflowEdges;
 use super::solver::stop::Stop;
 use super::solver::viscosity_by_scalar::Thick;
 use super::sources::{FlowPoint, Flows};
@@ -33,9 +33,9 @@ pub struct Shallow {
     pub(super) falls: Falling,
     pub(super) thick: Thick,
     /// Copy of the state at the beginning of a frame that may take long.
-    pub(super) kept: Kept,
+    pub(super) kept: SavedState,
     /// Cells that belong to another liquid.
-    pub(super) apart: Option<Apart>,
+    pub(super) apart: Option<ExcludedCells>,
     /// Units poured in, less those removed, other than by flow points.
     pub(super) poured: i64,
     /// Surface of the liquid at rest beyond an absorbing border (units), or BOTTOMLESS.
@@ -60,7 +60,7 @@ pub struct Report {
     /// Rows, summed over steps, in which columns would have received more than they had room for (K_max below 1).
     pub filled: u64,
     /// Rows, summed over steps, in which films on slopes were too fast for the step length and were limited
-    /// ([`Pace::Realtime`](super::params::Pace)).
+    /// ([`TimeStepping::Realtime`](super::params::Pace)).
     pub slowed: u64,
 }
 
@@ -103,7 +103,7 @@ impl Shallow {
         ctx: &Context,
         solids: &Solids,
         params: Params,
-        apart: Option<Apart>,
+        apart: Option<ExcludedCells>,
     ) -> Result<Self> {
         params.validate()?;
         solids.grid.validate()?;
@@ -122,13 +122,13 @@ impl Shallow {
             flow.walls.turn_on(&columns);
         }
         if falls.is_some() {
-            flow.lips = Lips::with_room(pipes.links.len());
+            flow.overflow_edges = OverflowEdges::with_room(pipes.links.len());
         }
         Ok(Self {
             remap: Remap::new(falls.map_or(0, |falls| falls.most)),
             falls: Falling::new(falls, pipes.links.len()),
             thick: Thick::none(),
-            kept: Kept::default(),
+            kept: SavedState::default(),
             apart,
             params,
             flow,
@@ -260,7 +260,7 @@ impl Shallow {
     /// One step of a length (s), counted in a report.
     pub(super) fn advance(&mut self, measures: &Measures, length: f64, report: &mut Report, stop: &Stop) {
         let step = time_step::step(&self.params, measures, length, self.flow.last);
-        self.find_lips();
+        self.find_overflow_edges();
         let [emptied, filled, slowed] = self.flow.step(&self.columns, &self.pipes, &step, length, stop);
         self.fall(length);
         self.flows.step(&self.columns, &mut self.flow, -self.params.gravity[1], self.time, length);
@@ -398,7 +398,7 @@ const WALLS: u64 = 108;
 
 /// The state at the beginning of a frame, and the steps of the frame before.
 #[derive(Debug, Default)]
-pub(in crate::shallow) struct Kept {
+pub(in crate::shallow) struct SavedState {
     pub state: Vec<u8>,
     pub steps: Vec<f64>,
 }

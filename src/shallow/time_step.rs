@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use super::columns::grid::TOP;
-use super::params::{Friction, Pace, Params, Section};
+use super::params::{Friction, Params, Section, TimeStepping};
 use super::solver::fast_films::FAST_WAVES;
 use super::solver::flux::{Step, Thinning};
 use super::solver::rest::Bounds;
@@ -81,11 +81,11 @@ const STEADY: f64 = 0.45;
 pub fn next(at: &Next) -> f64 {
     let halved = f64::from(1 << at.halvings);
     let longest = match at.params.pace {
-        Pace::Exact => {
+        TimeStepping::Exact => {
             let longest = longest(at.params, at.measures, at.deepest, at.left) / halved;
             if (STEADY * longest..=longest).contains(&at.last) { at.last } else { longest }
         }
-        Pace::Realtime(longest) => longest / halved,
+        TimeStepping::Realtime(longest) => longest / halved,
     };
     // Rounding of the time left must not add a step. Where nothing limits a step, it takes all the time left.
     at.left / (at.left / longest - 1e-9).ceil().max(1.0)
@@ -93,7 +93,7 @@ pub fn next(at: &Next) -> f64 {
 
 /// Maximum count of halvings of a step, which keep a disturbance in a fast film within a cell. Where they cannot, the film is limited.
 pub fn most_halvings(params: &Params) -> u32 {
-    if params.pace == Pace::Exact { 3 } else { 0 }
+    if params.pace == TimeStepping::Exact { 3 } else { 0 }
 }
 
 /// Maximum transfer of a pipe of a fast film in a step, as part of the donor's depth. A disturbance travels at three times the film's speed
@@ -147,8 +147,8 @@ pub fn step(params: &Params, measures: &Measures, dt: f64, last: f64) -> Step {
     let y = params.gravity[1];
     let section = match (params.section, params.pace) {
         (Section::Whole, _) => cell / unit,
-        (Section::Wetted, Pace::Exact) => f64::from(TOP),
-        (Section::Wetted, Pace::Realtime(_)) => deepest_section(params, measures, dt) / unit,
+        (Section::Wetted, TimeStepping::Exact) => f64::from(TOP),
+        (Section::Wetted, TimeStepping::Realtime(_)) => deepest_section(params, measures, dt) / unit,
     };
     Step {
         kept: (libm::pow(params.kept, dt) * dt / last) as f32,

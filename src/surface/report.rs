@@ -1,7 +1,7 @@
 //! Report of a tracker's step.
 
 use super::topology::change::Change;
-use super::topology::uncovered_parts::Apart;
+use super::topology::uncovered_parts::UncoveredPart;
 use crate::context::PhaseTime;
 
 /// Report of a step.
@@ -22,7 +22,7 @@ pub struct StepReport {
     /// Triangles of the particles' own surface.
     pub triangles: usize,
     /// Parts of that surface that the mesh does not cover, the largest first: drops and bubbles.
-    pub apart: Vec<Apart>,
+    pub apart: Vec<UncoveredPart>,
     /// Changes to the mesh where it was rebuilt or improved; none: vertices and triangles are as before.
     pub change: Option<Change>,
     /// A sentence that describes how ids, velocities and positions of the particles contradict each other.

@@ -30,8 +30,8 @@ impl Tracker {
         if self.is_rebuilt {
             to.count(self.triangles.len());
             self.triangles.as_flattened().iter().for_each(|corner| to.u32(*corner));
-            to.count(self.lasting.len());
-            to.f32s(&self.lasting);
+            to.count(self.detail_retention.len());
+            to.f32s(&self.detail_retention);
             to.count(self.sizes.len());
             to.f32s(self.sizes.as_flattened());
         } else {
@@ -74,14 +74,14 @@ impl Tracker {
         }
         let drift = drift(&mut from)?;
         let is_rebuilt = from.u32()? != 0;
-        let (mut triangles, mut lasting) = (mesh.triangles.clone(), Vec::new());
+        let (mut triangles, mut detail_retention) = (mesh.triangles.clone(), Vec::new());
         let (mut is_other, mut own) = (false, Vec::new());
         if is_rebuilt {
             let count = from.count(3 * 4)?;
             triangles =
                 (0..count).map(|_| Ok([from.u32()?, from.u32()?, from.u32()?])).collect::<Result<_>>()?;
             let count = from.count(4)?;
-            lasting = (0..count).map(|_| Ok(from.f32s::<1>()?[0])).collect::<Result<Vec<f32>>>()?;
+            detail_retention = (0..count).map(|_| Ok(from.f32s::<1>()?[0])).collect::<Result<Vec<f32>>>()?;
             let count = from.count(8)?;
             own = (0..count).map(|_| from.f32s::<2>()).collect::<Result<_>>()?;
         } else {
@@ -97,8 +97,8 @@ impl Tracker {
         if triangles.as_flattened().iter().any(|corner| *corner as usize >= count) {
             return wrong("has a triangle without a vertex".into());
         }
-        if !(lasting.is_empty() || lasting.len() == count)
-            || !lasting.iter().all(|share| (0.0..=1.0).contains(share))
+        if !(detail_retention.is_empty() || detail_retention.len() == count)
+            || !detail_retention.iter().all(|share| (0.0..=1.0).contains(share))
         {
             return wrong("has shares of detail that do not fit".into());
         }
@@ -134,7 +134,7 @@ impl Tracker {
             vertices,
             triangles,
             delta,
-            lasting,
+            detail_retention,
             flags,
             bare,
             reach,

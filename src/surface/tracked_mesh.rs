@@ -26,7 +26,7 @@ pub struct Tracker {
     /// Distance from the surface that each vertex keeps (m); NaN: it was too far from the surface to have one.
     pub(super) delta: Vec<f32>,
     /// Detail retention: share 0..=1 of each vertex' detail that never fades; empty: none.
-    pub(super) lasting: Vec<f32>,
+    pub(super) detail_retention: Vec<f32>,
     /// Vertices where the last step found a change.
     pub(super) flags: Vec<bool>,
     /// Vertices beside which the mesh has not covered the surface since the first frame: that is no change.
@@ -68,7 +68,7 @@ impl Tracker {
     ///
     /// # Errors
     /// A count other than that of the vertices; a share out of range, reported with its vertex, counted from 1.
-    pub fn set_lasting(&mut self, shares: Vec<f32>) -> Result<()> {
+    pub fn set_detail_retention(&mut self, shares: Vec<f32>) -> Result<()> {
         let count = self.vertices.len();
         if !shares.is_empty() && shares.len() != count {
             return Err(Error::argument(format!(
@@ -80,7 +80,7 @@ impl Tracker {
             let what = format!("detail of vertex {} is {}, not within 0 to 1", at + 1, shares[at]);
             return Err(Error::argument(what));
         }
-        self.lasting = shares;
+        self.detail_retention = shares;
         Ok(())
     }
 

@@ -18,8 +18,8 @@ use super::remesh::sizes;
 use super::report::StepReport;
 use super::topology::coverage::Cover;
 use super::topology::lost_vertices::gather;
-use super::topology::particle_count::Crowd;
-use super::topology::uncovered_parts::{Apart, Lacking, Parts, Wanted};
+use super::topology::particle_count::ParticleCountTest;
+use super::topology::uncovered_parts::{MissingParts, Parts, UncoveredPart, Wanted};
 use super::track::advect::{advect, validate_step};
 use super::track::ahead::Ahead;
 use super::track::deep_detail::{Deep, covers, sorted};
@@ -78,7 +78,7 @@ impl Tracker {
         }
         let vertices: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
         let flags = vec![false; vertices.len()];
-        let (delta, lasting, bare, reach) = (Vec::new(), Vec::new(), Vec::new(), REACH[0]);
+        let (delta, detail_retention, bare, reach) = (Vec::new(), Vec::new(), Vec::new(), REACH[0]);
         let triangles = mesh.triangles.clone();
         let is_rebuilt = false;
         let ahead = Ahead::default();
@@ -89,7 +89,7 @@ impl Tracker {
             vertices,
             triangles,
             delta,
-            lasting,
+            detail_retention,
             flags,
             bare,
             reach,
@@ -243,14 +243,14 @@ impl Tracker {
         let bubble = if self.params.every { spacing.powi(3) } else { f64::INFINITY };
         let lacking = match self.params.rebuild {
             true => parts.lacking(phi, surface, &Wanted { crowd: self.crowd(particles), bubble }),
-            false => Lacking::default(),
+            false => MissingParts::default(),
         };
         Ok(Covered { apart: parts.apart(phi, surface), bare, positions, reach: cover.reach(), lacking })
     }
 
     /// Particles at these positions, for the minimum count in each part of the mesh.
-    pub(super) fn crowd<'a>(&self, positions: &'a [DVec3]) -> Crowd<'a> {
-        Crowd { positions, spacing: self.params.spacing, least: self.params.min_drop.max(1) }
+    pub(super) fn crowd<'a>(&self, positions: &'a [DVec3]) -> ParticleCountTest<'a> {
+        ParticleCountTest { positions, spacing: self.params.spacing, least: self.params.min_drop.max(1) }
     }
 
     pub(super) fn carried(&self, ctx: &Context, paths: &Paths) -> Result<(Vec<DVec3>, usize)> {
@@ -347,14 +347,14 @@ pub(super) struct Next {
 
 /// What the mesh covers of the particles' surface, and what it does not.
 pub(super) struct Covered {
-    pub apart: Vec<Apart>,
+    pub apart: Vec<UncoveredPart>,
     /// Vertices beside uncovered positions, and these positions (cells).
     pub bare: Vec<bool>,
     pub positions: Vec<DVec3>,
     /// Maximum distance between such a vertex' foot and such a position (cells).
     pub reach: f64,
     /// Uncovered parts that it should cover.
-    pub lacking: Lacking,
+    pub lacking: MissingParts,
 }
 
 /// Result of projecting a vertex.

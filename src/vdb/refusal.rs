@@ -45,12 +45,12 @@ pub(super) fn error_of(what: &str) -> Error {
 pub(in crate::vdb) fn cannot_read(error: &cxx::Exception) -> String {
     let what = error.what();
     log::info!("OpenVDB: {}", crate::error::one_line(what));
-    let told = |words: &[&str]| words.iter().any(|word| what.contains(word));
+    let mentions = |words: &[&str]| words.iter().any(|word| what.contains(word));
     if is_of_memory(what) {
         "the .vdb file is damaged, or needs more memory than it may take".into()
-    } else if told(&["LookupError", "non-registered", "not registered", "unregistered"]) {
+    } else if mentions(&["LookupError", "non-registered", "not registered", "unregistered"]) {
         "the .vdb file is damaged, or holds a kind of grid that frazil does not know".into()
-    } else if told(&["no longer supported", "unsupported"]) {
+    } else if mentions(&["no longer supported", "unsupported"]) {
         "the .vdb file is of a version that frazil does not read".into()
     } else {
         "the .vdb file cannot be read, it is cut short or damaged".into()

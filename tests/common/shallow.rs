@@ -6,7 +6,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use frazil::shallow::columns::Columns;
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::{Friction, Pace, Section};
+use frazil::shallow::params::{Friction, Section, TimeStepping};
 use frazil::shallow::pipes::{Border, Pipes};
 use frazil::shallow::sources::{FlowPoint, Kind, Pulse};
 use frazil::shallow::terrain::Solids;
@@ -367,7 +367,7 @@ pub fn random_params(dice: &mut Dice, step: f64) -> Params {
         liquid: Liquid::new(viscosity),
         gravity: [dice.between(-leans, leans), -9.81, dice.between(-leans, leans)],
         kept: [0.0, 0.5, 1.0][dice.below(3)],
-        pace: Pace::Realtime(step.clamp(1e-6, 1.0)),
+        pace: TimeStepping::Realtime(step.clamp(1e-6, 1.0)),
         border: [Border::Closed, Border::Open, Border::Absorbing][dice.below(3)],
         section: if dice.one_in(4) { Section::Whole } else { Section::Wetted },
         friction: Friction::Ground,
@@ -389,7 +389,7 @@ pub fn turnable(seed: u64) -> Plan {
     let step = [0.001, 0.003, 0.01][dice.below(3)];
     plan.params = random_params(&mut dice, step);
     if dice.one_in(3) {
-        plan.params.pace = Pace::Exact;
+        plan.params.pace = TimeStepping::Exact;
         plan.params.liquid.viscosity = plan.params.liquid.viscosity.min(1e-3);
     }
     plan
@@ -407,7 +407,7 @@ pub fn extreme(seed: u64) -> (Plan, f64) {
     let mut plan = random(&mut dice, size, cell, range, depth);
     plan.params = random_params(&mut dice, step);
     if dice.one_in(3) {
-        plan.params.pace = Pace::Exact;
+        plan.params.pace = TimeStepping::Exact;
     }
     (plan, step)
 }
@@ -416,8 +416,8 @@ pub fn extreme(seed: u64) -> (Plan, f64) {
 pub fn extreme_frame(ctx: &Context, liquid: &mut Shallow, step: f64, frame: usize) -> Report {
     let report = match liquid.params().pace {
         // A recorded run may hold steps of any length, and nothing caps what flows in them.
-        Pace::Exact => liquid.replay(ctx, &[step, 0.3 * step, 3.0 * step][..1 + frame % 3]),
-        Pace::Realtime(longest) => liquid.step(ctx, longest * (0.7 + (frame % 4) as f64)),
+        TimeStepping::Exact => liquid.replay(ctx, &[step, 0.3 * step, 3.0 * step][..1 + frame % 3]),
+        TimeStepping::Realtime(longest) => liquid.step(ctx, longest * (0.7 + (frame % 4) as f64)),
     };
     report.expect("a frame")
 }

@@ -4,7 +4,7 @@ use frazil::Context;
 use frazil::geometry::DVec3;
 use frazil::shallow::free_fall::Falls;
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Params, Shallow};
 
@@ -41,7 +41,7 @@ fn path(h: &mut Harness) {
         (0.1, "blood", 4e-6, 2e-6),
         (0.5, "paint", 4e-5, 5e-6),
     ] {
-        for pace in [Pace::Exact, Pace::Realtime(0.003)] {
+        for pace in [TimeStepping::Exact, TimeStepping::Realtime(0.003)] {
             let params = Params {
                 liquid: Liquid::new(viscosity),
                 pace,

@@ -3,7 +3,7 @@
 use frazil::Context;
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 
@@ -27,7 +27,7 @@ pub fn between(low: f64, high: f64) -> Heights {
 
 /// A liquid of a viscosity (m2/s) that loses nothing else, in steps as long as is stable.
 pub fn viscous(viscosity: f64) -> Params {
-    Params { liquid: Liquid::new(viscosity), kept: 1.0, pace: Pace::Exact, ..Params::default() }
+    Params { liquid: Liquid::new(viscosity), kept: 1.0, pace: TimeStepping::Exact, ..Params::default() }
 }
 
 /// Dry ground.

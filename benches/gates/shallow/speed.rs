@@ -2,7 +2,7 @@
 
 use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 use rustix::time::{ClockId, clock_gettime};
@@ -63,7 +63,7 @@ pub fn run(h: &mut Harness) {
 
 /// Blood in steps of at most so many seconds.
 fn blood(longest: f64) -> Params {
-    Params { liquid: Liquid::BLOOD, pace: Pace::Realtime(longest), ..Params::default() }
+    Params { liquid: Liquid::BLOOD, pace: TimeStepping::Realtime(longest), ..Params::default() }
 }
 
 /// Like the thesis' Fig. 4.13: a rolling slope of 200 x 200 cells, 1 mm of blood on all of it.

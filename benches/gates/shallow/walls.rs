@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use frazil::Context;
 use frazil::numeric::cpu::cpu_level;
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid};
-use frazil::shallow::params::{Friction, Pace};
+use frazil::shallow::params::{Friction, TimeStepping};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 
@@ -224,7 +224,7 @@ fn slope(friction: Friction, viscosity: f64, is_narrow: bool) -> Shallow {
     let solids = ground([200; 2], CELL, [-0.01, 0.1], |at @ [x, z]| {
         0.01 - 0.1 * x + 1e-4 * waves(at, CELL) + if is_wall(z) { 0.005 } else { 0.0 }
     });
-    let params = Params { friction, kept: 0.5, pace: Pace::Realtime(0.003), ..viscous(viscosity) };
+    let params = Params { friction, kept: 0.5, pace: TimeStepping::Realtime(0.003), ..viscous(viscosity) };
     covered(&context(), &solids, params, |[_, z], _| if is_wall(z) { 0.0 } else { 1e-3 })
 }
 

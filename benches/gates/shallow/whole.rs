@@ -5,7 +5,7 @@ use frazil::shallow::columns::Columns;
 use frazil::shallow::free_fall::mesh::{self as drops, Balls};
 use frazil::shallow::free_fall::{Droplet, Falls};
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::surface::{Depths, Indices, Layout, Surface, Target, bound};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
@@ -48,7 +48,7 @@ fn ledge() -> Shallow {
 /// Blood on all columns, in steps of at most so many seconds, that falls from 5 mm on.
 fn falling(solids: &Solids, longest: f64) -> Shallow {
     let falls = Some(Falls { height: 0.005, ..Falls::default() });
-    let pace = Pace::Realtime(longest);
+    let pace = TimeStepping::Realtime(longest);
     let params = Params { liquid: Liquid::BLOOD, pace, falls, ..Params::default() };
     covered(&context(), solids, params, |_, _| DEPTH)
 }

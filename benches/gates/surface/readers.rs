@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use frazil::geometry::DVec3;
 use frazil::geometry::points::{Column, Points, Values};
 use frazil::io::mesh::extension;
-use frazil::io::particles::{self, Cloud};
+use frazil::io::particles::{self, ParticleData};
 use frazil::vdb::file::{Compression, WriteOptions};
 use frazil::vdb::points::to_bytes;
 use frazil::vdb::reading::guard::Guard;
@@ -112,7 +112,7 @@ fn converted(input: &Path, output: PathBuf) -> PathBuf {
 fn ours(path: &Path) -> Vec<Particle> {
     if extension(path) == "vdb" {
         let points = damage::decoder(u64::MAX).read_points(path, None).expect("points");
-        let mut particles = numbered(&Cloud::from(points));
+        let mut particles = numbered(&ParticleData::from(points));
         particles.sort_unstable_by_key(|particle| particle.0);
         return particles;
     }
@@ -120,7 +120,7 @@ fn ours(path: &Path) -> Vec<Particle> {
 }
 
 /// Particles with what numbers them; with their index where nothing does.
-fn numbered(cloud: &Cloud) -> Vec<Particle> {
+fn numbered(cloud: &ParticleData) -> Vec<Particle> {
     let ids = cloud.attribute("id").or(cloud.attribute("index"));
     let id = |n: usize| ids.map_or(n as i64, |ids| ids.number(n) as i64);
     cloud.positions.iter().enumerate().map(|(n, position)| (id(n), *position)).collect()

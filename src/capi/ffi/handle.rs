@@ -10,7 +10,7 @@ use super::guard::{Failure, Outcome};
 /// A kind of handle.
 ///
 /// Opaque to C: a pointer to it is a pointer to a [`Handle`] that holds its value.
-pub(in crate::capi) trait Noun {
+pub(in crate::capi) trait HandleType {
     /// The value of the handle.
     type Value;
     /// Its name in messages.
@@ -44,7 +44,7 @@ pub(in crate::capi) struct Changing<'a, T>(&'a Handle<T>);
 ///
 /// # Safety
 /// `out` must be NULL or point to memory for a pointer.
-pub(in crate::capi) unsafe fn give<N: Noun>(out: *mut *mut N, value: N::Value) -> Outcome {
+pub(in crate::capi) unsafe fn give<N: HandleType>(out: *mut *mut N, value: N::Value) -> Outcome {
     let out = required(out, "out")?;
     let head = Handle {
         tag: AtomicU32::new(N::TAG),
@@ -80,7 +80,7 @@ pub(in crate::capi) fn required<T>(pointer: *mut T, name: &str) -> Outcome<*mut 
 ///
 /// # Safety
 /// The pointer must be NULL or point to a handle of any kind that was not destroyed, for `'a`.
-unsafe fn look<'a, N: Noun>(pointer: *const N) -> Outcome<&'a Handle<N::Value>> {
+unsafe fn look<'a, N: HandleType>(pointer: *const N) -> Outcome<&'a Handle<N::Value>> {
     let handle = pointer.cast::<Handle<N::Value>>();
     if handle.is_null() {
         return Err(Failure::argument(format!("the {} is NULL", N::NAME)));
@@ -101,7 +101,7 @@ unsafe fn look<'a, N: Noun>(pointer: *const N) -> Outcome<&'a Handle<N::Value>> 
 ///
 /// # Safety
 /// The pointer must be NULL or point to a handle of any kind that was not destroyed, for `'a`.
-pub(in crate::capi) unsafe fn read<'a, N: Noun>(pointer: *const N) -> Outcome<Reading<'a, N::Value>> {
+pub(in crate::capi) unsafe fn read<'a, N: HandleType>(pointer: *const N) -> Outcome<Reading<'a, N::Value>> {
     // SAFETY: guaranteed by the caller.
     let handle = unsafe { look(pointer) }?;
     let one_more = |users: i32| (users >= 0).then_some(users + 1);
@@ -117,7 +117,7 @@ pub(in crate::capi) unsafe fn read<'a, N: Noun>(pointer: *const N) -> Outcome<Re
 ///
 /// # Safety
 /// As [`read`].
-pub(in crate::capi) unsafe fn read_some<'a, N: Noun>(
+pub(in crate::capi) unsafe fn read_some<'a, N: HandleType>(
     pointer: *const N,
 ) -> Outcome<Option<Reading<'a, N::Value>>> {
     // SAFETY: guaranteed by the caller.
@@ -128,7 +128,7 @@ pub(in crate::capi) unsafe fn read_some<'a, N: Noun>(
 ///
 /// # Safety
 /// As [`read`].
-pub(in crate::capi) unsafe fn change<'a, N: Noun>(pointer: *mut N) -> Outcome<Changing<'a, N::Value>> {
+pub(in crate::capi) unsafe fn change<'a, N: HandleType>(pointer: *mut N) -> Outcome<Changing<'a, N::Value>> {
     // SAFETY: guaranteed by the caller.
     let handle = unsafe { look(pointer.cast_const()) }?;
     if handle.users.compare_exchange(0, CHANGING, Ordering::Acquire, Ordering::Relaxed).is_err() {
@@ -143,7 +143,7 @@ pub(in crate::capi) unsafe fn change<'a, N: Noun>(pointer: *mut N) -> Outcome<Ch
 ///
 /// # Safety
 /// As [`read`]; the handle must not be used afterwards.
-pub(in crate::capi) unsafe fn destroy<N: Noun>(pointer: *mut N) -> Outcome {
+pub(in crate::capi) unsafe fn destroy<N: HandleType>(pointer: *mut N) -> Outcome {
     // SAFETY: guaranteed by the caller; there are no lent handles.
     unsafe { destroy_whole::<N, N>(pointer, |_| Vec::new()) }
 }
@@ -153,7 +153,7 @@ pub(in crate::capi) unsafe fn destroy<N: Noun>(pointer: *mut N) -> Outcome {
 ///
 /// # Safety
 /// As [`destroy`], also for the lent handles.
-pub(in crate::capi) unsafe fn destroy_whole<N: Noun, P: Noun>(
+pub(in crate::capi) unsafe fn destroy_whole<N: HandleType, P: HandleType>(
     pointer: *mut N,
     lent: impl FnOnce(&N::Value) -> Vec<*mut P>,
 ) -> Outcome {
@@ -179,7 +179,7 @@ pub(in crate::capi) unsafe fn destroy_whole<N: Noun, P: Noun>(
 ///
 /// # Safety
 /// It must come from [`give`], and must not be used now or afterwards.
-pub(in crate::capi) unsafe fn free<N: Noun>(pointer: *mut N) {
+pub(in crate::capi) unsafe fn free<N: HandleType>(pointer: *mut N) {
     if pointer.is_null() {
         return;
     }
@@ -194,7 +194,7 @@ pub(in crate::capi) unsafe fn free<N: Noun>(pointer: *mut N) {
 /// A handle that is locked against use, poisoned or not.
 struct Seized<'a, T>(&'a Handle<T>);
 
-fn seize<N: Noun>(handle: &Handle<N::Value>) -> Outcome<Seized<'_, N::Value>> {
+fn seize<N: HandleType>(handle: &Handle<N::Value>) -> Outcome<Seized<'_, N::Value>> {
     if handle.users.compare_exchange(0, CHANGING, Ordering::AcqRel, Ordering::Relaxed).is_err() {
         return Err(busy::<N>());
     }
@@ -207,11 +207,11 @@ impl<T> Drop for Seized<'_, T> {
     }
 }
 
-fn busy<N: Noun>() -> Failure {
+fn busy<N: HandleType>() -> Failure {
     Failure::new(FRZ_ERROR_BUSY, format!("the {} is in use by another call", N::NAME))
 }
 
-fn sound<N: Noun>(handle: &Handle<N::Value>) -> Outcome {
+fn sound<N: HandleType>(handle: &Handle<N::Value>) -> Outcome {
     if handle.poisoned.load(Ordering::Acquire) {
         let text = format!("the {} saw an internal error before and can only be destroyed", N::NAME);
         return Err(Failure::new(FRZ_ERROR_POISONED, text));
@@ -265,13 +265,13 @@ mod tests {
     struct Jar;
     struct Tin;
 
-    impl Noun for Jar {
+    impl HandleType for Jar {
         type Value = i32;
         const NAME: &'static str = "jar";
         const TAG: u32 = 1;
     }
 
-    impl Noun for Tin {
+    impl HandleType for Tin {
         type Value = [u8; 3];
         const NAME: &'static str = "tin";
         const TAG: u32 = 2;
@@ -306,7 +306,7 @@ mod tests {
     /// Lends a jar.
     struct Shelf(*mut Jar);
 
-    impl Noun for Shelf {
+    impl HandleType for Shelf {
         type Value = Shelf;
         const NAME: &'static str = "shelf";
         const TAG: u32 = 3;

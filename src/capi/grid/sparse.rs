@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_void};
 use std::ptr::NonNull;
 
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{Noun, change, clear, destroy, read};
+use crate::capi::ffi::handle::{HandleType, change, clear, destroy, read};
 use crate::capi::ffi::views::{Sized32, fill, finite, text, write_bytes};
 use crate::capi::runtime::context::{creates, frz_context};
 use crate::vdb::{AnyGrid, FloatGrid, GridClass, GridRef, VectorGrid};
@@ -83,7 +83,7 @@ pub(in crate::capi) enum Grid {
     Lent(NonNull<FloatGrid>),
 }
 
-impl Noun for frz_grid {
+impl HandleType for frz_grid {
     type Value = Grid;
     const NAME: &'static str = "grid";
     const TAG: u32 = 0x6672_7a04;

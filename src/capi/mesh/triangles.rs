@@ -3,7 +3,7 @@
 use std::ffi::c_char;
 
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{Noun, destroy, read};
+use crate::capi::ffi::handle::{HandleType, destroy, read};
 use crate::capi::ffi::views::{Plain, Sized32, fill, frz_span, frz_view, meaning, sized, text};
 use crate::capi::runtime::context::{creates, frz_context};
 use crate::context::Context;
@@ -119,7 +119,7 @@ struct Attribute {
     values: Vec<f32>,
 }
 
-impl Noun for frz_mesh {
+impl HandleType for frz_mesh {
     type Value = Mesh;
     const NAME: &'static str = "mesh";
     const TAG: u32 = 0x6672_7a03;

@@ -9,7 +9,7 @@ use super::library::FRZ_ABI_VERSION;
 use super::pool::{Threads, frz_pool};
 use crate::capi::ffi::guard::frz_status::*;
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{Noun, Reading, clear, destroy, give, read, required};
+use crate::capi::ffi::handle::{HandleType, Reading, clear, destroy, give, read, required};
 use crate::capi::ffi::views::{Plain, frz_span};
 use crate::context::{Context, PhaseTime, Phases, Progress, Running, machine_memory};
 use crate::error::Error;
@@ -92,7 +92,7 @@ pub(in crate::capi) struct State {
     timings: Mutex<Vec<PhaseTime>>,
 }
 
-impl Noun for frz_context {
+impl HandleType for frz_context {
     type Value = State;
     const NAME: &'static str = "context";
     const TAG: u32 = 0x6672_7a02;
@@ -173,7 +173,7 @@ impl Drop for LightCall<'_> {
 ///
 /// # Safety
 /// As [`enter`] and [`give`].
-pub(in crate::capi) unsafe fn creates<N: Noun>(
+pub(in crate::capi) unsafe fn creates<N: HandleType>(
     context: *const frz_context,
     out: *mut *mut N,
     make: impl FnOnce(&Context) -> Outcome<N::Value>,

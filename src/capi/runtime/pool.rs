@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{Noun, clear, destroy, give};
+use crate::capi::ffi::handle::{HandleType, clear, destroy, give};
 use crate::context::Pool;
 
 /// Worker threads that any number of contexts may share.
@@ -42,7 +42,7 @@ impl Drop for Alive {
     }
 }
 
-impl Noun for frz_pool {
+impl HandleType for frz_pool {
     type Value = Threads;
     const NAME: &'static str = "pool";
     const TAG: u32 = 0x6672_7a01;

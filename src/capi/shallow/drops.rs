@@ -1,7 +1,7 @@
 //! Shallow liquid in the air: its drops, and their mesh.
 
 use super::snapshot::{Taken, frz_shallow_snapshot};
-use super::spill::{Spill, frz_shallow};
+use super::spill::{ShallowHandle, frz_shallow};
 use super::surface::{
     Buffer, NO_SPAN, check_buffers, check_room, frz_shallow_layout, frz_shallow_size, indices_in, layout,
 };
@@ -257,7 +257,7 @@ pub unsafe extern "C" fn frz_shallow_drops_mesh(
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;
             let mut spill = change(shallow)?;
-            let Spill { shallow, balls, drops, .. } = &mut *spill;
+            let ShallowHandle { shallow, balls, drops, .. } = &mut *spill;
             drops.clear();
             drops.extend(shallow.drops());
             wanted.write(balls, drops)

@@ -3,7 +3,7 @@
 use super::flow_points::{Attached, frz_shallow_flow};
 use super::ground::Terrain;
 use crate::capi::ffi::guard::{Failure, Outcome};
-use crate::capi::ffi::handle::{Noun, change, clear, read, required};
+use crate::capi::ffi::handle::{HandleType, change, clear, read, required};
 use crate::capi::ffi::views::finite;
 use crate::error::Result;
 use crate::shallow::sources::FlowPoint;
@@ -24,7 +24,7 @@ pub(in crate::capi) trait Flowing {
 ///
 /// # Safety
 /// The pointers must be NULL or valid.
-pub(in crate::capi) unsafe fn set_flows<N: Noun<Value: Flowing>>(
+pub(in crate::capi) unsafe fn set_flows<N: HandleType<Value: Flowing>>(
     liquid: *mut N,
     flows: *const frz_shallow_flow,
     count: usize,
@@ -41,7 +41,7 @@ pub(in crate::capi) unsafe fn set_flows<N: Noun<Value: Flowing>>(
 ///
 /// # Safety
 /// The pointers must be NULL or valid.
-pub(in crate::capi) unsafe fn moved<N: Noun<Value: Flowing>>(
+pub(in crate::capi) unsafe fn moved<N: HandleType<Value: Flowing>>(
     liquid: *const N,
     flow: usize,
     volume: *mut f64,
@@ -64,7 +64,7 @@ pub(in crate::capi) unsafe fn moved<N: Noun<Value: Flowing>>(
 ///
 /// # Safety
 /// The pointers must be NULL or valid.
-pub(in crate::capi) unsafe fn pour<N: Noun<Value: Flowing>>(
+pub(in crate::capi) unsafe fn pour<N: HandleType<Value: Flowing>>(
     liquid: *mut N,
     at: *const f64,
     radius: f64,
@@ -89,7 +89,7 @@ pub(in crate::capi) unsafe fn pour<N: Noun<Value: Flowing>>(
 ///
 /// # Safety
 /// The liquid must be NULL or alive.
-pub(in crate::capi) unsafe fn fill_up<N: Noun<Value: Flowing>>(liquid: *mut N, height: f64) -> Outcome {
+pub(in crate::capi) unsafe fn fill_up<N: HandleType<Value: Flowing>>(liquid: *mut N, height: f64) -> Outcome {
     // SAFETY: guaranteed by the caller.
     let mut liquid = unsafe { change(liquid) }?;
     finite("height", height)?;

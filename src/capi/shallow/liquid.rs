@@ -2,7 +2,7 @@
 
 use super::ground::Terrain;
 use super::params::{domain, frz_shallow_domain, frz_shallow_params, params};
-use super::spill::{Spill, frz_shallow};
+use super::spill::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::guard::{Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{change, destroy, read, required};
 use crate::capi::ffi::views::{Sized32, fill, frz_span, frz_view, within};
@@ -85,7 +85,7 @@ pub unsafe extern "C" fn frz_shallow_create(
             let (grid, heights) = self::domain(ctx, domain)?;
             let mesh = read(mesh)?;
             let (terrain, solids) = Terrain::of_mesh(ctx, &mesh.triangles, grid, heights)?;
-            Spill::new(ctx, params, terrain, &solids)
+            ShallowHandle::new(ctx, params, terrain, &solids)
         })
     }
 }
@@ -114,7 +114,7 @@ pub unsafe extern "C" fn frz_shallow_create_heights(
             let (grid, range) = self::domain(ctx, domain)?;
             let tops = heights.in_place::<f32>("heights")?;
             let (terrain, solids) = Terrain::of_heights(tops, grid, range)?;
-            Spill::new(ctx, params, terrain, &solids)
+            ShallowHandle::new(ctx, params, terrain, &solids)
         })
     }
 }
@@ -144,7 +144,7 @@ pub unsafe extern "C" fn frz_shallow_create_grid(
             let (grid, heights) = self::domain(ctx, domain)?;
             let held = read(level_set)?;
             let (terrain, solids) = Terrain::of_level_set(ctx, held.floats()?, grid, heights)?;
-            Spill::new(ctx, params, terrain, &solids)
+            ShallowHandle::new(ctx, params, terrain, &solids)
         })
     }
 }
@@ -231,7 +231,7 @@ pub unsafe extern "C" fn frz_shallow_replay(
         // SAFETY: the pointers are NULL or valid.
         unsafe {
             computes(context, shallow, report, |ctx, spill| {
-                let Spill { shallow, steps: own, .. } = spill;
+                let ShallowHandle { shallow, steps: own, .. } = spill;
                 let given = steps.in_place::<f64>("steps")?;
                 within("the count of steps", given.len() as f64, 1.0..=f64::from(MOST_STEPS), "")?;
                 own.clear();
@@ -251,7 +251,7 @@ unsafe fn computes(
     context: *mut frz_context,
     shallow: *mut frz_shallow,
     report: *mut frz_shallow_report,
-    compute: impl FnOnce(&Context, &mut Spill) -> Outcome<(Report, f64)>,
+    compute: impl FnOnce(&Context, &mut ShallowHandle) -> Outcome<(Report, f64)>,
 ) -> Outcome {
     // SAFETY: guaranteed by the caller.
     unsafe {

@@ -1,6 +1,6 @@
 //! Loads of shallow liquid on the bodies in it.
 
-use super::spill::{Spill, frz_shallow};
+use super::spill::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::change;
 use crate::capi::ffi::views::{Sized32, check_size, fill, frz_view};
@@ -88,7 +88,7 @@ pub unsafe extern "C" fn frz_shallow_loads(
         unsafe {
             put(loads, (0..count).map(|_| Load::default()))?;
             let mut spill = change(shallow)?;
-            let Spill { shallow, velocities_of_bodies: own, loads: felt, .. } = &mut *spill;
+            let ShallowHandle { shallow, velocities_of_bodies: own, loads: felt, .. } = &mut *spill;
             let bodies = shallow.bodies().len();
             if count != bodies {
                 return Err(Failure::argument(format!("count = {count} is not that of the {bodies} bodies")));

@@ -7,7 +7,7 @@ use crate::context::Context;
 use crate::shallow::columns::grid::{Grid, Heights};
 use crate::shallow::free_fall::Falls;
 use crate::shallow::material::{Carreau, Liquid};
-use crate::shallow::params::{Friction, Pace, Section};
+use crate::shallow::params::{Friction, Section, TimeStepping};
 use crate::shallow::pipes::Border;
 use crate::shallow::{Params, Thickening};
 
@@ -175,7 +175,7 @@ impl frz_shallow_params {
     pub(in crate::capi) fn defaults() -> Self {
         let defaults = Params::default();
         let falls = Falls::default();
-        let longest_step = if let Pace::Realtime(longest) = defaults.pace { longest } else { 0.0 };
+        let longest_step = if let TimeStepping::Realtime(longest) = defaults.pace { longest } else { 0.0 };
         let mut params = Self {
             struct_size: 0,
             flags: 0,
@@ -226,10 +226,10 @@ impl frz_shallow_params {
             most: self.falls_most as usize,
         };
         let pace = match meaning("pace", "frz_shallow_pace", self.pace, &PACES)? {
-            FRZ_SHALLOW_EXACT => Pace::Exact,
+            FRZ_SHALLOW_EXACT => TimeStepping::Exact,
             FRZ_SHALLOW_REALTIME => {
                 within("longest_step", self.longest_step, 1e-6..=1.0, " s")?;
-                Pace::Realtime(self.longest_step)
+                TimeStepping::Realtime(self.longest_step)
             }
         };
         let thickening = Thickening {

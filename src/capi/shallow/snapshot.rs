@@ -1,11 +1,11 @@
 //! Shallow liquid as it was after a frame, for another thread.
 
 use super::read::probe;
-use super::spill::{Spill, frz_shallow};
+use super::spill::{ShallowHandle, frz_shallow};
 use super::surface::prepared::{Ledged, no_lifts};
 use super::surface::{Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target};
 use crate::capi::ffi::guard::{frz_status, guard};
-use crate::capi::ffi::handle::{Noun, change, destroy, read};
+use crate::capi::ffi::handle::{HandleType, change, destroy, read};
 use crate::capi::ffi::views::{frz_span, frz_view};
 use crate::capi::runtime::context::{creates, enter_light, frz_context};
 use crate::shallow::Snapshot;
@@ -33,7 +33,7 @@ pub(in crate::capi) struct Taken {
 
 impl Taken {
     /// Takes the minimum heights and the ledges of a liquid, if they match its current ground.
-    fn fit(&mut self, spill: &Spill) {
+    fn fit(&mut self, spill: &ShallowHandle) {
         self.ledged.copy_from(&spill.ledged);
         let (least, sunk) = spill.lifted.known().unwrap_or_default();
         self.least.clear();
@@ -43,7 +43,7 @@ impl Taken {
     }
 }
 
-impl Noun for frz_shallow_snapshot {
+impl HandleType for frz_shallow_snapshot {
     type Value = Taken;
     const NAME: &'static str = "snapshot";
     const TAG: u32 = 0x6672_7a0a;

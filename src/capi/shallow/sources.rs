@@ -2,7 +2,7 @@
 
 use super::flow_points::frz_shallow_flow;
 use super::flowing;
-use super::spill::{Spill, frz_shallow};
+use super::spill::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::guard::{Failure, frz_status, guard};
 use crate::capi::ffi::handle::{change, read};
 use crate::capi::ffi::views::{Sized32, fill, frz_view};
@@ -105,7 +105,7 @@ pub unsafe extern "C" fn frz_shallow_set_depths(shallow: *mut frz_shallow, depth
     })
 }
 
-fn set_depths(spill: &mut Spill, wanted: impl Iterator<Item = f32>) {
+fn set_depths(spill: &mut ShallowHandle, wanted: impl Iterator<Item = f32>) {
     let shallow = &mut spill.shallow;
     let heights = shallow.columns().heights;
     for (index, depth) in wanted.enumerate() {

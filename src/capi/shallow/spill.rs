@@ -5,7 +5,7 @@ use super::flowing::Flowing;
 use super::ground::Terrain;
 use super::surface::prepared::{Ledged, Lifted};
 use crate::capi::ffi::guard::Outcome;
-use crate::capi::ffi::handle::Noun;
+use crate::capi::ffi::handle::HandleType;
 use crate::context::Context;
 use crate::error::Result;
 use crate::shallow::free_fall::Droplet;
@@ -34,14 +34,14 @@ pub struct frz_shallow {
     _opaque: [u8; 0],
 }
 
-impl Noun for frz_shallow {
-    type Value = Spill;
+impl HandleType for frz_shallow {
+    type Value = ShallowHandle;
     const NAME: &'static str = "shallow liquid";
     const TAG: u32 = 0x6672_7a09;
 }
 
 /// The value of a liquid's handle.
-pub(in crate::capi) struct Spill {
+pub(in crate::capi) struct ShallowHandle {
     /// The liquid.
     pub shallow: Shallow,
     /// What it flows over.
@@ -71,7 +71,7 @@ pub(in crate::capi) struct Spill {
     pub steps: Vec<f64>,
 }
 
-impl Flowing for Spill {
+impl Flowing for ShallowHandle {
     fn terrain(&self) -> &Terrain {
         &self.terrain
     }
@@ -99,7 +99,7 @@ impl Flowing for Spill {
     }
 }
 
-impl Spill {
+impl ShallowHandle {
     /// Dry ground.
     pub fn new(ctx: &Context, params: Params, terrain: Terrain, solids: &Solids) -> Outcome<Self> {
         let shallow = ctx.phase("columns", || Shallow::new(ctx, solids, params))?;

@@ -5,7 +5,7 @@ use std::ffi::c_void;
 use super::params::FRZ_SHALLOW_NO_SCALAR;
 use super::spill::frz_shallow;
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{Noun, change, destroy, read, required};
+use crate::capi::ffi::handle::{HandleType, change, destroy, read, required};
 use crate::capi::ffi::views::{Sized32, fill, frz_span, frz_view, sized, write_bytes};
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{creates, enter_light, frz_context};
@@ -106,7 +106,7 @@ pub(in crate::capi) struct Stained {
     positions: Vec<Vec3>,
 }
 
-impl Noun for frz_shallow_stains {
+impl HandleType for frz_shallow_stains {
     type Value = Stained;
     const NAME: &'static str = "stains";
     const TAG: u32 = 0x6672_7a0b;

@@ -2,7 +2,7 @@
 
 use super::ground::{Terrain, cells_in, read_heights};
 use super::lists::each_sized;
-use super::spill::{Spill, frz_shallow};
+use super::spill::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::change;
 use crate::capi::ffi::views::{Sized32, fill, frz_view, meaning};
@@ -57,7 +57,7 @@ unsafe fn moves(
     context: *mut frz_context,
     shallow: *mut frz_shallow,
     moved: *mut frz_shallow_moved,
-    make: impl FnOnce(&mut Spill) -> Outcome<Moved>,
+    make: impl FnOnce(&mut ShallowHandle) -> Outcome<Moved>,
 ) -> Outcome {
     // SAFETY: guaranteed by the caller.
     unsafe {
@@ -96,7 +96,7 @@ pub unsafe extern "C" fn frz_shallow_update_terrain(
         // SAFETY: the pointers are NULL or valid, and so is the view.
         unsafe {
             moves(context, shallow, moved, |spill| {
-                let Spill { shallow, terrain, flows, .. } = spill;
+                let ShallowHandle { shallow, terrain, flows, .. } = spill;
                 let cells = cells_in(&shallow.columns().grid, bounds)?;
                 let Terrain::Mesh(mesh) = terrain else {
                     return Err(Failure::argument("the liquid was not made with a mesh that could move"));
@@ -138,7 +138,7 @@ pub unsafe extern "C" fn frz_shallow_update_heights(
         // SAFETY: the pointers are NULL or valid, and so is the view.
         unsafe {
             moves(context, shallow, moved, |spill| {
-                let Spill { shallow, terrain, .. } = spill;
+                let ShallowHandle { shallow, terrain, .. } = spill;
                 let (grid, range) = (shallow.columns().grid, shallow.columns().heights);
                 let cells = cells_in(&grid, bounds)?;
                 let Terrain::Heights(solids) = terrain else {
@@ -268,7 +268,7 @@ pub unsafe extern "C" fn frz_shallow_set_bodies(
         // SAFETY: the pointers are NULL or valid.
         unsafe {
             moves(context, shallow, moved, |spill| {
-                let Spill { shallow, shapes, .. } = spill;
+                let ShallowHandle { shallow, shapes, .. } = spill;
                 read_bodies(bodies, count, shapes)?;
                 Ok(shallow.set_bodies(shapes)?)
             })

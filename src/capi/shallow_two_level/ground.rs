@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::ffi::c_void;
 
-use super::liquid::{Spread, frz_shallow_detail};
+use super::liquid::{DetailHandle, frz_shallow_detail};
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{change, clear, read, required};
 use crate::capi::ffi::views::{fill, frz_view};
@@ -25,7 +25,7 @@ unsafe fn moves(
     context: *mut frz_context,
     detail: *mut frz_shallow_detail,
     moved: *mut frz_shallow_moved,
-    make: impl FnOnce(&mut Spread) -> Outcome<Moved>,
+    make: impl FnOnce(&mut DetailHandle) -> Outcome<Moved>,
 ) -> Outcome {
     // SAFETY: guaranteed by the caller.
     unsafe {
@@ -57,7 +57,7 @@ pub unsafe extern "C" fn frz_shallow_detail_update_terrain(
         // SAFETY: the pointers are NULL or valid, and so is the view.
         unsafe {
             moves(context, detail, moved, |spread| {
-                let Spread { detail, terrain, flows, .. } = spread;
+                let DetailHandle { detail, terrain, flows, .. } = spread;
                 let columns = detail.fine().columns();
                 let Terrain::Mesh(mesh) = terrain else {
                     return Err(Failure::argument("the liquid was not made with a mesh that could move"));
@@ -96,7 +96,7 @@ pub unsafe extern "C" fn frz_shallow_detail_update_heights(
         // SAFETY: the pointers are NULL or valid, and so is the view.
         unsafe {
             moves(context, detail, moved, |spread| {
-                let Spread { detail, terrain, .. } = spread;
+                let DetailHandle { detail, terrain, .. } = spread;
                 let (grid, range) = (detail.fine().columns().grid, detail.fine().columns().heights);
                 let Terrain::Heights(own) = terrain else {
                     return Err(Failure::argument(
@@ -132,7 +132,7 @@ pub unsafe extern "C" fn frz_shallow_detail_set_bodies(
         // SAFETY: the pointers are NULL or valid.
         unsafe {
             moves(context, detail, moved, |spread| {
-                let Spread { detail, shapes, .. } = spread;
+                let DetailHandle { detail, shapes, .. } = spread;
                 read_bodies(bodies, count, shapes)?;
                 Ok(detail.set_bodies(shapes)?)
             })
@@ -183,7 +183,7 @@ pub unsafe extern "C" fn frz_shallow_detail_surface(
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;
             let mut spread = change(detail)?;
-            let Spread { detail, surface, velocities, concentrations, is_reserved, .. } = &mut *spread;
+            let DetailHandle { detail, surface, velocities, concentrations, is_reserved, .. } = &mut *spread;
             for (is_wanted, name) in
                 [(wanted.is_lifted, "FRZ_SHALLOW_LIFTED"), (wanted.is_skirted, "FRZ_SHALLOW_SKIRTED")]
             {

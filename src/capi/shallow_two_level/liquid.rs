@@ -1,7 +1,7 @@
 //! Shallow liquid in cells of two sizes: small ones near what matters.
 
 use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{Noun, change, clear, destroy, read, required};
+use crate::capi::ffi::handle::{HandleType, change, clear, destroy, read, required};
 use crate::capi::ffi::views::{Sized32, fill, frz_view};
 use crate::capi::mesh::triangles::frz_mesh;
 use crate::capi::runtime::context::{creates, enter_light, frz_context};
@@ -31,7 +31,7 @@ pub struct frz_shallow_detail {
 }
 
 /// The value of a handle.
-pub(in crate::capi) struct Spread {
+pub(in crate::capi) struct DetailHandle {
     pub detail: Detail,
     /// What it flows over.
     pub terrain: Terrain,
@@ -48,13 +48,13 @@ pub(in crate::capi) struct Spread {
     pub concentrations: [[Vec<f32>; MOST]; 2],
 }
 
-impl Noun for frz_shallow_detail {
-    type Value = Spread;
+impl HandleType for frz_shallow_detail {
+    type Value = DetailHandle;
     const NAME: &'static str = "shallow liquid in cells of two sizes";
     const TAG: u32 = 0x6672_7a0c;
 }
 
-impl Flowing for Spread {
+impl Flowing for DetailHandle {
     fn terrain(&self) -> &Terrain {
         &self.terrain
     }
@@ -82,7 +82,7 @@ impl Flowing for Spread {
     }
 }
 
-impl Spread {
+impl DetailHandle {
     /// Dry ground, with a box of small cells.
     ///
     /// # Safety
@@ -148,7 +148,7 @@ pub unsafe extern "C" fn frz_shallow_detail_create(
             let (grid, heights) = self::domain(ctx, domain)?;
             let mesh = read(mesh)?;
             let (terrain, solids) = Terrain::of_mesh(ctx, &mesh.triangles, grid, heights)?;
-            Spread::new(ctx, params, terrain, &solids, near)
+            DetailHandle::new(ctx, params, terrain, &solids, near)
         })
     }
 }
@@ -178,7 +178,7 @@ pub unsafe extern "C" fn frz_shallow_detail_create_heights(
             let (grid, range) = self::domain(ctx, domain)?;
             let tops = heights.in_place::<f32>("heights")?;
             let (terrain, solids) = Terrain::of_heights(tops, grid, range)?;
-            Spread::new(ctx, params, terrain, &solids, near)
+            DetailHandle::new(ctx, params, terrain, &solids, near)
         })
     }
 }

@@ -4,7 +4,7 @@ use std::ffi::c_void;
 use std::ptr::NonNull;
 
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{Noun, change, clear, destroy_whole, free, give, read, required};
+use crate::capi::ffi::handle::{HandleType, change, clear, destroy_whole, free, give, read, required};
 use crate::capi::ffi::views::{Sized32, fill, finite, frz_view, sized, write_bytes};
 use crate::capi::grid::sparse::{Grid, frz_grid};
 use crate::capi::level_set::body::{Role, Shapes, bodies, frz_body};
@@ -93,7 +93,7 @@ pub(in crate::capi) struct Layer {
     dirty: Vec<Origin>,
 }
 
-impl Noun for frz_base {
+impl HandleType for frz_base {
     type Value = Layer;
     const NAME: &'static str = "base layer";
     const TAG: u32 = 0x6672_7a05;

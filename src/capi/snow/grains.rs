@@ -5,7 +5,7 @@ use std::ffi::c_void;
 use super::base_layer::frz_base;
 use super::grains_params::{FRZ_GRAINS_FLOOR, frz_grains_params};
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{Noun, change, destroy, read};
+use crate::capi::ffi::handle::{HandleType, change, destroy, read};
 use crate::capi::ffi::saved::{Saved, resumed};
 use crate::capi::ffi::views::{Sized32, fill, frz_view, sized, within};
 use crate::capi::grid::sparse::frz_grid;
@@ -93,7 +93,7 @@ pub(in crate::capi) struct Heap {
     pub saved: Saved,
 }
 
-impl Noun for frz_grains {
+impl HandleType for frz_grains {
     type Value = Heap;
     const NAME: &'static str = "grains handle";
     const TAG: u32 = 0x6672_7a06;

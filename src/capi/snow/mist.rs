@@ -6,7 +6,7 @@ use super::base_layer::frz_base;
 use super::grains::frz_grains;
 use super::mist_params::frz_mist_params;
 use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{Noun, change, clear, destroy, read, read_some, required};
+use crate::capi::ffi::handle::{HandleType, change, clear, destroy, read, read_some, required};
 use crate::capi::ffi::saved::{Saved, resumed};
 use crate::capi::ffi::views::{Sized32, fill, frz_view, meaning, sized, within};
 use crate::capi::grid::sparse::{Grid, frz_grid};
@@ -74,7 +74,7 @@ pub(in crate::capi) struct Air {
     saved: Saved,
 }
 
-impl Noun for frz_mist {
+impl HandleType for frz_mist {
     type Value = Air;
     const NAME: &'static str = "mist handle";
     const TAG: u32 = 0x6672_7a07;

@@ -1,6 +1,6 @@
 //! The current mesh of a tracker, and how the last step changed it.
 
-use super::follower::{Follower, frz_tracker};
+use super::follower::{TrackerHandle, frz_tracker};
 use crate::capi::ffi::guard::{frz_status, guard};
 use crate::capi::ffi::handle::{clear, read, required};
 use crate::capi::ffi::views::{frz_span, meaning};
@@ -220,7 +220,7 @@ pub unsafe extern "C" fn frz_tracker_read_edits(
     })
 }
 
-impl Follower {
+impl TrackerHandle {
     /// Positions (m), at the end of the last step, of the vertices that existed before it.
     fn before(&self) -> &[DVec3] {
         match &self.edits {

@@ -1,6 +1,6 @@
 //! A tracker, as its handle holds it.
 
-use crate::capi::ffi::handle::Noun;
+use crate::capi::ffi::handle::HandleType;
 use crate::capi::ffi::saved::Saved;
 use crate::geometry::DVec3;
 use crate::mesh_repair::Source;
@@ -11,8 +11,8 @@ pub struct frz_tracker {
     _opaque: [u8; 0],
 }
 
-impl Noun for frz_tracker {
-    type Value = Follower;
+impl HandleType for frz_tracker {
+    type Value = TrackerHandle;
     const NAME: &'static str = "tracker";
     const TAG: u32 = 0x6672_7a08;
 }
@@ -35,7 +35,7 @@ impl From<Change> for Edits {
 }
 
 /// The value of a tracker's handle.
-pub(in crate::capi) struct Follower {
+pub(in crate::capi) struct TrackerHandle {
     /// The mesh.
     pub tracker: Tracker,
     /// How the last step changed it; `None`: no triangle changed, or there was no step yet.

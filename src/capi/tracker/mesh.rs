@@ -2,7 +2,7 @@
 
 use std::ffi::c_void;
 
-use super::follower::{Follower, frz_tracker};
+use super::follower::{TrackerHandle, frz_tracker};
 pub use super::params::{frz_tracker_params, frz_tracker_params_init};
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{change, clear, destroy, read, required};
@@ -214,9 +214,9 @@ pub unsafe extern "C" fn frz_tracker_create(
             }
             // The state of a rebuilt mesh contains the mesh.
             if !tracker.is_rebuilt() {
-                tracker.set_lasting(mesh.attribute("detail", 1).unwrap_or_default().to_vec())?;
+                tracker.set_detail_retention(mesh.attribute("detail", 1).unwrap_or_default().to_vec())?;
             }
-            Ok(Follower {
+            Ok(TrackerHandle {
                 tracker,
                 edits: None,
                 outlook: Outlook::default(),

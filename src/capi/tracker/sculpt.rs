@@ -35,10 +35,10 @@ pub unsafe extern "C" fn frz_tracker_resculpt(
             let mut follower = change(tracker)?;
             let mesh = read(mesh)?;
             let particles = self::particles(particles)?;
-            let lasting = mesh.attribute("detail", 1).unwrap_or_default().to_vec();
+            let detail_retention = mesh.attribute("detail", 1).unwrap_or_default().to_vec();
             let before = follower.tracker.vertices().to_vec();
             let follower = &mut *follower;
-            follower.tracker.resculpt(call.ctx(), &mesh.triangles, lasting, &particles)?;
+            follower.tracker.resculpt(call.ctx(), &mesh.triangles, detail_retention, &particles)?;
             let now = &follower.tracker;
             follower.edits = Some(Edits {
                 origins: vec![None; now.vertices().len()],

@@ -39,7 +39,7 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
     let _ = writeln!(out, "frames    {first}-{last}: {count}, {seconds:.2} s at {} a second", report.fps);
     let [least, most] = report.particles;
     let counts = if least == most { least.to_string() } else { format!("{least} to {most}") };
-    let told = match (report.has_ids, report.has_velocities) {
+    let motion = match (report.has_ids, report.has_velocities) {
         (true, true) => "ids and velocities",
         (true, false) => "ids, no velocities",
         (false, true) => "no ids, velocities",
@@ -47,7 +47,7 @@ fn in_words(report: &Report, limit: u64, free: Option<u64>) -> String {
     };
     let _ = writeln!(
         out,
-        "liquid    {} files of {counts} particles, {:.6} m apart; {told}",
+        "liquid    {} files of {counts} particles, {:.6} m apart; {motion}",
         report.files, report.spacing_m
     );
     let [low, high] = report.particles_bounds_m.map(|p| format!("({:.2}, {:.2}, {:.2})", p[0], p[1], p[2]));

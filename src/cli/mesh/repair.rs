@@ -67,19 +67,19 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
         output::refuse_input(&of_frame(&args.output, frame), [from.as_path()]).before()?;
     }
     let mut chosen = args.cell.map(Cell::given);
-    let mut told: Vec<Value> = Vec::new();
+    let mut reports: Vec<Value> = Vec::new();
     for frame in frames.iter() {
         session.ctx.check().during()?;
         let (from, to) = (of_frame(&args.input, frame), of_frame(&args.output, frame));
         let detail = args.read(&from);
         // Fail early if the first file cannot be repaired.
-        let detail = if told.is_empty() { detail.before()? } else { detail.during()? };
-        if told.is_empty() {
+        let detail = if reports.is_empty() { detail.before()? } else { detail.during()? };
+        if reports.is_empty() {
             args.warn_of_losses(&from, &detail).before()?;
         }
         let cell = *chosen.get_or_insert_with(|| Cell::of(&detail.mesh));
         let repaired = match repaired(session, &from, &detail.mesh, cell.edge) {
-            Err(error @ Error::File { .. }) if told.is_empty() => return Err(Failure::refused(error)),
+            Err(error @ Error::File { .. }) if reports.is_empty() => return Err(Failure::refused(error)),
             repaired => repaired.during()?,
         };
         if let Some(what) = warning(&repaired) {
@@ -102,13 +102,14 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
         if !args.json {
             output::print(&in_words(&report, cell)).during()?;
         }
-        told.push(report);
+        reports.push(report);
     }
-    session.record("meshes", json!(told));
+    session.record("meshes", json!(reports));
     if !args.json {
         return Ok(());
     }
-    let all = if args.frames.is_some() { json!(told) } else { told.into_iter().next().unwrap_or_default() };
+    let all =
+        if args.frames.is_some() { json!(reports) } else { reports.into_iter().next().unwrap_or_default() };
     output::print(&format!("{all:#}\n")).during()
 }
 

@@ -17,11 +17,12 @@ pub fn report(error: &Error) -> u8 {
         return exit::REFUSED;
     }
     // clap prints a headline, maybe a list and a tip, then the usage; the first two describe the error.
-    let told: Vec<&str> = text.lines().take_while(|line| !line.starts_with("Usage:")).collect();
-    let told = told.join(" ");
-    let told = told.strip_prefix("error:").unwrap_or(&told).trim();
-    let told = told.split_once(" For more information").map_or(told, |parts| parts.0);
-    let told = told.replace("tip:", ";").split_whitespace().collect::<Vec<_>>().join(" ").replace(" ;", ";");
-    exit::say_error(&format!("{told}; see `frazil --help`"));
+    let message: Vec<&str> = text.lines().take_while(|line| !line.starts_with("Usage:")).collect();
+    let message = message.join(" ");
+    let message = message.strip_prefix("error:").unwrap_or(&message).trim();
+    let message = message.split_once(" For more information").map_or(message, |parts| parts.0);
+    let message =
+        message.replace("tip:", ";").split_whitespace().collect::<Vec<_>>().join(" ").replace(" ;", ";");
+    exit::say_error(&format!("{message}; see `frazil --help`"));
     exit::REFUSED
 }

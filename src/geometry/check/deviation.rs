@@ -391,9 +391,9 @@ mod tests {
                 let least = tree.facets.iter().fold(f64::INFINITY, best).sqrt();
                 let nearest = tree.nearest(point).unwrap();
                 let hinted = tree.search(point, guess).unwrap();
-                let told = [nearest.distance, (nearest.position - point).norm(), hinted.square.sqrt()];
-                let is_least = told.iter().all(|told| (told - least).abs() <= 1e-12 * (1.0 + least));
-                assert!(is_least, "{told:?}: {least}");
+                let squares = [nearest.distance, (nearest.position - point).norm(), hinted.square.sqrt()];
+                let is_least = squares.iter().all(|squares| (squares - least).abs() <= 1e-12 * (1.0 + least));
+                assert!(is_least, "{squares:?}: {least}");
                 guess = Some(hinted.facet);
             }
         }

@@ -10,7 +10,7 @@ use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 
-use super::Found;
+use super::ParticleColumns;
 use crate::geometry::points::{Points, Values};
 use crate::io::files::numbers::{Kind, Numbers, Order, most_inflated};
 use crate::io::files::source;
@@ -39,7 +39,7 @@ struct Field {
 }
 
 /// Reads the points of a file.
-pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
+pub(in crate::io) fn parse(bytes: &[u8]) -> Result<ParticleColumns, String> {
     let is_packed = bytes.starts_with(&[0x1f, 0x8b]);
     let mut reader: Box<dyn Read + '_> =
         if is_packed { Box::new(GzDecoder::new(bytes)) } else { Box::new(bytes) };
@@ -83,7 +83,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
     if is_packed {
         read_to_the_end(&mut *reader)?;
     }
-    let mut found = Found::new(positions);
+    let mut found = ParticleColumns::new(positions);
     for Field { name, kind, size, numbers } in fields {
         match numbers {
             Some(numbers) => found.add(&name, kind, size, numbers)?,

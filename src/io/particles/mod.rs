@@ -38,7 +38,7 @@ pub const WRITTEN: [&str; 5] = ["bgeo", "bgeo.gz", "bhclassic", "ply", "xyz"];
 
 /// Points of a file, and their voxel size if the file states it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cloud {
+pub struct ParticleData {
     /// Positions (m).
     pub positions: Vec<DVec3>,
     /// Attributes.
@@ -47,7 +47,7 @@ pub struct Cloud {
     pub voxel_size: Option<f64>,
 }
 
-impl Cloud {
+impl ParticleData {
     /// The values of the attribute of this name.
     pub fn attribute(&self, name: &str) -> Option<&Values> {
         self.attributes.iter().find(|attribute| attribute.name == name).map(|attribute| &attribute.values)
@@ -77,7 +77,7 @@ impl Cloud {
     }
 }
 
-impl From<Points> for Cloud {
+impl From<Points> for ParticleData {
     fn from(points: Points) -> Self {
         let positions = (0..points.count()).map(|point| points.position(point)).collect();
         Self { positions, attributes: points.attributes, voxel_size: Some(points.voxel_size) }
@@ -130,7 +130,7 @@ pub fn is_written(path: &Path) -> bool {
 /// # Errors
 /// A file that is missing, empty, cut short or malformed; a position that is not finite (the particle is named, counted from 1); an integer
 /// that is out of its type's range; Houdini's own .bgeo.
-pub fn read(path: &Path) -> Result<Cloud> {
+pub fn read(path: &Path) -> Result<ParticleData> {
     parse(path, &source::read(path)?)
 }
 
@@ -138,11 +138,13 @@ pub fn read(path: &Path) -> Result<Cloud> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn parse(path: &Path, bytes: &[u8]) -> Result<Cloud> {
+pub fn parse(path: &Path, bytes: &[u8]) -> Result<ParticleData> {
     if bytes.is_empty() {
         return Err(Error::file(path, "the file is empty"));
     }
-    let found = |parse: fn(&[u8]) -> std::result::Result<Found, String>| parse(bytes).map(Found::into_parts);
+    let found = |parse: fn(&[u8]) -> std::result::Result<ParticleColumns, String>| {
+        parse(bytes).map(ParticleColumns::into_parts)
+    };
     let parse = || match format(path) {
         Some(Format::Bgeo) => found(bgeo::parse),
         Some(Format::BgeoSc) => Err(bgeo::HOUDINIS.into()),
@@ -208,14 +210,14 @@ fn warn_of_rounding(path: &Path, points: &Points) {
 
 /// The particles of a file, as a reader returns them.
 #[derive(Debug)]
-pub(super) struct Found {
+pub(super) struct ParticleColumns {
     positions: Vec<DVec3>,
     attributes: Vec<Attribute>,
     /// Attributes that no [`Values`] can hold.
     left_out: Vec<String>,
 }
 
-impl Found {
+impl ParticleColumns {
     /// Positions, three numbers each; an incomplete last one is ignored.
     pub fn new(numbers: Numbers) -> Self {
         let numbers = numbers.into_reals();
@@ -283,9 +285,9 @@ impl Found {
         self.left_out.push(format!("\"{name}\""));
     }
 
-    fn into_parts(self) -> (Cloud, Vec<String>) {
+    fn into_parts(self) -> (ParticleData, Vec<String>) {
         let Self { positions, attributes, left_out } = self;
-        (Cloud { positions, attributes, voxel_size: None }, left_out)
+        (ParticleData { positions, attributes, voxel_size: None }, left_out)
     }
 }
 

@@ -7,7 +7,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::{Cloud, shared, whole};
+use super::{ParticleData, shared, whole};
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::geometry::mesh::spacing;
@@ -41,13 +41,13 @@ pub fn holds_points(path: &Path) -> Result<bool> {
 ///
 /// # Errors
 /// A missing, cut or malformed file; numbers that are not finite, or too large for their type.
-pub fn read(path: &Path) -> Result<Cloud> {
+pub fn read(path: &Path) -> Result<ParticleData> {
     let bytes = source::read(path)?;
     parse(&bytes).map_err(|what| Error::file(path, what))
 }
 
 /// As [`read`], from the bytes of the file.
-pub(in crate::io) fn parse(bytes: &[u8]) -> std::result::Result<Cloud, String> {
+pub(in crate::io) fn parse(bytes: &[u8]) -> std::result::Result<ParticleData, String> {
     let mut body = ply::open(bytes)?;
     let at = body.elements.iter().position(|element| element.name == "vertex").expect("open looks for it");
     let vertices = body.elements.swap_remove(at);
@@ -66,7 +66,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> std::result::Result<Cloud, String> {
         (0..vertices.count).map(|row| DVec3::from(axes.map(|axis| columns[axis][row]))).collect();
     let attributes = attributes(&vertices, &names, &columns)?;
     let voxel_size = body.comments.iter().find_map(|line| line.strip_prefix(VOXEL)?.trim().parse().ok());
-    Ok(Cloud { positions, attributes, voxel_size })
+    Ok(ParticleData { positions, attributes, voxel_size })
 }
 
 fn attributes(

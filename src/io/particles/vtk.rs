@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use super::Found;
+use super::ParticleColumns;
 use crate::io::files::numbers::{Kind, Numbers, Order};
 use crate::io::files::{source, text};
 
@@ -32,10 +32,10 @@ enum Owner {
 }
 
 /// Reads the points of a file.
-pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
+pub(in crate::io) fn parse(bytes: &[u8]) -> Result<ParticleColumns, String> {
     let bytes = with_line_feeds(text::without_mark(bytes)?)?;
     let mut reader = Reader::open(&bytes)?;
-    let mut found: Option<Found> = None;
+    let mut found: Option<ParticleColumns> = None;
     let (mut owner, mut count) = (Owner::File, 0);
     while let Some(line) = reader.line()? {
         let words: Vec<&str> = line.split_whitespace().collect();
@@ -47,7 +47,9 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
                 let Some(Type::Number(kind)) = type_of(kind) else { return Err(wrong()) };
                 reader.components = 3;
                 let numbers = points.parse::<usize>().ok().and_then(|points| points.checked_mul(3));
-                found = Some(Found::new(reader.numbers(Type::Number(kind), numbers.ok_or_else(wrong)?)?));
+                found = Some(ParticleColumns::new(
+                    reader.numbers(Type::Number(kind), numbers.ok_or_else(wrong)?)?,
+                ));
             }
             ("vertices" | "lines" | "polygons" | "triangle_strips" | "cells", [cells, size]) => {
                 let [cells, size] = [cells, size].map(|word| word.parse().map_err(|_| wrong()));
@@ -60,7 +62,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
             ("point_data" | "cell_data", [values]) => {
                 owner = if keyword == "point_data" { Owner::Points } else { Owner::Cells };
                 count = values.parse().map_err(|_| wrong())?;
-                let points = found.as_ref().map_or(0, Found::count);
+                let points = found.as_ref().map_or(0, ParticleColumns::count);
                 if owner == Owner::Points && count != points {
                     return Err(format!("there are data of {count} points, but {points} points"));
                 }
@@ -292,7 +294,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads the arrays of a FIELD; those of points go to `found`.
-    fn field(&mut self, arrays: usize, mut found: Option<&mut Found>) -> Result<(), String> {
+    fn field(&mut self, arrays: usize, mut found: Option<&mut ParticleColumns>) -> Result<(), String> {
         for _ in 0..arrays {
             let line = self.line()?.ok_or("the .vtk file ends in a FIELD")?;
             let words: Vec<&str> = line.split_whitespace().collect();
@@ -310,7 +312,12 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads an array of `values` values into `found`, or skips it.
-    fn array(&mut self, array: &Array, values: usize, found: Option<&mut Found>) -> Result<(), String> {
+    fn array(
+        &mut self,
+        array: &Array,
+        values: usize,
+        found: Option<&mut ParticleColumns>,
+    ) -> Result<(), String> {
         let Array { name, kind, components } = array;
         self.components = *components;
         let too_many =

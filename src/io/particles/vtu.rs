@@ -5,12 +5,12 @@ use std::str::FromStr;
 
 use roxmltree::{Document, Node};
 
-use super::Found;
+use super::ParticleColumns;
 use super::vtu_data::{Codec, File, Inflate, Stream, lz4, zlib};
 use crate::io::files::numbers::{Kind, Numbers, Order};
 
 /// Reads the points of a file.
-pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
+pub(in crate::io) fn parse(bytes: &[u8]) -> Result<ParticleColumns, String> {
     let (text, appended) = split(bytes)?;
     let text = std::str::from_utf8(&text).map_err(|_| "is not a .vtu file: it is not text")?;
     let document =
@@ -36,7 +36,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
         }
     }
     let Piece { positions, arrays, left_out, .. } = all.ok_or("the .vtu file has no Piece")?;
-    let mut found = Found::new(positions);
+    let mut found = ParticleColumns::new(positions);
     for Array { name, kind, components, numbers } in arrays {
         found.add(&name, kind, components, numbers)?;
     }

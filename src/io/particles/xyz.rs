@@ -7,7 +7,7 @@
 
 use std::io::Write;
 
-use super::Found;
+use super::ParticleColumns;
 use crate::geometry::points::Points;
 use crate::io::files::numbers::{Kind, Numbers, Order};
 use crate::io::files::{source, text};
@@ -18,7 +18,7 @@ const ROW: usize = 12;
 const PIECE: usize = 1 << 14;
 
 /// Reads the particles of a file.
-pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
+pub(in crate::io) fn parse(bytes: &[u8]) -> Result<ParticleColumns, String> {
     let marked = text::without_mark(bytes);
     let marked = if is_wide(bytes) { marked? } else { marked.unwrap_or(bytes) };
     if is_text(marked) {
@@ -32,7 +32,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> Result<Found, String> {
     }
     let mut numbers = Kind::F32.none();
     Kind::F32.decode(bytes, Order::Little, &mut numbers)?;
-    Ok(Found::new(numbers))
+    Ok(ParticleColumns::new(numbers))
 }
 
 /// Whether every other byte is 0, as in UTF-16, after what may be its mark or the first bytes of a float.
@@ -50,7 +50,7 @@ fn is_text(bytes: &[u8]) -> bool {
     })
 }
 
-fn parse_text(bytes: &[u8]) -> Result<Found, String> {
+fn parse_text(bytes: &[u8]) -> Result<ParticleColumns, String> {
     let mut numbers = Vec::new();
     // Most files have no comma, so there is nothing to decide.
     let mut commas = bytes.contains(&b',').then(Commas::default);
@@ -76,7 +76,7 @@ fn parse_text(bytes: &[u8]) -> Result<Found, String> {
             numbers.push(text::number(word).ok_or_else(|| format!("line {n}: {}", text::no_number(word)))?);
         }
     }
-    Ok(Found::new(Numbers::Real(numbers)))
+    Ok(ParticleColumns::new(Numbers::Real(numbers)))
 }
 
 /// The columns of a line, separated by blanks and semicolons.

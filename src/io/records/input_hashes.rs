@@ -9,9 +9,9 @@ use crate::io::files::hash;
 
 /// Hashes of files by path, each of the bytes that were first used.
 #[derive(Default)]
-pub struct Seen(Mutex<HashMap<PathBuf, String>>);
+pub struct InputHashes(Mutex<HashMap<PathBuf, String>>);
 
-impl Seen {
+impl InputHashes {
     /// Reads a file for use.
     ///
     /// # Errors
@@ -63,7 +63,7 @@ mod tests {
         let folder = std::env::temp_dir().join(format!("frazil-seen-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         let path = folder.join("a.obj");
-        let seen = Seen::default();
+        let seen = InputHashes::default();
         std::fs::write(&path, "one").unwrap();
         let hash = seen.hash(&path).unwrap();
         assert_eq!(seen.read(&path).unwrap(), b"one");

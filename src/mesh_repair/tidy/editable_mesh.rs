@@ -23,17 +23,17 @@ pub(in crate::mesh_repair) fn flipped([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
 const NONE: u32 = u32::MAX;
 
 /// A mesh with the vertex rings of all vertices that a created triangle uses: all triangles around them, whole ones too.
-pub(in crate::mesh_repair) struct Fans<'a> {
+pub(in crate::mesh_repair) struct VertexRings<'a> {
     draft: &'a mut Draft,
     /// For each vertex, the index of its ring; [`NONE`]: it has none.
     slots: Vec<u32>,
     /// Triangles of each ring, in no order.
-    fans: Vec<Vec<u32>>,
+    rings: Vec<Vec<u32>>,
     /// For each triangle, whether a collapse has removed it.
     is_dead: Vec<bool>,
 }
 
-impl<'a> Fans<'a> {
+impl<'a> VertexRings<'a> {
     /// Takes one pass over all triangles, and memory for those near created ones.
     pub(in crate::mesh_repair) fn of(draft: &'a mut Draft) -> Self {
         let mut slots = vec![NONE; draft.positions.len()];
@@ -50,16 +50,16 @@ impl<'a> Fans<'a> {
                 }
             }
         }
-        let mut fans: Vec<Vec<u32>> = vec![Vec::new(); count as usize];
+        let mut rings: Vec<Vec<u32>> = vec![Vec::new(); count as usize];
         for (triangle, corners) in (0..).zip(&draft.triangles) {
             for corner in corners {
-                if let Some(fan) = fans.get_mut(slots[*corner as usize] as usize) {
+                if let Some(fan) = rings.get_mut(slots[*corner as usize] as usize) {
                     fan.push(triangle);
                 }
             }
         }
         let is_dead = vec![false; draft.triangles.len()];
-        Self { draft, slots, fans, is_dead }
+        Self { draft, slots, rings, is_dead }
     }
 
     /// Whether a triangle exists, and was made or changed by the repair; whole ones stay as they are.
@@ -87,11 +87,11 @@ impl<'a> Fans<'a> {
 
     /// The triangles around a vertex; empty if no created triangle used it.
     fn around(&self, vertex: u32) -> &[u32] {
-        self.fans.get(self.slots[vertex as usize] as usize).map(Vec::as_slice).unwrap_or_default()
+        self.rings.get(self.slots[vertex as usize] as usize).map(Vec::as_slice).unwrap_or_default()
     }
 
     fn around_mut(&mut self, vertex: u32) -> Option<&mut Vec<u32>> {
-        self.fans.get_mut(self.slots[vertex as usize] as usize)
+        self.rings.get_mut(self.slots[vertex as usize] as usize)
     }
 
     /// The neighbours of a vertex, ascending.
@@ -163,7 +163,7 @@ impl<'a> Fans<'a> {
         matches!(self.source(triangles[0]), Source::Part(of) if is_of(of))
     }
 
-    /// Makes a change, one of [`Fans::changes`] whose moving triangles are all created; returns the triangles that it touched, and whole
+    /// Makes a change, one of [`VertexRings::changes`] whose moving triangles are all created; returns the triangles that it touched, and whole
     /// ones around the same vertex.
     pub(in crate::mesh_repair) fn make(&mut self, change: Change) -> Vec<u32> {
         match change {
@@ -332,27 +332,27 @@ pub(in crate::mesh_repair) mod tests {
     #[test]
     fn fans_hold_whole_triangles_too_and_are_only_where_something_was_created() {
         let mut draft = draft();
-        let fans = Fans::of(&mut draft);
-        assert_eq!(fans.around(4), [0, 1, 2, 3]);
-        assert_eq!(fans.around(0), [0, 3, 4, 5]);
-        assert_eq!((fans.ring(0), fans.ring(1)), (vec![1, 2, 3, 4], vec![0, 2, 4]));
-        assert!(fans.around(7).is_empty());
+        let rings = VertexRings::of(&mut draft);
+        assert_eq!(rings.around(4), [0, 1, 2, 3]);
+        assert_eq!(rings.around(0), [0, 3, 4, 5]);
+        assert_eq!((rings.ring(0), rings.ring(1)), (vec![1, 2, 3, 4], vec![0, 2, 4]));
+        assert!(rings.around(7).is_empty());
     }
 
     #[test]
     fn only_sound_changes_are_offered() {
         let mut draft = draft();
-        let fans = Fans::of(&mut draft);
+        let rings = VertexRings::of(&mut draft);
         // Vertices 1 and 3 are adjacent to 0 and 4, but 2 is, too.
-        assert!(!fans.may_join(4, 0) && !fans.may_join(4, 2));
+        assert!(!rings.may_join(4, 0) && !rings.may_join(4, 2));
         // Only 0 and 2 are adjacent to 1 and 4.
-        assert!(fans.may_join(4, 1) && fans.may_join(4, 3));
+        assert!(rings.may_join(4, 1) && rings.may_join(4, 3));
         let [a, b, c, d] = [1, 4, 0, 2];
         let into = Change::Collapse { from: 4, to: 1, position: DVec3::repeat(1.0) };
         // The edge 0-2 exists already; that from 1 to 3 does not, but 0-1 has a whole triangle beyond it.
-        assert_eq!(fans.flip(0, [a, b, c]), None);
+        assert_eq!(rings.flip(0, [a, b, c]), None);
         let flip = Change::Flip { triangles: [0, 3], corners: [4, 0, 1, 3] };
-        assert_eq!(fans.changes(0), [into, flip]);
+        assert_eq!(rings.changes(0), [into, flip]);
         assert_eq!(flipped([a, b, c, d]), [[0, 1, 2], [2, 4, 0]]);
     }
 
@@ -360,10 +360,10 @@ pub(in crate::mesh_repair) mod tests {
     fn changes_keep_a_closed_manifold_and_what_is_dropped_is_dropped_alone() {
         for change in [0, 1] {
             let mut draft = draft();
-            let mut fans = Fans::of(&mut draft);
-            let touched = fans.make(fans.changes(0)[change]);
+            let mut rings = VertexRings::of(&mut draft);
+            let touched = rings.make(rings.changes(0)[change]);
             assert_eq!(touched.len(), [3, 2][change]);
-            fans.finish();
+            rings.finish();
             assert!(Topology::of(draft.positions.len(), &draft.triangles).is_watertight());
             // Vertex 5 stays: it is not new.
             let (vertices, triangles) = [(9, 8), (10, 10)][change];

@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 
 use super::{Draft, Source};
 use crate::geometry::DVec3;
-use editable_mesh::{Change, Fans, flipped};
+use editable_mesh::{Change, VertexRings, flipped};
 
 /// Quality below which a triangle is a sliver: the 1e-4 guaranteed for a repaired mesh, with a margin.
 const LEAST: f64 = 4e-4;
@@ -83,7 +83,7 @@ pub(super) fn tidy(draft: &mut Draft) -> usize {
         }
     }
     let left = tidy.slivers();
-    tidy.fans.finish();
+    tidy.rings.finish();
     left
 }
 
@@ -148,7 +148,7 @@ impl Outcome {
 
 /// A mesh from which slivers are being removed.
 struct Tidy<'a> {
-    fans: Fans<'a>,
+    rings: VertexRings<'a>,
     /// Created triangles, ascending; collapses may have removed some.
     created: Vec<u32>,
     /// Triangles still to be looked at, each once.
@@ -164,7 +164,7 @@ impl<'a> Tidy<'a> {
         let created = (0..).zip(&draft.sources).filter(|(_, source)| !matches!(source, Source::Whole(_)));
         Self {
             created: created.map(|(triangle, _)| triangle).collect(),
-            fans: Fans::of(draft),
+            rings: VertexRings::of(draft),
             waiting: VecDeque::new(),
             is_waiting: vec![false; count],
             tries: vec![0; count],
@@ -185,7 +185,7 @@ impl<'a> Tidy<'a> {
                 && let Some(change) = self.best(triangle, rule)
             {
                 has_changed = true;
-                for touched in self.fans.make(change) {
+                for touched in self.rings.make(change) {
                     self.queue(touched, rule);
                 }
             }
@@ -204,23 +204,23 @@ impl<'a> Tidy<'a> {
 
     /// Count of created triangles whose smallest altitude is below [`LEAST`] of their longest edge.
     fn slivers(&self) -> usize {
-        let there = self.created.iter().filter(|&&triangle| self.fans.is_created(triangle));
+        let there = self.created.iter().filter(|&&triangle| self.rings.is_created(triangle));
         there.filter(|&&triangle| altitude(&self.positions(triangle), 0.0) < LEAST).count()
     }
 
     /// Whether a triangle was created, still exists, and is below a quality.
     fn is_below(&self, triangle: u32, bound: f64) -> bool {
-        self.fans.is_created(triangle) && quality(&self.positions(triangle)) < bound
+        self.rings.is_created(triangle) && quality(&self.positions(triangle)) < bound
     }
 
     fn positions(&self, triangle: u32) -> [DVec3; 3] {
-        self.fans.corners(triangle).map(|corner| self.fans.position(corner))
+        self.rings.corners(triangle).map(|corner| self.rings.position(corner))
     }
 
     /// The best change that a rule allows for a triangle; the first of equal ones.
     fn best(&self, triangle: u32, rule: &Rule) -> Option<Change> {
         let mut best: Option<Outcome> = None;
-        for change in self.fans.changes(triangle) {
+        for change in self.rings.changes(triangle) {
             if let Some(outcome) = self.outcome(change, rule)
                 && best.is_none_or(|best| outcome.is_better_than(&best))
             {
@@ -233,8 +233,8 @@ impl<'a> Tidy<'a> {
     /// The outcome of a change; none if a rule forbids it.
     fn outcome(&self, change: Change, rule: &Rule) -> Option<Outcome> {
         let far = match change {
-            Change::Collapse { from, position, .. } => (position - self.fans.position(from)).norm(),
-            Change::Flip { corners, .. } => apart(corners.map(|corner| self.fans.position(corner))),
+            Change::Collapse { from, position, .. } => (position - self.rings.position(from)).norm(),
+            Change::Flip { corners, .. } => apart(corners.map(|corner| self.rings.position(corner))),
         };
         let farthest =
             if let Change::Flip { .. } = change { rule.farthest.min(BEVEL) } else { rule.farthest };
@@ -260,17 +260,17 @@ impl<'a> Tidy<'a> {
     /// The triangles around a collapse, before and after it.
     fn collapsed(&self, from: u32, to: u32, position: DVec3, rule: &Rule) -> Option<[Score; 2]> {
         let [mut before, mut after] = [Score::EMPTY; 2];
-        for triangle in self.fans.moving(from, to, position) {
-            if !self.fans.is_created(triangle) {
+        for triangle in self.rings.moving(from, to, position) {
+            if !self.rings.is_created(triangle) {
                 return None;
             }
-            let (corners, old) = (self.fans.corners(triangle), self.positions(triangle));
+            let (corners, old) = (self.rings.corners(triangle), self.positions(triangle));
             let old_quality = quality(&old);
             before.count(old_quality);
             if corners.contains(&from) && corners.contains(&to) {
                 continue;
             }
-            let moved = |at: u32| if at == from || at == to { position } else { self.fans.position(at) };
+            let moved = |at: u32| if at == from || at == to { position } else { self.rings.position(at) };
             let new = corners.map(moved);
             // The normal of a sliver is meaningless.
             let turns = old_quality >= LEAST && normal(&old).dot(&normal(&new)) <= 0.0;
@@ -292,7 +292,7 @@ impl<'a> Tidy<'a> {
             sum += normal(&old);
         }
         for corners in flipped(corners) {
-            let new = corners.map(|corner| self.fans.position(corner));
+            let new = corners.map(|corner| self.rings.position(corner));
             if normal(&new).dot(&sum) <= 0.0 && !rule.may_fold {
                 return None;
             }

@@ -233,12 +233,12 @@ fn check_length(bytes: &[u8]) -> std::result::Result<(), String> {
         return Err("the file is empty".into());
     }
     if bytes.starts_with(b"glTF") {
-        let told = bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
-        if told.is_none_or(|told| bytes.len() < told) {
+        let stated = bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+        if stated.is_none_or(|stated| bytes.len() < stated) {
             return Err(format!("the .glb file is cut short at {} bytes", bytes.len()));
         }
         // A header of 12 bytes, and one of 8 for the JSON that must follow.
-        if told.is_some_and(|told| told < 20) {
+        if stated.is_some_and(|stated| stated < 20) {
             return Err("the .glb file is damaged: it says that it is shorter than its own header".into());
         }
     }

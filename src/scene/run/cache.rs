@@ -12,7 +12,7 @@ use super::stored::{Kept, Stored};
 use crate::error::{Error, Result};
 use crate::io::files::hash::Hasher;
 use crate::io::records::checksummed;
-use crate::io::records::input_hashes::Seen;
+use crate::io::records::input_hashes::InputHashes;
 use crate::io::records::manifest::Manifest;
 use crate::scene::FrameChoice;
 
@@ -81,7 +81,7 @@ impl Cache {
     /// # Errors
     /// A folder that cannot be read or that holds frames of other settings; a damaged record; no frame to resume from; a gap between
     /// frames, if the stage allows none.
-    pub fn open(stage: &dyn Stage, seen: &Arc<Seen>, folder: &Path, asked: Asked<'_>) -> Result<Self> {
+    pub fn open(stage: &dyn Stage, seen: &Arc<InputHashes>, folder: &Path, asked: Asked<'_>) -> Result<Self> {
         let settings = stage.settings()?;
         let path = record_path(folder, stage);
         let mut record: Record = checksummed::read(&path)?.unwrap_or_default();
@@ -142,7 +142,7 @@ impl Cache {
     /// The changed settings, or the frame whose inputs have changed; a damaged record; an input that cannot be read.
     pub fn refuse_stale(
         stage: &dyn Stage,
-        seen: &Arc<Seen>,
+        seen: &Arc<InputHashes>,
         folder: &Path,
         reader: &str,
         upstream: &[&Stored],

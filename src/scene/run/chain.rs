@@ -8,7 +8,7 @@ use super::stage::Stage;
 use super::stored::Stored;
 use crate::error::{Error, Result};
 use crate::io::files::hash::Hasher;
-use crate::io::records::input_hashes::Seen;
+use crate::io::records::input_hashes::InputHashes;
 use crate::io::records::manifest::{Manifest, Written};
 
 /// Hashes of consecutive frames.
@@ -16,7 +16,7 @@ pub(super) struct Chain {
     first: i32,
     /// The hash of the start, then that of each frame requested so far.
     links: Vec<String>,
-    seen: Arc<Seen>,
+    seen: Arc<InputHashes>,
 }
 
 /// Hashes of a frame's inputs.
@@ -30,7 +30,7 @@ pub struct Made {
 
 impl Chain {
     /// A chain whose first link is for frame `first` and depends on `seed`.
-    pub fn new(seen: &Arc<Seen>, first: i32, seed: &str) -> Self {
+    pub fn new(seen: &Arc<InputHashes>, first: i32, seed: &str) -> Self {
         let mut start = Hasher::default();
         start.add_text(seed).add(&first.to_le_bytes());
         Self { first, links: vec![start.finish()], seen: seen.clone() }

@@ -8,7 +8,7 @@ use super::pass::AnyStage;
 use super::stage::Stage;
 use super::stored::Stored;
 use crate::error::{Error, Result};
-use crate::io::records::input_hashes::Seen;
+use crate::io::records::input_hashes::InputHashes;
 use crate::scene::Scene;
 
 /// A scene with its stages, upstream stages first.
@@ -16,7 +16,7 @@ pub struct Plan<'a> {
     /// The scene.
     pub scene: &'a Scene,
     /// Contents of its files when they were read.
-    pub seen: &'a Arc<Seen>,
+    pub seen: &'a Arc<InputHashes>,
     /// Its stages.
     pub stages: Vec<Box<dyn AnyStage + 'a>>,
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::error::Result;
 use crate::io::files::sequence::Pattern;
-use crate::io::records::input_hashes::Seen;
+use crate::io::records::input_hashes::InputHashes;
 use crate::scene::schema::key::Key;
 use crate::scene::schema::key::Scope::{First, Object};
 use crate::scene::schema::values::path;
@@ -22,14 +22,14 @@ pub type Settings = BTreeMap<String, String>;
 pub(in crate::scene) fn changed(before: &Settings, after: &Settings) -> Vec<String> {
     let keys: BTreeSet<&String> = before.keys().chain(after.keys()).collect();
     let differs = |key: &&&String| before.get(**key) != after.get(**key);
-    let told = |key: &String| match (before.get(key), named(key)) {
+    let described = |key: &String| match (before.get(key), named(key)) {
         (Some(value), key) if value.starts_with(CONTENT) => format!("{key} had another content"),
         (Some(value), key) if key == "shot.frames" => format!("{key} began at {value}"),
         (Some(value), key) if value.len() > LONG => key,
         (Some(value), key) => format!("{key} was {value}"),
         (None, key) => format!("{key} was not there"),
     };
-    keys.iter().filter(differs).map(|key| told(key)).collect()
+    keys.iter().filter(differs).map(|key| described(key)).collect()
 }
 
 /// A key as `--set` names it: `object.1.scale`, not `object[1].scale`.
@@ -42,7 +42,7 @@ fn named(key: &str) -> String {
 ///
 /// # Errors
 /// A file that cannot be read.
-pub fn settings_of(scene: &Scene, stage: &str, seen: &Seen, roles: &[Role]) -> Result<Settings> {
+pub fn settings_of(scene: &Scene, stage: &str, seen: &InputHashes, roles: &[Role]) -> Result<Settings> {
     let mut settings: Settings = scene
         .values
         .iter()

@@ -50,7 +50,7 @@ pub fn verify(ctx: &Context, folder: &Path) -> Result<Verified> {
     let (mut damaged, mut known) = (Vec::new(), BTreeSet::new());
     let (own, faults) = match Own::read(folder, std::iter::empty()) {
         Ok(own) => (own, Vec::new()),
-        Err(error) => (Own::unknown(folder), vec![told(FILES, error)]),
+        Err(error) => (Own::unknown(folder), vec![damage_of(FILES, error)]),
     };
     damaged.extend(faults);
     let stages = own.stages_there()?;
@@ -65,7 +65,7 @@ pub fn verify(ctx: &Context, folder: &Path) -> Result<Verified> {
         if !folder.join(&record).exists() {
             damaged.push(Damage { file: record.clone(), what: "is missing".into() });
         } else if let Err(error) = checksummed::read::<serde_json::Value>(&folder.join(&record)) {
-            damaged.push(told(&record, error));
+            damaged.push(damage_of(&record, error));
         }
         known.insert(record);
     }
@@ -103,7 +103,7 @@ pub fn verify(ctx: &Context, folder: &Path) -> Result<Verified> {
     })
 }
 
-fn told(file: &str, error: Error) -> Damage {
+fn damage_of(file: &str, error: Error) -> Damage {
     let what = match error {
         Error::File { what, .. } => what,
         other => other.to_string(),
@@ -117,7 +117,7 @@ fn manifest(folder: &Path, name: &str, damaged: &mut Vec<Damage>) -> Option<(Str
     match Manifest::read(folder, stage, frame) {
         Ok(manifest) => manifest.map(|manifest| (name.to_string(), manifest)),
         Err(error) => {
-            damaged.push(told(name, error));
+            damaged.push(damage_of(name, error));
             None
         }
     }

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::estimate::{disk, memory};
 use super::inputs::area;
-use super::stage::liquid_over_time::Course;
+use super::stage::liquid_over_time::LiquidState;
 use super::{Inputs, ML, Shallow};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -95,7 +95,7 @@ impl Report {
 /// A file that cannot be read; a source inside solid, and anything else that a run would refuse; cancel.
 pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let (of, frames) = (scene.shallow()?, scene.shot.frames);
-    let course = Course::begin(ctx, (scene, of, inputs))?;
+    let course = LiquidState::begin(ctx, (scene, of, inputs))?;
     let columns = course.liquid.columns();
     let (grid, heights) = (inputs.grid, inputs.heights);
     let [low, high] = inputs.bounds;
@@ -139,7 +139,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
 }
 
 /// Steps through terrain, obstacles and points of all later frames; a sentence for each point that should act but is resting.
-fn later(ctx: &Context, scene: &Scene, mut course: Course<'_>) -> Result<Vec<String>> {
+fn later(ctx: &Context, scene: &Scene, mut course: LiquidState<'_>) -> Result<Vec<String>> {
     // By name: the first frame, and the number of frames.
     let mut resting: BTreeMap<String, (i32, usize)> = BTreeMap::new();
     for frame in scene.shot.frames.iter().skip(1) {
@@ -149,12 +149,12 @@ fn later(ctx: &Context, scene: &Scene, mut course: Course<'_>) -> Result<Vec<Str
             resting.entry(name).or_insert((frame, 0)).1 += 1;
         }
     }
-    let told = |(name, (first, count)): (String, (i32, usize))| {
+    let warning = |(name, (first, count)): (String, (i32, usize))| {
         format!(
             "{name} lies inside solid or outside of the area, and rests, at {count} frames, the first of them {first}"
         )
     };
-    Ok(resting.into_iter().map(told).collect())
+    Ok(resting.into_iter().map(warning).collect())
 }
 
 /// Liquid added after the first frame (m3).
@@ -173,7 +173,7 @@ fn comes(scene: &Scene, of: &Shallow) -> f64 {
 }
 
 /// Probable mistakes.
-fn odd(of: &Shallow, inputs: &Inputs, course: &Course<'_>, void_cells: usize) -> Vec<String> {
+fn odd(of: &Shallow, inputs: &Inputs, course: &LiquidState<'_>, void_cells: usize) -> Vec<String> {
     let mut out = Vec::new();
     let (grid, heights) = (inputs.grid, inputs.heights);
     let share = void_cells as f64 / grid.cells() as f64;

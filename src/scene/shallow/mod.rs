@@ -25,7 +25,7 @@ use crate::io::files::sequence::Pattern;
 use crate::motion::{Space, Up};
 use crate::shallow::free_fall::Falls;
 use crate::shallow::material::Liquid;
-use crate::shallow::params::{Friction, Pace, Section};
+use crate::shallow::params::{Friction, Section, TimeStepping};
 use crate::shallow::pipes::Border;
 use crate::shallow::sources::FlowPoint;
 use crate::shallow::{Params, Staining, sources};
@@ -332,8 +332,8 @@ fn params(values: &Values) -> Params {
         gravity: values.settled("shallow", None, "gravity"),
         kept: values.settled("shallow", None, "kept"),
         pace: match text("pace") {
-            Some("realtime") => Pace::Realtime(values.settled("shallow", None, "step")),
-            _ => Pace::Exact,
+            Some("realtime") => TimeStepping::Realtime(values.settled("shallow", None, "step")),
+            _ => TimeStepping::Exact,
         },
         border: match text("border") {
             Some("closed") => Border::Closed,
@@ -377,7 +377,7 @@ mod tests {
         }
         // Except for border and pace, a scene's defaults are the library's.
         let params = scene("").shallow().unwrap().params.clone();
-        assert_eq!(params, Params { border: Border::Open, pace: Pace::Exact, ..Params::default() });
+        assert_eq!(params, Params { border: Border::Open, pace: TimeStepping::Exact, ..Params::default() });
         let thick = scene("liquid = \"paint\"\nviscosity = 0.25\n");
         assert_eq!(thick.shallow().unwrap().params.liquid, Liquid::new(0.25));
         let other = scene("friction = \"walls\"\nrest = 0.0\n").shallow().unwrap().params.clone();

@@ -2,7 +2,7 @@
 
 use super::Inputs;
 use super::stage::Liquid;
-use super::stage::liquid_over_time::Course;
+use super::stage::liquid_over_time::LiquidState;
 use crate::context::Context;
 use crate::error::Result;
 use crate::scene::Scene;
@@ -13,7 +13,7 @@ use crate::scene::run::Plan;
 /// # Errors
 /// A scene without one; a source inside solid, before anything is written; cancel.
 pub fn plan<'a>(ctx: &Context, scene: &'a Scene, inputs: &'a Inputs) -> Result<Plan<'a>> {
-    Course::begin(ctx, (scene, scene.shallow()?, inputs))?;
+    LiquidState::begin(ctx, (scene, scene.shallow()?, inputs))?;
     let stage = Liquid::new(scene, scene.shallow()?, inputs);
     Ok(Plan { scene, seen: &inputs.seen, stages: vec![Box::new(stage)] })
 }

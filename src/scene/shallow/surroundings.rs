@@ -5,7 +5,7 @@ use super::inputs::terrain::Terrain;
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::TriMesh;
-use crate::io::records::input_hashes::Seen;
+use crate::io::records::input_hashes::InputHashes;
 use crate::scene::Scene;
 
 /// The surroundings of a scene's liquid at a frame (m).
@@ -24,7 +24,7 @@ impl Around {
     /// # Errors
     /// A scene without a liquid; files that cannot be read; cancel.
     pub fn read(ctx: &Context, scene: &Scene, frame: i32) -> Result<Self> {
-        let terrain = Terrain::read(scene.shallow()?, frame, &Seen::default())?.mesh(ctx)?;
+        let terrain = Terrain::read(scene.shallow()?, frame, &InputHashes::default())?.mesh(ctx)?;
         Self::with_terrain(terrain, scene, frame)
     }
 
@@ -34,7 +34,7 @@ impl Around {
     /// As there.
     pub fn with_terrain(terrain: TriMesh, scene: &Scene, frame: i32) -> Result<Self> {
         let of = scene.shallow()?;
-        let mut obstacles = obstacles::meshes(of, scene.shot.frames.first, &Seen::default())?;
+        let mut obstacles = obstacles::meshes(of, scene.shot.frames.first, &InputHashes::default())?;
         let meshes = obstacles.len();
         obstacles.extend(obstacles::shapes_at(of, frame)?.iter().map(obstacles::drawn));
         Ok(Self { terrain, obstacles, meshes })

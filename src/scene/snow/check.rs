@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::estimate::{disk, memory};
-use super::inspect::object_path::Course;
+use super::inspect::object_path::ObjectPath;
 use super::inspect::relief::Relief;
 use super::{Forecast, Inputs, MistForecast, has_grains, has_mist};
 use crate::context::Context;
@@ -55,7 +55,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs, folder: Option<&Path
     }
     let relief = Relief::new(inputs);
     let mut objects = Vec::new();
-    let courses = Course::all(ctx, scene, inputs)?;
+    let courses = ObjectPath::all(ctx, scene, inputs)?;
     for course in &courses {
         let report = course.report(relief.as_ref())?;
         warnings.extend(course.warnings(ctx, &report)?);

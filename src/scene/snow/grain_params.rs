@@ -10,8 +10,8 @@ pub(in crate::scene::snow) fn params(scene: &Scene, cell: f64) -> Params {
     let values = &scene.values;
     let number = |name: &str| values.number(&format!("grains.{name}"));
     let whole = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.whole());
-    let usual = Params::for_cell(cell);
-    let radius = number("radius").unwrap_or(usual.radius);
+    let defaults = Params::for_cell(cell);
+    let radius = number("radius").unwrap_or(defaults.radius);
     let [friction, attraction] = material(values, radius);
     let keep_box = values.get("grains.keep_box").and_then(|value| value.numbers());
     Params {

@@ -13,7 +13,7 @@ use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh};
 use crate::io::mesh::extension;
 use crate::io::particles::ply;
-use crate::io::records::input_hashes::Seen;
+use crate::io::records::input_hashes::InputHashes;
 use crate::scene::Scene;
 use crate::scene::schema::rounded;
 use crate::snow::grains::{FASTEST, Grains, Params};
@@ -44,7 +44,12 @@ impl Drift {
     ///
     /// # Errors
     /// A file that is missing, truncated or damaged; a `v` that is not a vector; positions or velocities out of range for grains.
-    pub fn of(scene: &Scene, cell: f64, seen: &Seen, warnings: &mut Vec<String>) -> Result<Option<Self>> {
+    pub fn of(
+        scene: &Scene,
+        cell: f64,
+        seen: &InputHashes,
+        warnings: &mut Vec<String>,
+    ) -> Result<Option<Self>> {
         let Some(path) = file(scene) else { return Ok(None) };
         seen.hash(path)?;
         let (positions, attributes) = if extension(path) == "ply" {

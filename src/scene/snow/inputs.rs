@@ -15,7 +15,7 @@ use crate::geometry::{DVec3, TriMesh};
 use crate::io::files::hash;
 use crate::io::files::sequence::Pattern;
 use crate::io::mesh;
-use crate::io::records::input_hashes::Seen;
+use crate::io::records::input_hashes::InputHashes;
 use crate::motion::{Character, Key, Keys, MeshSequence, Motion, Placed, Play, Rigid, is_gltf, missing_uvs};
 use crate::scene::{Ground, Layer, Object, Role, Scene, Snow, schema};
 use crate::snow::base_layer::initial::{self, Cover};
@@ -38,7 +38,7 @@ pub struct Inputs {
     /// Wind that varies in space.
     pub(super) wind: Option<VectorGrid>,
     /// Contents of the files when they were read.
-    pub(in crate::scene) seen: Arc<Seen>,
+    pub(in crate::scene) seen: Arc<InputHashes>,
     /// Warnings about the files, one sentence each; they are logged too.
     pub warnings: Vec<String>,
 }
@@ -68,7 +68,7 @@ impl Inputs {
     /// # Errors
     /// Errors in files or keys, with file and key.
     pub fn load(scene: &Scene) -> Result<Self> {
-        let seen = Arc::new(Seen::default());
+        let seen = Arc::new(InputHashes::default());
         let snow = scene.snow()?.clone();
         let mut warnings = Vec::new();
         let source = match &snow.layer {
@@ -292,13 +292,13 @@ fn oriented(mesh: TriMesh, name: &str, warnings: &mut Vec<String>) -> TriMesh {
     orientation.applied_to(mesh)
 }
 
-fn read_mesh(path: &Path, snow: &Snow, seen: &Seen, warnings: &mut Vec<String>) -> Result<TriMesh> {
+fn read_mesh(path: &Path, snow: &Snow, seen: &InputHashes, warnings: &mut Vec<String>) -> Result<TriMesh> {
     let mesh = mesh::parse_polygons_from(path, &seen.read(path)?, snow.origin)?;
     // Unused vertices are not part of the snow.
     Ok(oriented(mesh.into_triangles().without_unused(), &path.display().to_string(), warnings))
 }
 
-fn ground(snow: &Snow, seen: &Seen, warnings: &mut Vec<String>) -> Result<initial::Ground> {
+fn ground(snow: &Snow, seen: &InputHashes, warnings: &mut Vec<String>) -> Result<initial::Ground> {
     match &snow.ground {
         Some(Ground::Plane { height, area: Some(area) }) => {
             Ok(initial::Ground::Plane { height: *height, area: *area })
@@ -309,7 +309,7 @@ fn ground(snow: &Snow, seen: &Seen, warnings: &mut Vec<String>) -> Result<initia
 }
 
 /// The ground beside a given layer.
-fn under(snow: &Snow, seen: &Seen, warnings: &mut Vec<String>) -> Result<Option<Under>> {
+fn under(snow: &Snow, seen: &InputHashes, warnings: &mut Vec<String>) -> Result<Option<Under>> {
     Ok(match &snow.ground {
         None => None,
         Some(Ground::Plane { height, .. }) => Some(Under::Level(*height)),
@@ -319,40 +319,40 @@ fn under(snow: &Snow, seen: &Seen, warnings: &mut Vec<String>) -> Result<Option<
 
 /// Warnings about a mesh of ground or top that lies far from the origin.
 fn far_meshes(snow: &Snow, source: &Source) -> Vec<String> {
-    let told = |path: &Path, mesh: &TriMesh| {
+    let warning = |path: &Path, mesh: &TriMesh| {
         far_mesh(&path.display().to_string(), mesh.farthest(), 1.0, snow.cell, FOR_SNOW)
     };
     /// No key moves these.
     const FOR_SNOW: &str = "give snow.origin nearby, which is subtracted in 64 bits, or save it near the origin and move the scene there too";
     let mut out = Vec::new();
     if let (Some(Ground::Mesh(path)), Some(mesh)) = (&snow.ground, source.ground()) {
-        out.extend(told(path, mesh));
+        out.extend(warning(path, mesh));
     }
     if let (Layer::Top(path), Some(mesh)) = (&snow.layer, source.top()) {
-        out.extend(told(path, mesh));
+        out.extend(warning(path, mesh));
     }
     out
 }
 
 /// Warnings about corners of a mesh of ground or top that rounding does not decide.
 fn unclear_corners(snow: &Snow, source: &Source) -> Vec<String> {
-    let told = |path: &Path, mesh: &TriMesh| {
+    let warning = |path: &Path, mesh: &TriMesh| {
         let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
         let what = Weld::of(&positions, &mesh.triangles).warning();
         what.map(|what| format!("{}: {what}", path.display()))
     };
     let ground = match (&snow.ground, source.ground()) {
-        (Some(Ground::Mesh(path)), Some(mesh)) => told(path, mesh),
+        (Some(Ground::Mesh(path)), Some(mesh)) => warning(path, mesh),
         _ => None,
     };
     let top = match (&snow.layer, source.top()) {
-        (Layer::Top(path), Some(mesh)) => told(path, mesh),
+        (Layer::Top(path), Some(mesh)) => warning(path, mesh),
         _ => None,
     };
     ground.into_iter().chain(top).collect()
 }
 
-fn layer_grid(path: &Path, cell: f64, seen: &Seen) -> Result<FloatGrid> {
+fn layer_grid(path: &Path, cell: f64, seen: &InputHashes) -> Result<FloatGrid> {
     // OpenVDB reads the file itself: its content must be the same before and after.
     seen.hash(path)?;
     let grid = file::read_named(path, None)?;
@@ -377,7 +377,7 @@ fn layer_grid(path: &Path, cell: f64, seen: &Seen) -> Result<FloatGrid> {
 fn motion(
     scene: &Scene,
     object: &Object,
-    seen: &Arc<Seen>,
+    seen: &Arc<InputHashes>,
     warnings: &mut Vec<String>,
 ) -> Result<Box<dyn Motion>> {
     let fps = scene.shot.fps;
@@ -416,7 +416,7 @@ fn motion(
     Ok(Box::new(Placed::new(own, space, keys)))
 }
 
-fn character(scene: &Scene, object: &Object, seen: &Seen) -> Result<Character> {
+fn character(scene: &Scene, object: &Object, seen: &InputHashes) -> Result<Character> {
     let play = Play {
         node: object.node.clone(),
         clip: object.clip.clone(),

@@ -12,7 +12,7 @@ mod tests {
     use super::super::{Scene, System};
     use super::keys;
     use super::*;
-    use crate::io::records::input_hashes::Seen;
+    use crate::io::records::input_hashes::InputHashes;
     use crate::scene::run::settings::settings_of;
     use crate::scene::schema::Value;
     use crate::scene::schema::key::{Key, Kind, Scope};
@@ -54,7 +54,7 @@ mod tests {
         assert!(reference_of(keys).contains("| `glitter` | 0 to 2 m | `0.5` | how far it can be seen |\n"));
         // `frazil check` prints these.
         assert_eq!(scene.values.by_path()["snow.glitter"], Value::Number(0.5));
-        let settings = |stage| settings_of(&scene, stage, &Seen::default(), &[]).unwrap();
+        let settings = |stage| settings_of(&scene, stage, &InputHashes::default(), &[]).unwrap();
         assert_eq!(settings("base").get("snow.glitter").map(String::as_str), Some("0.5"));
         assert_eq!(settings("objects").get("snow.glitter"), None);
     }

@@ -22,10 +22,10 @@ const BRINK: f64 = 0.715;
 
 impl Shallow {
     /// Finds the overflow edges of the next step.
-    pub(in crate::shallow) fn find_lips(&mut self) {
+    pub(in crate::shallow) fn find_overflow_edges(&mut self) {
         if self.params.falls.is_some() {
             let cliffs = Falls::cliffs(self.params.falls.as_ref(), &self.columns);
-            self.flow.find_lips(&self.columns, &self.pipes.links, cliffs);
+            self.flow.find_overflow_edges(&self.columns, &self.pipes.links, cliffs);
         }
     }
 
@@ -122,7 +122,7 @@ impl Shallow {
     fn gather(&mut self, dt: f64) {
         let Self { columns, pipes, flow, falls, params, .. } = self;
         let width = columns.heights.unit * columns.grid.cell / dt;
-        for over in flow.lips.over(&pipes.links, &flow.links) {
+        for over in flow.overflow_edges.over(&pipes.links, &flow.links) {
             let is_back = over.from != pipes.links.from[over.link];
             let side = outward(&pipes.links, over.link, is_back);
             // Flux over section, in cells: the part of the column's depth that left in a step. Thin liquid has run out before it is as fast

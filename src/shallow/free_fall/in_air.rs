@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::Falls;
 use super::packet::Packet;
-use super::rivulets::Threads;
+use super::rivulets::Rivulets;
 use super::splash::Landing;
 use super::waiting::Waiting;
 use crate::shallow::columns::resize_part;
@@ -22,7 +22,7 @@ pub(in crate::shallow) struct Falling {
     pub(in crate::shallow::free_fall) waiting: Vec<Waiting>,
     /// Landings of a step; kept to avoid repeated allocation.
     pub(super) landed: Vec<Landing>,
-    pub(in crate::shallow::free_fall) threads: Threads,
+    pub(in crate::shallow::free_fall) threads: Rivulets,
     /// Seconds since packets were last created, and how many times they were.
     pub since: f64,
     pub tick: u64,
@@ -36,7 +36,7 @@ impl Falling {
             packets: Vec::with_capacity(falls.most),
             waiting: vec![Waiting::default(); links],
             landed: Vec::with_capacity(SPLASHES * falls.most),
-            threads: Threads::with_room(links),
+            threads: Rivulets::with_room(links),
             ..Self::default()
         }
     }

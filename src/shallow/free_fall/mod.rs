@@ -2,8 +2,8 @@
 //!
 //! | word | meaning |
 //! |---|---|
-//! | overflow edge (`Lip`) | a link that liquid falls freely from in a step: the void is beyond, or the surface there is lower by more than a given height (`solver/overflow_edges.rs`) |
-//! | rivulet (`Threads`) | an overflow edge that takes what goes over those near it (`free_fall/rivulets.rs`) |
+//! | overflow edge | a link that liquid falls freely from in a step: the void is beyond, or the surface there is lower by more than a given height (`solver/overflow_edges.rs`) |
+//! | rivulet | an overflow edge that takes what goes over those near it (`free_fall/rivulets.rs`) |
 //! | packet | what went over an overflow edge in some steps; whole units of volume, which fly together (`flight.rs`) and land together (`falling.rs`, `splash.rs`) |
 //! | drop | a packet, as a host sees it |
 //! | strand | a tube between consecutive packets of an overflow edge, and from the edge to the newest (`mesh.rs`) |
@@ -50,14 +50,14 @@ pub struct Droplet {
     /// Concentration of each scalar, in the scalar's own measure.
     pub concentrations: [f32; MOST],
     /// Where the liquid leaves the ground; only for the newest drop there.
-    pub lip: Option<Lip>,
+    pub lip: Option<OverflowEdge>,
     /// One more than the number of the previous drop of the same overflow edge, unless the flow there was interrupted.
     pub number: u64,
 }
 
 /// Where liquid leaves the ground.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Lip {
+pub struct OverflowEdge {
     /// The middle of the column that it comes from, at half its depth (m).
     pub position: [f64; 3],
     /// Depth there (m).
@@ -98,7 +98,7 @@ impl Shallow {
     }
 
     /// Where a packet's liquid comes from; None if the ground has moved since.
-    fn lip_of(&self, packet: &Packet) -> Option<Lip> {
+    fn lip_of(&self, packet: &Packet) -> Option<OverflowEdge> {
         let (columns, unit) = (&self.columns, self.columns.heights.unit);
         let (cell, layer) = ((packet.source >> 18) as usize, (packet.source & 0xffff) as usize);
         let cell = [cell % columns.grid.size[0], cell / columns.grid.size[0]];
@@ -107,6 +107,6 @@ impl Shallow {
         let depth = f64::from(self.flow.depth[column]) * unit;
         // Sides to the east and to the west have even numbers.
         let edge = if packet.source >> 16 & 1 == 0 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
-        Some(Lip { position: [x, columns.heights.low + base + 0.5 * depth, z], depth, edge })
+        Some(OverflowEdge { position: [x, columns.heights.low + base + 0.5 * depth, z], depth, edge })
     }
 }

@@ -1,4 +1,4 @@
-//! Rivulets (`Threads`): liquid from nearby overflow edges gathers into one fall, because of surface tension.
+//! Rivulets: liquid from nearby overflow edges gathers into one fall, because of surface tension.
 //!
 //! A thin sheet that leaves an edge contracts: from the edge of a table a film runs off in rivulets some millimetres apart. Of all overflow
 //! edges, the one with the most liquid is the first rivulet, and takes what flows over those within [`REACH`]; of the remaining edges, the
@@ -18,7 +18,7 @@ const OWN: u32 = u32::MAX;
 
 /// An overflow edge at which liquid waits.
 #[derive(Debug, Clone, Copy)]
-struct Lip {
+struct OverflowEdge {
     /// Index of the cell that it belongs to (`Grid::index`).
     cell: u32,
     link: u32,
@@ -35,14 +35,14 @@ struct Lip {
 
 /// Lists of overflow edges; kept to avoid repeated allocation.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Threads {
+pub(super) struct Rivulets {
     /// By cell.
-    lips: Vec<Lip>,
+    lips: Vec<OverflowEdge>,
     /// By decreasing strength.
     order: Vec<u32>,
 }
 
-impl Threads {
+impl Rivulets {
     /// Empty, with capacity for so many links.
     pub fn with_room(links: usize) -> Self {
         Self { lips: Vec::with_capacity(links), order: Vec::with_capacity(links) }
@@ -50,7 +50,7 @@ impl Threads {
 
     /// Memory (bytes).
     pub fn bytes(&self) -> usize {
-        self.lips.capacity() * size_of::<Lip>() + self.order.capacity() * size_of::<u32>()
+        self.lips.capacity() * size_of::<OverflowEdge>() + self.order.capacity() * size_of::<u32>()
     }
 
     /// Finds which overflow edges are rivulets, and which of these takes the liquid of each other edge.
@@ -66,7 +66,7 @@ impl Threads {
             let [x, z] = columns.cell(from);
             let [east, south] = side.outward();
             let came = own.units - own.before;
-            self.lips.push(Lip {
+            self.lips.push(OverflowEdge {
                 cell: grid.index([x, z]) as u32,
                 link: link as u32,
                 middle: [2 * x as i32 + east, 2 * z as i32 + south],
@@ -139,7 +139,7 @@ impl Threads {
     }
 }
 
-impl Threads {
+impl Rivulets {
     /// Gives what waits at overflow edges to the rivulets near them, and updates the inflow of each in this interval.
     pub fn gather(&mut self, columns: &Columns, links: &Links, waiting: &mut [Waiting]) {
         self.find(columns, links, waiting);

@@ -15,19 +15,19 @@ pub(in crate::shallow) struct Rules {
     pub cliffs: Cliffs,
     /// A rise of more than this over a cell (units), on only one side of a column, is a wall and not a slope.
     pub steepest: i32,
-    pub apart: Option<Apart>,
+    pub apart: Option<ExcludedCells>,
 }
 
 /// Cells that belong to another liquid. Where they have no columns, they are a wall and not a void.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::shallow) struct Apart {
+pub(in crate::shallow) struct ExcludedCells {
     /// A box of cells: ranges of x and of z.
     pub cells: [Range<usize>; 2],
     /// Whether the cells are those in the box; otherwise they are all others.
     pub is_inside: bool,
 }
 
-impl Apart {
+impl ExcludedCells {
     /// Whether a cell (x, z) is one of them.
     pub fn has(&self, [x, z]: [usize; 2]) -> bool {
         (self.cells[0].contains(&x) && self.cells[1].contains(&z)) == self.is_inside
@@ -36,7 +36,7 @@ impl Apart {
 
 impl Rules {
     /// The rules for a liquid.
-    pub fn of(params: &Params, columns: &Columns, apart: Option<&Apart>) -> Self {
+    pub fn of(params: &Params, columns: &Columns, apart: Option<&ExcludedCells>) -> Self {
         let steepest = match params.friction {
             Friction::Ground => i32::MAX,
             Friction::Walls => (columns.grid.cell / columns.heights.unit).min(f64::from(i32::MAX)) as i32,

@@ -6,7 +6,7 @@ use crate::shallow::Params;
 use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights, TOP};
 use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::free_fall::Falls;
-use crate::shallow::params::{Friction, Pace};
+use crate::shallow::params::{Friction, TimeStepping};
 use crate::shallow::pipes::{Border, Pipes};
 
 struct Dice(u64);
@@ -52,7 +52,7 @@ fn solids(grid: Grid, cells: &[Vec<Solid>]) -> Solids {
 }
 
 fn params(border: Border) -> Params {
-    Params { border, pace: Pace::Realtime(0.01), ..Params::default() }
+    Params { border, pace: TimeStepping::Realtime(0.01), ..Params::default() }
 }
 
 /// The state of every pipe, sorted by its ends (as cells and layers) and side: flux and remainder.

@@ -9,7 +9,7 @@
 use std::ops::Range;
 
 use super::active::Active;
-use super::flux::{Step, greater, lesser};
+use super::flux::{Step, max, min};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::per_column::{Array, PerColumn};
 use crate::shallow::columns::{NONE, STRIP, resize_part, strip_from, strip_of};
@@ -253,15 +253,15 @@ impl<'a> Span<'a> {
 #[inline(always)]
 fn is_fast(drive: f32, depth: [f32; 2], flux: f32) -> bool {
     let mean = 0.5 * (depth[0] + depth[1]);
-    (9.0 * flux * flux > drive * mean * mean * mean) & (lesser(depth[0], depth[1]) > 0.0)
+    (9.0 * flux * flux > drive * mean * mean * mean) & (min(depth[0], depth[1]) > 0.0)
 }
 
 /// The inertia factor of a pipe in a step; `drive` is that of the last step, which the flux refers to.
 #[inline(always)]
 fn light_of(drive: f32, step: &Step, depth: [f32; 2], flux: f32) -> f32 {
-    let section = lesser(0.5 * (depth[0] + depth[1]), step.section);
-    let light = lesser(step.lighter / greater(section, 1.0), LIGHTEST);
-    if is_fast(drive, depth, flux) { greater(light, HEAVIEST) } else { 1.0 }
+    let section = min(0.5 * (depth[0] + depth[1]), step.section);
+    let light = min(step.lighter / max(section, 1.0), LIGHTEST);
+    if is_fast(drive, depth, flux) { max(light, HEAVIEST) } else { 1.0 }
 }
 
 /// As `light_of`, for a link: its flux refers to the last step, which is about as long as this one.

@@ -76,13 +76,13 @@ impl<const VISCOUS: bool, const WHOLE: bool, const THINS: bool> Kind for Of<VISC
 
 /// Maximum; a single instruction, as neither number is ever NaN.
 #[inline(always)]
-pub fn greater(a: f32, b: f32) -> f32 {
+pub fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
 /// Minimum.
 #[inline(always)]
-pub fn lesser(a: f32, b: f32) -> f32 {
+pub fn min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
@@ -102,7 +102,7 @@ pub fn flux_of<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open
     let kept = step.kept * flux;
     let drive = step.drive * light * fall as f32;
     // The mean depth drives, the same uphill and downhill: with the donor's depth, waves would gain energy in each oscillation.
-    let section = if K::WHOLE { step.section } else { lesser(0.5 * (depth[0] + depth[1]), step.section) };
+    let section = if K::WHOLE { step.section } else { min(0.5 * (depth[0] + depth[1]), step.section) };
     let driven = kept + drive * section;
     let giver = if driven > 0.0 { depth[0] } else { depth[1] };
     if K::VISCOUS {
@@ -120,7 +120,7 @@ impl Step {
     /// Sets a flux to 0 where it is slow and the surface differs from level by less than is visible, so that the liquid can sleep.
     #[inline(always)]
     pub fn rested<K: Kind>(&self, fall: i32, depth: [f32; 2], flux: f32) -> f32 {
-        let section = if K::WHOLE { self.section } else { lesser(0.5 * (depth[0] + depth[1]), self.section) };
+        let section = if K::WHOLE { self.section } else { min(0.5 * (depth[0] + depth[1]), self.section) };
         let moves = (fall.abs() > self.level) | (flux.abs() > self.slow * section);
         // Turns -0 into 0.
         if moves { flux + 0.0 } else { 0.0 }
@@ -132,7 +132,7 @@ impl Step {
     fn held_back(&self, light: f32, depth: [f32; 2], flux: f32, held: &mut i32) -> f32 {
         let most =
             if light > 1.0 { self.fastest * if flux > 0.0 { depth[0] } else { depth[1] } } else { f32::MAX };
-        let within = lesser(greater(flux, -most), most);
+        let within = min(max(flux, -most), most);
         *held |= i32::from(within != flux);
         within
     }
@@ -141,7 +141,7 @@ impl Step {
     #[inline(always)]
     pub fn thinned(&self, flux: f32, square: f32) -> f32 {
         let Some(law) = self.thinning else { return 1.0 };
-        let rate = lesser(law.shear * flux.abs() / greater(square, 1.0), 1e15);
+        let rate = min(law.shear * flux.abs() / max(square, 1.0), 1e15);
         law.thinnest + (1.0 - law.thinnest) * power(1.0 + rate * rate, law.power)
     }
 }

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::fast_films;
-use super::flux::{Kind, Step, flux_of, lesser, split};
+use super::flux::{Kind, Step, flux_of, min, split};
 use super::link_flow::beyond;
-use super::overflow_edges::{Fall, Lips, edge};
+use super::overflow_edges::{Fall, OverflowEdges, edge};
 use super::rows::band_views::LinkPart;
 use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::pipes::Links;
@@ -30,7 +30,7 @@ impl LinkPart<'_> {
         step: &Step,
         columns: &Columns,
         links: &Links,
-        lips: &Lips,
+        overflow_edges: &OverflowEdges,
         (row, first): (usize, usize),
         depth: impl Fn(usize) -> i32,
     ) {
@@ -41,8 +41,8 @@ impl LinkPart<'_> {
             let at = link - first;
             let (eta, beyond, is_still) = match links.to[link] {
                 // Whatever lies below, as into the void.
-                _ if lips.at(link) == Fall::Ahead => (base[i] - edge(columns), 0, false),
-                j if lips.at(link) == Fall::Back => {
+                _ if overflow_edges.at(link) == Fall::Ahead => (base[i] - edge(columns), 0, false),
+                j if overflow_edges.at(link) == Fall::Back => {
                     let (base, depth) = (base[j as usize], depth(j as usize));
                     self.drive_back::<K>(step, at, base + depth - (base - edge(columns)), depth, open);
                     continue;
@@ -81,7 +81,7 @@ impl LinkPart<'_> {
     pub fn each(
         &self,
         links: &Links,
-        lips: &Lips,
+        overflow_edges: &OverflowEdges,
         (row, first): (usize, usize),
         within: &Range<u32>,
         gives: bool,
@@ -90,7 +90,7 @@ impl LinkPart<'_> {
         for link in links.row(row) {
             let transfer = self.transfer[link - first];
             let column = if (transfer > 0.0) == gives { links.from[link] } else { links.to[link] };
-            let is_there = column != NONE && (gives || lips.at(link) == Fall::No);
+            let is_there = column != NONE && (gives || overflow_edges.at(link) == Fall::No);
             if transfer != 0.0 && is_there && within.contains(&column) {
                 add(column, transfer.abs().ceil() as i64);
             }
@@ -101,7 +101,7 @@ impl LinkPart<'_> {
     pub fn scale(
         &mut self,
         links: &Links,
-        lips: &Lips,
+        overflow_edges: &OverflowEdges,
         (row, first): (usize, usize),
         giver: bool,
         factor: impl Fn(u32) -> f32,
@@ -109,7 +109,7 @@ impl LinkPart<'_> {
         for link in links.row(row) {
             let transfer = self.transfer[link - first];
             let column = if (transfer > 0.0) == giver { links.from[link] } else { links.to[link] };
-            if transfer != 0.0 && column != NONE && (giver || lips.at(link) == Fall::No) {
+            if transfer != 0.0 && column != NONE && (giver || overflow_edges.at(link) == Fall::No) {
                 let k = factor(column);
                 self.transfer[link - first] *= k;
                 self.flux[link - first] *= k;
@@ -122,7 +122,7 @@ impl LinkPart<'_> {
     pub fn move_units(
         &mut self,
         links: &Links,
-        lips: &Lips,
+        overflow_edges: &OverflowEdges,
         (row, first): (usize, usize),
         outside: &mut Outside,
         mut change: impl FnMut(usize, i32),
@@ -134,7 +134,7 @@ impl LinkPart<'_> {
             if units == 0 {
                 continue;
             }
-            match lips.at(link) {
+            match overflow_edges.at(link) {
                 Fall::No => {}
                 Fall::Ahead => {
                     change(links.from[link] as usize, -units);
@@ -158,8 +158,8 @@ impl LinkPart<'_> {
 /// The flux of a wave that leaves over the border (units a step): a surface that is `fall` above the one at rest flows out at the speed of
 /// waves (Sommerfeld's condition), and waves are not reflected.
 fn radiated(step: &Step, fall: i32, depth: [f32; 2]) -> f32 {
-    let mean = if step.is_whole { step.section } else { lesser(0.5 * (depth[0] + depth[1]), step.section) };
-    if fall.saturating_abs() <= step.level { 0.0 } else { lesser(step.wave * mean.sqrt(), 1.0) * fall as f32 }
+    let mean = if step.is_whole { step.section } else { min(0.5 * (depth[0] + depth[1]), step.section) };
+    if fall.saturating_abs() <= step.level { 0.0 } else { min(step.wave * mean.sqrt(), 1.0) * fall as f32 }
 }
 
 /// The indices of a row's columns.

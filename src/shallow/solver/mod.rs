@@ -35,7 +35,7 @@ use active::{Active, runs};
 use fast_films::{Fast, Films};
 use flux::Step;
 use lateral_friction::{Liquid, Walls};
-use overflow_edges::Lips;
+use overflow_edges::OverflowEdges;
 use pressurised::network::{Network, State};
 use rest::{Bounds, Still};
 use rows::Ground;
@@ -53,7 +53,7 @@ pub struct Flow {
     /// Remainders of transfers to the east and to the south (units).
     pub(super) left: [PerColumn<f32>; 2],
     pub(super) links: LinkFlow,
-    pub(super) lips: Lips,
+    pub(super) overflow_edges: OverflowEdges,
     active: Active,
     bands: Bands,
     pub(super) network: Network,
@@ -114,7 +114,7 @@ impl Flow {
             flux: [none(Array::FluxEast), none(Array::FluxSouth)],
             left: [none(Array::LeftEast), none(Array::LeftSouth)],
             links: LinkFlow::new(&pipes.links),
-            lips: Lips::default(),
+            overflow_edges: OverflowEdges::default(),
             active: Active::new(columns, &pipes.links),
             bands: Bands::new(columns, pipes.links.most),
             network: Network::new(columns.len(), columns.grid.size[1]),
@@ -325,8 +325,8 @@ impl Flow {
     }
 
     /// Finds the overflow edges of the next step: the links that liquid falls freely from.
-    pub(super) fn find_lips(&mut self, columns: &Columns, links: &Links, cliffs: Cliffs) {
-        self.lips.find(columns, links, cliffs, &self.depth);
+    pub(super) fn find_overflow_edges(&mut self, columns: &Columns, links: &Links, cliffs: Cliffs) {
+        self.overflow_edges.find(columns, links, cliffs, &self.depth);
     }
 
     /// One step of `dt` (s). Returns the counts of rows in which K_min and K_max were not 1, and in which fast films were limited. Runs on
@@ -359,7 +359,7 @@ impl Flow {
             network: &self.network,
             fast: &self.fast,
             walls: &self.walls,
-            lips: &self.lips,
+            overflow_edges: &self.overflow_edges,
             may_rest: step.level > 0,
             may_fill: &[],
             room: &[],
@@ -370,7 +370,7 @@ impl Flow {
         let amounts = self.amounts.amounts.each_mut().map(|amounts| &mut amounts[..]);
         let liquid = Part::new(&mut self.depth, flux, left, &mut self.links, amounts);
         self.bands.step(step, &ground, liquid);
-        self.network.put_back(&mut self.flux, &mut self.left, &mut self.links, &mut self.lips);
+        self.network.put_back(&mut self.flux, &mut self.left, &mut self.links, &mut self.overflow_edges);
         let mut scaled = [0; 3];
         for stepped in self.bands.results() {
             scaled = [0, 1, 2].map(|which| scaled[which] + stepped.scaled[which]);
@@ -410,7 +410,7 @@ impl Flow {
         let mut changes = [Changes::default(); MOST];
         let each = amounts.iter_mut().zip(&mut self.links.fallen).zip(&mut changes);
         for ((amounts, fallen), changes) in each.take(scalars.len()) {
-            self.network.carry(&self.depth, (&self.lips, fallen), amounts, party_levels, changes);
+            self.network.carry(&self.depth, (&self.overflow_edges, fallen), amounts, party_levels, changes);
         }
         self.amounts.settle(&changes);
     }
@@ -452,7 +452,7 @@ impl Flow {
             flux: [east, south],
             left: [left_east, left_south],
             links: &self.links,
-            lips: &self.lips,
+            overflow_edges: &self.overflow_edges,
             walls: &self.walls,
         };
         self.network.find(step, columns, pipes, self.bands.filling(), &state, stop);

@@ -1,4 +1,4 @@
-//! Overflow edges (`Lips`): links that liquid falls freely from. What goes over one does not arrive at its other end in the same step, and
+//! Overflow edges: links that liquid falls freely from. What goes over one does not arrive at its other end in the same step, and
 //! the liquid there does not push back.
 
 use super::link_flow::LinkFlow;
@@ -20,7 +20,7 @@ pub enum Fall {
 
 /// The overflow edges of a step, by link; empty without falls.
 #[derive(Debug, Clone, Default)]
-pub struct Lips {
+pub struct OverflowEdges {
     falls: Vec<Fall>,
     /// H of the donor at the start of the step (units).
     depth: Vec<i32>,
@@ -42,7 +42,7 @@ pub struct Over {
     pub depth: i32,
 }
 
-impl Lips {
+impl OverflowEdges {
     /// With capacity for so many links.
     pub(in crate::shallow) fn with_room(links: usize) -> Self {
         let (falls, depth) = (Vec::with_capacity(links), Vec::with_capacity(links));
@@ -86,8 +86,8 @@ impl Lips {
         links: &'a Links,
         flow: &'a LinkFlow,
     ) -> impl Iterator<Item = Over> + 'a {
-        let lips = (0..self.falls.len()).filter(|&link| self.falls[link] != Fall::No);
-        lips.filter_map(move |link| {
+        let overflow_edges = (0..self.falls.len()).filter(|&link| self.falls[link] != Fall::No);
+        overflow_edges.filter_map(move |link| {
             let units = i64::from(flow.transfer[link].abs() as i32) + self.flooded[link];
             let (from, to) = match self.falls[link] {
                 Fall::Back => (links.to[link], links.from[link]),

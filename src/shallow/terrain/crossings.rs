@@ -3,7 +3,7 @@
 //! Each line is shifted by a symbolic (e, e^2) in (x, z), e infinitesimal, so that it meets no edge and no vertex. Nothing but the shift
 //! prefers a side: mirroring the scene or rotating it by 90 degrees gives the same bits unless a line meets an edge exactly.
 
-use super::lines::{Corner, LANES, ROUNDOFF, WHOLE, greater, integer_of, lesser, whole};
+use super::lines::{Corner, LANES, ROUNDOFF, WHOLE, integer_of, max, min, whole};
 use crate::shallow::columns::grid::{Heights, TOP};
 
 /// A triangle that lines may cross.
@@ -34,9 +34,7 @@ impl Facet {
     /// A triangle whose heights matter to within a small part of `unit` (m).
     #[inline(always)]
     pub fn new([a, b, c]: [Corner; 3], unit: f64) -> Self {
-        let range = |axis: usize| {
-            [lesser(lesser(a[axis], b[axis]), c[axis]), greater(greater(a[axis], b[axis]), c[axis])]
-        };
+        let range = |axis: usize| [min(min(a[axis], b[axis]), c[axis]), max(max(a[axis], b[axis]), c[axis])];
         let [x, y, z] = [range(0), range(1), range(2)];
         let lowest = [a, b, c].map(|corner| u32::from(corner[1] == y[0]));
         let own = if lowest[0] + lowest[1] + lowest[2] == 1 { y[0] } else { y[1] };
@@ -66,7 +64,7 @@ impl Facet {
         let [r, p, q] = [from(0), from(1), from(2)];
         let [a, b, c] = [cross(p, q), cross(q, r), cross(r, p)];
         let sum = (b + c) + a;
-        if lesser(lesser(a.abs(), b.abs()), c.abs()) <= self.doubt {
+        if min(min(a.abs(), b.abs()), c.abs()) <= self.doubt {
             return self.cross_exactly(at, [a, b, c]);
         }
         let is_left = a > 0.0;
@@ -87,14 +85,14 @@ impl Facet {
             let [r, p, q] = [from(r), from(p), from(q)];
             let [a, b, c] = [cross(p, q), cross(q, r), cross(r, p)];
             let sum = (b + c) + a;
-            let least = lesser(lesser(a, b), c);
-            let greatest = greater(greater(a, b), c);
-            out.within[lane] = greater(least, -greatest);
-            out.beside[lane] = lesser(greatest, -least);
+            let least = min(min(a, b), c);
+            let greatest = max(max(a, b), c);
+            out.within[lane] = max(least, -greatest);
+            out.beside[lane] = min(greatest, -least);
             out.area[lane] = sum;
             // As `Heights::round`: halves are rounded up.
             let units = (self.height([b, c], sum) - heights.low) / heights.unit;
-            let units = lesser(greater(units, 0.0), f64::from(TOP));
+            let units = min(max(units, 0.0), f64::from(TOP));
             let even = (units + WHOLE) - WHOLE;
             let up = if units - even >= 0.5 { 1.0 } else { 0.0 };
             out.units[lane] = whole(even + up);
@@ -155,7 +153,7 @@ impl Facet {
     fn height(&self, weights: [f64; 2], sum: f64) -> f64 {
         let [r, p, q] = self.corners.map(|corner| corner[1]);
         let height = r + (weights[0] * (p - r) + weights[1] * (q - r)) / sum;
-        lesser(greater(height, self.range[0]), self.range[1])
+        min(max(height, self.range[0]), self.range[1])
     }
 
     /// Height (m) with exact weights.

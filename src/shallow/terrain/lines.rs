@@ -49,7 +49,7 @@ impl Lines {
     #[inline]
     pub fn rank(&self, position: f64) -> u32 {
         // Usually right.
-        let guess = lesser(greater(self.lines_to(position) + 1.0, 0.0), self.count as f64);
+        let guess = min(max(self.lines_to(position) + 1.0, 0.0), self.count as f64);
         let mut rank = guess as i32 as usize;
         while self.positions[rank + 1] < position {
             rank += 1;
@@ -91,11 +91,11 @@ impl Outline {
         let edge = |corner: usize| {
             let (a, b) = (&corners[corner], &corners[(corner + 1) % 3]);
             // An edge along x: the row through it meets it where the two other edges end.
-            let range = if a[2] == b[2] { [1.0, -1.0] } else { [lesser(a[2], b[2]), greater(a[2], b[2])] };
+            let range = if a[2] == b[2] { [1.0, -1.0] } else { [min(a[2], b[2]), max(a[2], b[2])] };
             let slope = (b[0] - a[0]) * x.inverse / (b[2] - a[2]);
             Edge { range, from: [a[2], x.lines_to(a[0])], slope }
         };
-        let reach = corners.iter().fold(x.reach, |reach, corner| greater(reach, corner[0].abs()));
+        let reach = corners.iter().fold(x.reach, |reach, corner| max(reach, corner[0].abs()));
         // A position has 11 roundings of at most 2 reach, that of a line 6 of at most 1: 28 in all; the rest of the 128 is margin.
         Self { edges: [edge(0), edge(1), edge(2)], error: 128.0 * ROUNDOFF * reach * x.inverse }
     }
@@ -114,11 +114,11 @@ impl Outline {
             };
             let least = |edge: &Edge| position(edge, f64::INFINITY);
             let greatest = |edge: &Edge| position(edge, f64::NEG_INFINITY);
-            let start = lesser(lesser(least(a), least(b)), least(c)) - self.error;
-            let end = greater(greater(greatest(a), greatest(b)), greatest(c)) + self.error;
+            let start = min(min(least(a), least(b)), least(c)) - self.error;
+            let end = max(max(greatest(a), greatest(b)), greatest(c)) + self.error;
             // Rounding a position plus half a line gives the first line after it; the error margin is larger than the rounding of this sum.
-            out.first[lane] = whole(lesser(greater(start + 0.5, first), last));
-            out.last[lane] = whole(lesser(greater(end + 0.5, first), last));
+            out.first[lane] = whole(min(max(start + 0.5, first), last));
+            out.last[lane] = whole(min(max(end + 0.5, first), last));
         }
     }
 }
@@ -148,13 +148,13 @@ pub(super) const WHOLE: f64 = (1u64 << 52) as f64;
 
 /// The smaller of two numbers that are not NaN: one instruction, unlike `f64::min`.
 #[inline(always)]
-pub(super) fn lesser(a: f64, b: f64) -> f64 {
+pub(super) fn min(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
 /// The larger of two numbers that are not NaN.
 #[inline(always)]
-pub(super) fn greater(a: f64, b: f64) -> f64 {
+pub(super) fn max(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 

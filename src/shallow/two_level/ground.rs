@@ -1,7 +1,7 @@
 //! The ground of both sizes of cells.
 
 use crate::shallow::columns::grid::{BOTTOMLESS, Cells, Grid};
-use crate::shallow::pipes::pipe_rules::Apart;
+use crate::shallow::pipes::pipe_rules::ExcludedCells;
 use crate::shallow::terrain::Solids;
 use crate::shallow::terrain::solids::{Solid, unite};
 
@@ -43,9 +43,12 @@ impl Ground {
     }
 
     /// The fine cells that belong to the coarse liquid, and the coarse cells that belong to the fine liquid.
-    pub fn apart(near: &Cells) -> [Apart; 2] {
+    pub fn apart(near: &Cells) -> [ExcludedCells; 2] {
         let halved = near.clone().map(|range| range.start / 2..range.end / 2);
-        [Apart { cells: near.clone(), is_inside: false }, Apart { cells: halved, is_inside: true }]
+        [
+            ExcludedCells { cells: near.clone(), is_inside: false },
+            ExcludedCells { cells: halved, is_inside: true },
+        ]
     }
 
     /// The solids of a fine cell.

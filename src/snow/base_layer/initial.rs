@@ -111,7 +111,7 @@ pub fn fits(ground: &Ground, cover: &Cover, cell: f64) -> Result<()> {
         if size > 0.0 && size < cell {
             return Err(Error::argument(format!(
                 "{name} = {size} m is less than a cell of {cell} m, which cannot hold it: take cells of {} m or less",
-                told(size / THICK)
+                rounded(size / THICK)
             )));
         }
         Ok(())
@@ -130,7 +130,7 @@ pub fn fits(ground: &Ground, cover: &Cover, cell: f64) -> Result<()> {
 const THICK: f64 = 3.0;
 
 /// A length rounded to two significant digits.
-fn told(length: f64) -> f64 {
+fn rounded(length: f64) -> f64 {
     format!("{length:.1e}").parse().unwrap_or(length)
 }
 
@@ -140,7 +140,7 @@ pub fn thin(depth: f64, cell: f64) -> Option<String> {
     (cells < THICK).then(|| {
         format!(
             "the snow is {cells:.1} cells thick: its volume and its prints are rough; cells of {} m or less hold it well",
-            told(depth / THICK)
+            rounded(depth / THICK)
         )
     })
 }

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
-use crate::flow::{Coord, FARTHEST, Flow, Keeping, Kept, Solids, Tiles, tiles};
+use crate::flow::{Coord, FARTHEST, Flow, FlowState, Keeping, Solids, Tiles, tiles};
 use sources::Seed;
 
 pub use forces::wind::Wind;
@@ -91,13 +91,13 @@ pub struct Mist {
     params: Params,
     flow: Flow,
     /// The flow before the step, to restore if the step fails.
-    before: Kept,
+    before: FlowState,
 }
 
 impl Clone for Mist {
     /// A copy of the state that is carried from step to step.
     fn clone(&self) -> Self {
-        Self { params: self.params.clone(), flow: self.flow.copy(), before: Kept::default() }
+        Self { params: self.params.clone(), flow: self.flow.copy(), before: FlowState::default() }
     }
 }
 
@@ -109,7 +109,7 @@ impl Mist {
     pub fn new(params: Params) -> Result<Self> {
         params.validate()?;
         let flow = Flow::new(params.cell, params.wind.map(|x| x as f32))?;
-        Ok(Self { params, flow, before: Kept::default() })
+        Ok(Self { params, flow, before: FlowState::default() })
     }
 
     /// Resumes from a state that [`Mist::save`] wrote.

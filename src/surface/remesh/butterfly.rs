@@ -3,8 +3,8 @@
 
 use std::f64::consts::TAU;
 
-use super::fans::{Edge, Fans};
 use super::shape::is_upright;
+use super::vertex_rings::{Edge, VertexRings};
 use crate::geometry::DVec3;
 
 /// Maximum number of neighbours of a vertex for the rule.
@@ -12,7 +12,7 @@ const MOST: usize = 24;
 /// Maximum distance from the edge's midpoint, in edge lengths: where the surface is folded the rule is meaningless.
 const FAR: f64 = 0.25;
 
-impl Fans<'_, '_> {
+impl VertexRings<'_, '_> {
     /// Where an edge is split: at `middle`, or at its midpoint where a triangle would turn over.
     pub fn split_position(&self, edge: &Edge) -> DVec3 {
         let [a, b, c, d] = edge.corners.map(|corner| self.position(corner));
@@ -104,17 +104,17 @@ mod tests {
     fn a_flat_grid_stays_as_it_is_exactly() {
         let mut body = grid(7);
         let mut mesh = body.improvable();
-        let fans = Fans::of(&mut mesh);
+        let rings = VertexRings::of(&mut mesh);
         let middle = 3 * 7 + 3;
         for other in [middle + 1, middle + 7, middle + 8, middle - 1] {
-            let expected = 0.5 * (fans.position(middle) + fans.position(other));
-            assert!(fans.butterfly([middle, other]).is_some());
-            assert_eq!(fans.middle([middle, other]), expected);
-            assert_eq!(fans.split_position(&fans.edge([middle, other]).unwrap()), expected);
+            let expected = 0.5 * (rings.position(middle) + rings.position(other));
+            assert!(rings.butterfly([middle, other]).is_some());
+            assert_eq!(rings.middle([middle, other]), expected);
+            assert_eq!(rings.split_position(&rings.edge([middle, other]).unwrap()), expected);
         }
         // Vertices at the border do not have all neighbours.
-        assert!(fans.butterfly([0, 1]).is_none());
-        assert_eq!(fans.middle([0, 1]), 0.5 * (fans.position(0) + fans.position(1)));
+        assert!(rings.butterfly([0, 1]).is_none());
+        assert_eq!(rings.middle([0, 1]), 0.5 * (rings.position(0) + rings.position(1)));
     }
 
     #[test]
@@ -122,14 +122,14 @@ mod tests {
         for level in [2, 3] {
             let mut body = sphere(level);
             let mut mesh = body.improvable();
-            let fans = Fans::of(&mut mesh);
+            let rings = VertexRings::of(&mut mesh);
             let (mut sum, mut count) = (0.0, 0.0);
             for triangle in 0..8 * 4u32.pow(level) {
-                let [a, b, c] = fans.corners(triangle);
+                let [a, b, c] = rings.corners(triangle);
                 for ends in [[a, b], [b, c], [c, a]] {
-                    let [p, q] = ends.map(|end| fans.position(end));
+                    let [p, q] = ends.map(|end| rings.position(end));
                     let far = |position: DVec3| (position.norm() - 1.0).abs();
-                    let ratio = far(fans.middle(ends)) / far(0.5 * (p + q));
+                    let ratio = far(rings.middle(ends)) / far(0.5 * (p + q));
                     assert!(ratio < 0.7, "{ends:?}: {ratio}");
                     sum += ratio;
                     count += 1.0;
@@ -143,7 +143,7 @@ mod tests {
     fn what_is_flagged_or_far_says_nothing() {
         let ends = [0u32, 1].map(|n| n + 3 * 7 + 3);
         let half = |body: &Body| 0.5 * (body.positions[ends[0] as usize] + body.positions[ends[1] as usize]);
-        let middle = |body: &mut Body| Fans::of(&mut body.improvable()).middle(ends);
+        let middle = |body: &mut Body| VertexRings::of(&mut body.improvable()).middle(ends);
         let mut body = grid(7);
         body.positions[2 * 7 + 3].z += 0.5;
         assert!(middle(&mut body) != half(&body));

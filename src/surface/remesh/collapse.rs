@@ -1,8 +1,8 @@
 //! Which end of a short edge is merged into the other, and whether it may be.
 
-use super::fans::{Collapse, Fans};
 use super::improvable::{between, mean};
 use super::shape::{is_upright, normal, quality};
+use super::vertex_rings::{Collapse, VertexRings};
 use crate::geometry::DVec3;
 
 /// Minimum spread of normals on a ridge or in a corner: that of two planes of the same area that meet at 30 degrees.
@@ -18,7 +18,7 @@ const LONGEST_OF_FOLD: f64 = 2.0;
 /// Maximum cosine between the normals of triangles that are folded onto each other: they meet at more than 160 degrees.
 const FOLDED: f64 = -0.9397;
 
-impl Fans<'_, '_> {
+impl VertexRings<'_, '_> {
     /// Number of independent normal directions around a vertex: 1 where the surface is smooth, 2 on a ridge, 3 in a corner. The rank of the
     /// area-weighted sum of the outer products of its normals (the medial quadric of Jiao 2007, "Face offsetting"), from its invariants.
     pub fn rank(&self, vertex: u32) -> u8 {
@@ -135,26 +135,26 @@ mod tests {
         let TriMesh { positions, triangles } = TriMesh::cuboid([0.0; 3], [1.0; 3]);
         let mut body = Body::of(positions.iter().map(|position| position.cast()).collect(), triangles);
         let mut mesh = body.improvable();
-        let mut fans = Fans::of(&mut mesh);
-        assert!((0..8).all(|vertex| fans.rank(vertex) == 3));
+        let mut rings = VertexRings::of(&mut mesh);
+        assert!((0..8).all(|vertex| rings.rank(vertex) == 3));
         let [mut on_faces, mut on_ridges] = [0; 2];
         for triangle in 0..12 {
-            let [a, b, c] = fans.corners(triangle);
+            let [a, b, c] = rings.corners(triangle);
             for ends in [[a, b], [b, c], [c, a]] {
-                let Some(edge) = fans.edge(ends) else { continue };
-                let [one, two] = edge.triangles.map(|triangle| normal(&fans.positions(triangle)));
+                let Some(edge) = rings.edge(ends) else { continue };
+                let [one, two] = edge.triangles.map(|triangle| normal(&rings.positions(triangle)));
                 let is_flat = one.cross(&two).norm() < 1e-9;
                 let made = 8 + on_faces + on_ridges;
-                fans.split(&edge, 0.5 * (fans.position(ends[0]) + fans.position(ends[1])));
-                assert_eq!(fans.rank(made), if is_flat { 1 } else { 2 });
+                rings.split(&edge, 0.5 * (rings.position(ends[0]) + rings.position(ends[1])));
+                assert_eq!(rings.rank(made), if is_flat { 1 } else { 2 });
                 *(if is_flat { &mut on_faces } else { &mut on_ridges }) += 1;
             }
         }
         assert!(on_faces > 2 && on_ridges > 2, "{on_faces} {on_ridges}");
         let mut ball = sphere(3);
         let mut mesh = ball.improvable();
-        let fans = Fans::of(&mut mesh);
-        assert!((0..258).all(|vertex| fans.rank(vertex) == 1));
+        let rings = VertexRings::of(&mut mesh);
+        assert!((0..258).all(|vertex| rings.rank(vertex) == 1));
     }
 
     #[test]
@@ -164,8 +164,8 @@ mod tests {
         let (low, high) = (a.min(b), a.max(b));
         let offers = |body: &mut Body| {
             let mut mesh = body.improvable();
-            let fans = Fans::of(&mut mesh);
-            let ways = fans.collapses([a, b]);
+            let rings = VertexRings::of(&mut mesh);
+            let ways = rings.collapses([a, b]);
             (ways.iter().map(|way| (way.from, way.to)).collect::<Vec<_>>(), ways[0].position)
         };
         let position = |body: &Body, vertex: u32| body.positions[vertex as usize];
@@ -187,8 +187,8 @@ mod tests {
         let [a, b, c] = body.triangles[100];
         let may = |body: &mut Body| {
             let mut mesh = body.improvable();
-            let fans = Fans::of(&mut mesh);
-            fans.collapses([a, b]).iter().any(|way| fans.may(way, &[]))
+            let rings = VertexRings::of(&mut mesh);
+            rings.collapses([a, b]).iter().any(|way| rings.may(way, &[]))
         };
         // With the sizes at birth the resulting edges would be too long.
         assert!(!may(&mut body));
@@ -200,10 +200,10 @@ mod tests {
         // A position beyond the ring turns triangles over.
         body.sizes.iter_mut().flatten().for_each(|size| *size *= 10.0);
         let mut mesh = body.improvable();
-        let fans = Fans::of(&mut mesh);
-        let way = fans.collapses([a, b])[0];
-        let beyond = 3.5 * fans.position(way.from) - 2.5 * fans.position(way.to);
-        assert!(fans.may(&way, &[]) && !fans.may(&Collapse { position: beyond, ..way }, &[]));
+        let rings = VertexRings::of(&mut mesh);
+        let way = rings.collapses([a, b])[0];
+        let beyond = 3.5 * rings.position(way.from) - 2.5 * rings.position(way.to);
+        assert!(rings.may(&way, &[]) && !rings.may(&Collapse { position: beyond, ..way }, &[]));
     }
 
     #[test]
@@ -222,8 +222,8 @@ mod tests {
             let marks: Vec<bool> = around.collect();
             body.sources.iter_mut().zip(&marks).filter(|(_, is)| **is).for_each(|(at, _)| *at = Source::New);
             let mut mesh = body.improvable();
-            let fans = Fans::of(&mut mesh);
-            (0..512).filter_map(|triangle| fans.unfolding(triangle)).collect::<Vec<_>>()
+            let rings = VertexRings::of(&mut mesh);
+            (0..512).filter_map(|triangle| rings.unfolding(triangle)).collect::<Vec<_>>()
         };
         let ways = folded(true);
         assert!(!ways.is_empty() && ways.iter().all(|way| way.from == 100 || way.to == 100), "{ways:?}");

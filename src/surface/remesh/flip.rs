@@ -1,8 +1,8 @@
 //! Whether an edge should be flipped.
 
-use super::fans::{Edge, Fans, flipped};
 use super::improvable::TOO_LONG;
 use super::shape::{is_upright, least_angle, normal};
+use super::vertex_rings::{Edge, VertexRings, flipped};
 
 /// Triangles whose smallest angle (degrees) is at least this are left alone.
 const LEAST: f64 = 20.0;
@@ -11,7 +11,7 @@ const GAIN: f64 = 5.0;
 /// Minimum cosine between the normals of the two triangles: they meet at up to 30 degrees.
 const FLAT: f64 = 0.866;
 
-impl Fans<'_, '_> {
+impl VertexRings<'_, '_> {
     /// The edge of a triangle whose flip is best. None if its angles are not small, or no flip is clearly better; the artist's own triangles
     /// and those at flagged vertices are not flipped.
     pub fn better(&self, triangle: u32) -> Option<Edge> {
@@ -76,8 +76,8 @@ mod tests {
 
     fn better(body: &mut Body) -> Option<Edge> {
         let mut mesh = body.improvable();
-        let fans = Fans::of(&mut mesh);
-        let [one, two] = [0, 1].map(|triangle| fans.better(triangle));
+        let rings = VertexRings::of(&mut mesh);
+        let [one, two] = [0, 1].map(|triangle| rings.better(triangle));
         assert_eq!(one.is_some(), two.is_some());
         one
     }
@@ -95,7 +95,7 @@ mod tests {
             let mut body = kite(0.5, 0.0);
             body.sources[1] = source;
             let mut mesh = body.improvable();
-            assert_eq!(Fans::of(&mut mesh).better(0), (source == Source::New).then_some(flip));
+            assert_eq!(VertexRings::of(&mut mesh).better(0), (source == Source::New).then_some(flip));
         }
         let mut body = kite(0.5, 0.0);
         body.flags[3] = true;
@@ -105,7 +105,7 @@ mod tests {
         body.triangles.push([2, 3, 0]);
         body.sources.push(Source::New);
         let mut mesh = body.improvable();
-        assert_eq!(Fans::of(&mut mesh).gain(&flip), None);
+        assert_eq!(VertexRings::of(&mut mesh).gain(&flip), None);
         let mut body = kite(0.5, 0.0);
         body.sizes = vec![[0.5; 2]; 4];
         assert_eq!(better(&mut body), None);
@@ -122,11 +122,11 @@ mod tests {
             let mut body = kite(0.5, 0.0);
             body.sources[1] = other;
             let mut mesh = body.improvable();
-            let mut fans = Fans::of(&mut mesh);
-            let edge = fans.better(0).unwrap();
-            fans.flip(&edge);
-            assert_eq!((fans.take_touched(), fans.better(0)), (vec![0, 1], None));
-            fans.finish();
+            let mut rings = VertexRings::of(&mut mesh);
+            let edge = rings.better(0).unwrap();
+            rings.flip(&edge);
+            assert_eq!((rings.take_touched(), rings.better(0)), (vec![0, 1], None));
+            rings.finish();
             assert_eq!(body.triangles, [[2, 0, 3], [3, 1, 2]]);
             assert_eq!(body.sources, [expected; 2]);
         }

@@ -3,7 +3,7 @@
 //! they were sculpted. Nearly all of a mesh needs no change, and stays as it is, bit for bit; so does all of a mesh at rest (`strain.rs`).
 //!
 //! After Wojtan et al. 2009, and Brochu and Bridson 2009 ("Robust topological operations for dynamic explicit surfaces") for the
-//! preservation of ridges and corners. `fans.rs` has the operations, `butterfly.rs`, `collapse.rs`, `flip.rs` and `relax.rs` decide where
+//! preservation of ridges and corners. `remesh/vertex_rings.rs` has the operations, `butterfly.rs`, `collapse.rs`, `flip.rs` and `relax.rs` decide where
 //! they are applied and whether they are allowed.
 //!
 //! | word | meaning |
@@ -15,12 +15,12 @@
 mod butterfly;
 mod collapse;
 pub(in crate::surface) mod drift;
-mod fans;
 mod flip;
 mod improvable;
 mod relax;
 mod shape;
 mod strain;
+mod vertex_rings;
 
 pub use improvable::Improvable;
 pub use improvable::Size;
@@ -29,8 +29,8 @@ use rayon::prelude::*;
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::DVec3;
-use fans::Fans;
 use improvable::{is_long, is_short};
+use vertex_rings::VertexRings;
 
 /// How often an edge and its parts may be halved in a frame: a stray vertex may make it arbitrarily long.
 const ROUNDS: usize = 5;
@@ -64,11 +64,11 @@ pub fn improve(ctx: &Context, mesh: &mut Improvable<'_>) -> Result<Improvements>
     if due.is_empty() {
         return Ok(Improvements::default());
     }
-    let fans = Fans::of(mesh);
-    let mut work = Work { ctx, fans, rounds: ROUNDS, done: Improvements::default() };
+    let rings = VertexRings::of(mesh);
+    let mut work = Work { ctx, rings, rounds: ROUNDS, done: Improvements::default() };
     let result = work.run(due);
-    let Work { fans, done, .. } = work;
-    fans.finish();
+    let Work { rings, done, .. } = work;
+    rings.finish();
     result.map(|()| done)
 }
 
@@ -120,7 +120,7 @@ type Pass<T> = fn(&mut T, &[u32]) -> Result<()>;
 /// A mesh that is being improved.
 struct Work<'c, 'm, 'a> {
     ctx: &'c Context,
-    fans: Fans<'m, 'a>,
+    rings: VertexRings<'m, 'a>,
     /// How often edges may still be halved.
     rounds: usize,
     done: Improvements,
@@ -149,7 +149,7 @@ impl Work<'_, '_, '_> {
         let passes: [Pass<Self>; 4] = [Self::collapse, Self::unfold, Self::flip, Self::relax];
         for pass in passes {
             pass(self, &near)?;
-            let touched = self.fans.take_touched();
+            let touched = self.rings.take_touched();
             join(&mut near, &touched);
             join(&mut changed, &touched);
         }
@@ -165,16 +165,16 @@ impl Work<'_, '_, '_> {
         self.rounds -= usize::from(!edges.is_empty());
         for (n, ends) in edges.into_iter().enumerate() {
             self.look(n)?;
-            let edge = self.fans.edge(ends).filter(|_| self.fans.needs(ends, is_long));
+            let edge = self.rings.edge(ends).filter(|_| self.rings.needs(ends, is_long));
             if let Some(edge) = edge
-                && !edge.corners.iter().any(|&corner| self.fans.is_flagged(corner))
+                && !edge.corners.iter().any(|&corner| self.rings.is_flagged(corner))
             {
-                let position = self.fans.split_position(&edge);
-                self.fans.split(&edge, position);
+                let position = self.rings.split_position(&edge);
+                self.rings.split(&edge, position);
                 self.done.splits += 1;
             }
         }
-        Ok(self.fans.take_touched())
+        Ok(self.rings.take_touched())
     }
 
     /// Collapses edges that are too short, the shortest first.
@@ -182,12 +182,12 @@ impl Work<'_, '_, '_> {
         let edges = self.edges(near, is_short, 1.0);
         for (n, ends) in edges.into_iter().enumerate() {
             self.look(n)?;
-            if self.fans.edge(ends).is_none() || !self.fans.needs(ends, is_short) {
+            if self.rings.edge(ends).is_none() || !self.rings.needs(ends, is_short) {
                 continue;
             }
-            let way = self.fans.collapses(ends).into_iter().find(|way| self.fans.may(way, &[]));
+            let way = self.rings.collapses(ends).into_iter().find(|way| self.rings.may(way, &[]));
             if let Some(way) = way {
-                self.fans.collapse(&way);
+                self.rings.collapse(&way);
                 self.done.collapses += 1;
             }
         }
@@ -198,8 +198,8 @@ impl Work<'_, '_, '_> {
     fn unfold(&mut self, near: &[u32]) -> Result<()> {
         for (n, &triangle) in near.iter().enumerate() {
             self.look(n)?;
-            if let Some(way) = self.fans.unfolding(triangle) {
-                self.fans.collapse(&way);
+            if let Some(way) = self.rings.unfolding(triangle) {
+                self.rings.collapse(&way);
                 self.done.collapses += 1;
             }
         }
@@ -210,8 +210,8 @@ impl Work<'_, '_, '_> {
     fn flip(&mut self, near: &[u32]) -> Result<()> {
         for (n, &triangle) in near.iter().enumerate() {
             self.look(n)?;
-            if let Some(edge) = self.fans.better(triangle) {
-                self.fans.flip(&edge);
+            if let Some(edge) = self.rings.better(triangle) {
+                self.rings.flip(&edge);
                 self.done.flips += 1;
             }
         }
@@ -220,15 +220,15 @@ impl Work<'_, '_, '_> {
 
     /// Moves vertices created in this frame.
     fn relax(&mut self, near: &[u32]) -> Result<()> {
-        let there = near.iter().filter(|triangle| self.fans.is_there(**triangle));
-        let mut vertices: Vec<u32> = there.flat_map(|triangle| self.fans.corners(*triangle)).collect();
+        let there = near.iter().filter(|triangle| self.rings.is_there(**triangle));
+        let mut vertices: Vec<u32> = there.flat_map(|triangle| self.rings.corners(*triangle)).collect();
         vertices.sort_unstable();
         vertices.dedup();
         for _ in 0..RELAXED {
             for (n, vertex) in vertices.iter().enumerate() {
                 self.look(n)?;
-                if let Some(position) = self.fans.relaxed(*vertex) {
-                    self.fans.put(*vertex, position);
+                if let Some(position) = self.rings.relaxed(*vertex) {
+                    self.rings.put(*vertex, position);
                 }
             }
         }
@@ -239,12 +239,12 @@ impl Work<'_, '_, '_> {
     /// vertices.
     fn edges(&self, near: &[u32], is_out: fn(f64) -> bool, sign: f64) -> Vec<[u32; 2]> {
         let mut edges = Vec::new();
-        for &triangle in near.iter().filter(|triangle| self.fans.is_there(**triangle)) {
-            let [a, b, c] = self.fans.corners(triangle);
+        for &triangle in near.iter().filter(|triangle| self.rings.is_there(**triangle)) {
+            let [a, b, c] = self.rings.corners(triangle);
             for [a, b] in [[a, b], [b, c], [c, a]] {
                 let ends = [a.min(b), a.max(b)];
-                if self.fans.needs(ends, is_out) {
-                    edges.push((sign * self.fans.length(ends), ends));
+                if self.rings.needs(ends, is_out) {
+                    edges.push((sign * self.rings.length(ends), ends));
                 }
             }
         }

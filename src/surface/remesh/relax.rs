@@ -1,13 +1,13 @@
 //! Vertices created in this frame move along the surface toward the middle of their neighbours: edges and angles become even.
 
-use super::fans::Fans;
 use super::shape::{is_upright, least_angle, normal};
+use super::vertex_rings::VertexRings;
 use crate::geometry::DVec3;
 
 /// Fraction of the displacement to the neighbours' middle that a vertex moves at once.
 const SHARE: f64 = 0.5;
 
-impl Fans<'_, '_> {
+impl VertexRings<'_, '_> {
     /// The relaxed position along the surface of a vertex created in this frame; none if nothing is gained, or the vertex must stay.
     pub fn relaxed(&self, vertex: u32) -> Option<DVec3> {
         let fan = self.around(vertex);

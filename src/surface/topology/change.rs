@@ -3,7 +3,7 @@
 
 use super::hidden::Everywhere;
 use super::mesh_distance::Gamma;
-use super::particle_count::Crowd;
+use super::particle_count::ParticleCountTest;
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
 use crate::error::Result;
@@ -226,7 +226,7 @@ pub fn improved(
     (sizes, drifts): (&[Size], &[[f32; 3]]),
     change: Option<Change>,
     distances: &Distances,
-    crowd: &Crowd<'_>,
+    crowd: &ParticleCountTest<'_>,
     most: f64,
 ) -> Result<Option<Change>> {
     let mut is_changed = change.is_some();

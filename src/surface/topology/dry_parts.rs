@@ -1,7 +1,7 @@
 //! Removes parts of the mesh without liquid, crumbs left where it disappeared, and parts with too little of it.
 
 use super::change::Change;
-use super::particle_count::{Bounds, Crowd, are_inside, seen_from};
+use super::particle_count::{Bounds, ParticleCountTest, are_inside, seen_from};
 use crate::geometry::DVec3;
 use crate::geometry::check::topology;
 use crate::geometry::check::topology::bodies;
@@ -11,7 +11,7 @@ use crate::mesh_repair::Source;
 impl Change {
     /// Removes the parts of the mesh with a volume over 0 that hold too few particles, and the hollows in them. Returns the count of those
     /// that held none, and of those that held some; hollows are not counted. A mesh of one part stays.
-    pub(in crate::surface) fn drop_dry(&mut self, crowd: &Crowd<'_>) -> [usize; 2] {
+    pub(in crate::surface) fn drop_dry(&mut self, crowd: &ParticleCountTest<'_>) -> [usize; 2] {
         // Mostly there is only one.
         if topology::parts(self.vertices.len(), &self.triangles) < 2 {
             return [0; 2];

@@ -79,8 +79,8 @@ impl Tracker {
         let flag = |flags: &[bool], at: &Option<u32>| at.is_some_and(|at| flags[at as usize]);
         self.flags = change.origins.iter().map(|at| flag(&self.flags, at)).collect();
         self.bare = change.origins.iter().map(|at| flag(&self.bare, at)).collect();
-        if !self.lasting.is_empty() {
-            self.lasting = change.carried_shares(&self.lasting);
+        if !self.detail_retention.is_empty() {
+            self.detail_retention = change.carried_shares(&self.detail_retention);
         }
         self.sizes.clone_from(&change.sizes);
         self.drift.vertices.clone_from(&change.drifts);

@@ -22,7 +22,7 @@ pub type Bounds = [DVec3; 2];
 
 /// Particles, of which a part of the mesh must hold a minimum count.
 #[derive(Debug, Clone, Copy)]
-pub struct Crowd<'a> {
+pub struct ParticleCountTest<'a> {
     /// Their positions (m).
     pub positions: &'a [DVec3],
     /// Initial distance between them (m).
@@ -31,8 +31,8 @@ pub struct Crowd<'a> {
     pub least: usize,
 }
 
-impl Crowd<'_> {
-    /// Count of particles in each of some closed parts, given by their bounds (m), counted up to [`Crowd::least`]: 0 if none lies inside,
+impl ParticleCountTest<'_> {
+    /// Count of particles in each of some closed parts, given by their bounds (m), counted up to [`ParticleCountTest::least`]: 0 if none lies inside,
     /// else those inside and beside it. `mesh` gives a part's triangles, turned outward, with positions relative to its minimum corner; it
     /// is called for parts that particles come near.
     pub fn held(&self, parts: &[Bounds], mesh: impl Fn(usize) -> TriMesh) -> Vec<usize> {
@@ -144,7 +144,7 @@ impl Bins {
     }
 }
 
-/// Which positions (m) lie inside any of some closed parts, given by their bounds (m); `mesh` as for [`Crowd::held`].
+/// Which positions (m) lie inside any of some closed parts, given by their bounds (m); `mesh` as for [`ParticleCountTest::held`].
 pub fn are_inside(positions: &[DVec3], parts: &[Bounds], mesh: impl Fn(usize) -> TriMesh) -> Vec<bool> {
     let mut are = vec![false; positions.len()];
     for (part, bounds) in parts.iter().enumerate() {
@@ -186,7 +186,7 @@ mod tests {
             100 => TriMesh::cuboid([0.0; 3], [401.0, 3.0, 3.0]),
             _ => TriMesh::cuboid([0.0; 3], [1.0; 3]),
         };
-        Crowd { positions, spacing, least }.held(&parts, mesh)
+        ParticleCountTest { positions, spacing, least }.held(&parts, mesh)
     }
 
     fn middle(n: u32) -> DVec3 {

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::particle_count::{Bounds, Crowd, are_inside, seen_from};
+use super::particle_count::{Bounds, ParticleCountTest, are_inside, seen_from};
 use crate::geometry::Coord;
 use crate::geometry::DVec3;
 use crate::surface::level_set::implicit::Implicit;
@@ -11,7 +11,7 @@ use crate::surface::particles::grid::cell_of;
 
 /// A part of the particles' surface on which no vertex of the mesh lies.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Apart {
+pub struct UncoveredPart {
     /// Centre: the mean of its corners (m).
     pub position: DVec3,
     /// Enclosed volume (m3); negative: a bubble.
@@ -24,14 +24,14 @@ pub struct Apart {
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted<'a> {
     /// Drops: those that hold enough of these particles; if one is enough, all.
-    pub crowd: Crowd<'a>,
+    pub crowd: ParticleCountTest<'a>,
     /// Bubbles: those of at least this volume (cells^3), but none in drops that are too small; infinite: none at all.
     pub bubble: f64,
 }
 
 /// Missing parts of a mesh.
 #[derive(Debug, Default)]
-pub struct Lacking {
+pub struct MissingParts {
     /// Positions (cells) on the particles' surface.
     pub positions: Vec<DVec3>,
     /// Bounds (cells) of drops that it should not cover, as they are too small.
@@ -69,9 +69,9 @@ impl Parts {
     }
 
     /// The uncovered parts that the mesh should cover.
-    pub fn lacking(&self, phi: &Implicit, surface: &Isosurface, wanted: &Wanted<'_>) -> Lacking {
+    pub fn lacking(&self, phi: &Implicit, surface: &Isosurface, wanted: &Wanted<'_>) -> MissingParts {
         if self.is_covered.iter().all(|covered| *covered) {
-            return Lacking::default();
+            return MissingParts::default();
         }
         let mut six = vec![0.0f64; self.is_covered.len()];
         let mut firsts: Vec<Option<DVec3>> = vec![None; six.len()];
@@ -101,7 +101,7 @@ impl Parts {
         }
         let vertices = (0..).zip(&self.of_vertex).filter(|(_, part)| is_wanted[**part as usize]);
         let positions = vertices.map(|(vertex, _)| surface.in_cells(phi, vertex)).collect();
-        Lacking { positions, specks }
+        MissingParts { positions, specks }
     }
 
     /// Those of `drops` (ascending) that hold too few particles, and those of `bubbles` (each with a position (m) on it) that lie in such a
@@ -111,7 +111,7 @@ impl Parts {
         phi: &Implicit,
         surface: &Isosurface,
         (drops, bubbles): (&[usize], &[(usize, DVec3)]),
-        crowd: &Crowd<'_>,
+        crowd: &ParticleCountTest<'_>,
     ) -> (Vec<usize>, Vec<Bounds>) {
         let mut triangles: Vec<Vec<[DVec3; 3]>> = vec![Vec::new(); drops.len()];
         for triangle in surface.runs().flat_map(|(_, triangles)| triangles) {
@@ -143,7 +143,7 @@ impl Parts {
     }
 
     /// The parts that the mesh does not cover, the largest first.
-    pub fn apart(&self, phi: &Implicit, surface: &Isosurface) -> Vec<Apart> {
+    pub fn apart(&self, phi: &Implicit, surface: &Isosurface) -> Vec<UncoveredPart> {
         if self.is_covered.iter().all(|covered| *covered) {
             return Vec::new();
         }
@@ -164,12 +164,13 @@ impl Parts {
             sum.3 += 1;
         }
         let cell = phi.cell();
-        let told = sums.into_iter().filter(|sum| sum.3 > 0).map(|(corners, count, six, triangles)| Apart {
-            position: corners / count as f64 * cell,
-            volume: six / 6.0 * cell.powi(3),
-            triangles,
-        });
-        let mut out: Vec<Apart> = told.collect();
+        let told =
+            sums.into_iter().filter(|sum| sum.3 > 0).map(|(corners, count, six, triangles)| UncoveredPart {
+                position: corners / count as f64 * cell,
+                volume: six / 6.0 * cell.powi(3),
+                triangles,
+            });
+        let mut out: Vec<UncoveredPart> = told.collect();
         out.sort_by(|a, b| b.volume.abs().total_cmp(&a.volume.abs()));
         out
     }

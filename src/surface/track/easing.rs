@@ -28,14 +28,14 @@ const LEAST: f64 = 1e-3;
 
 /// Effect of a step on the vertices before it.
 #[derive(Debug, Clone, Default)]
-pub struct Leads {
+pub struct EasingTargets {
     /// Vertices that are removed, ascending, with their displacements (m) to what replaces them.
     ways: Vec<(u32, DVec3)>,
     /// For each vertex, its vertex before the step, if any vertex is new or was removed.
     origins: Origins,
 }
 
-impl Leads {
+impl EasingTargets {
     /// The targets of a change of a mesh that had these triangles; particles are a spacing (m) apart.
     ///
     /// # Errors
@@ -96,7 +96,7 @@ pub struct Eased {
 
 /// The vertices, ascending, that are displaced ahead of the steps in `coming` (the first step first), and by how much. Displacement starts
 /// `ahead` steps before the step that removes a vertex, grows with each step, and is complete when that step is done.
-pub fn eased<'a>(coming: impl IntoIterator<Item = &'a Leads>, ahead: usize) -> Vec<Eased> {
+pub fn eased<'a>(coming: impl IntoIterator<Item = &'a EasingTargets>, ahead: usize) -> Vec<Eased> {
     let (mut origins, mut moved) = (None, Vec::new());
     for (step, leads) in (1..=ahead + 1).zip(coming) {
         let [now, next] = [step, step - 1].map(|steps| weight(steps, ahead));
@@ -280,7 +280,7 @@ mod tests {
                 continue;
             }
             let mut places = change.before.clone();
-            let leads = Leads::of(&ctx, &change, &triangles, 1.0).unwrap();
+            let leads = EasingTargets::of(&ctx, &change, &triangles, 1.0).unwrap();
             eased([&leads], 0).iter().for_each(|eased| places[eased.vertex as usize] += eased.next);
             assert!(farthest(&places, &triangles, &change) < 0.35 * far, "{step}");
             // Vertices that stay are not displaced.
@@ -298,10 +298,10 @@ mod tests {
     fn a_vertex_is_moved_more_the_nearer_its_change_is_by_the_name_that_it_has() {
         // The second step removes vertex 1, which was vertex 2 before the first.
         let way = DVec3::new(1.0, 2.0, 3.0);
-        let first = Leads { ways: Vec::new(), origins: Some(vec![Some(0), Some(2), None]) };
-        let second = Leads { ways: vec![(1, way), (2, way)], origins: Some(vec![Some(0)]) };
-        let still = Leads::default();
-        let moved = |coming: &[&Leads]| eased(coming.iter().copied(), 3);
+        let first = EasingTargets { ways: Vec::new(), origins: Some(vec![Some(0), Some(2), None]) };
+        let second = EasingTargets { ways: vec![(1, way), (2, way)], origins: Some(vec![Some(0)]) };
+        let still = EasingTargets::default();
+        let moved = |coming: &[&EasingTargets]| eased(coming.iter().copied(), 3);
         assert!(moved(&[&still, &still]).is_empty());
         let [one] = moved(&[&first, &second])[..] else { panic!("one vertex is moved") };
         assert!(one.vertex == 2 && one.now == way * 0.5 && one.next == way * 0.84375, "{one:?}");
@@ -310,7 +310,7 @@ mod tests {
         let [one] = moved(&[&still, &still, &still, &both])[..] else { panic!("one vertex is moved") };
         assert!(one.now == DVec3::zeros() && one.next == way * 0.15625, "{one:?}");
         assert!(moved(&[&still, &still, &still, &still, &both]).is_empty());
-        assert!(moved(&[&Leads::cut(3), &second]).is_empty());
+        assert!(moved(&[&EasingTargets::cut(3), &second]).is_empty());
         let [one, two] = eased([&second], 0)[..] else { panic!("two vertices are moved") };
         assert_eq!((one.vertex, two.vertex), (1, 2));
         assert!([one, two].iter().all(|eased| eased.now == DVec3::zeros() && eased.next == way));

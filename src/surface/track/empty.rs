@@ -24,7 +24,7 @@ impl Tracker {
             vertices: Vec::new(),
             triangles: Vec::new(),
             delta: Vec::new(),
-            lasting: Vec::new(),
+            detail_retention: Vec::new(),
             flags: Vec::new(),
             bare: Vec::new(),
             reach: crate::surface::tracked_mesh::REACH[0],

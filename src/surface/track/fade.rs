@@ -16,8 +16,8 @@ pub fn fade(tracker: &Tracker, carried: &[DVec3], dt: f64) -> Vec<f32> {
     let strains = if params.fade > 0.0 { strains(tracker, carried) } else { Vec::new() };
     for (vertex, delta) in delta.iter_mut().enumerate() {
         let strain = strains.get(vertex).map_or(0.0, |strain| params.fade * strain);
-        let lasting = tracker.lasting.get(vertex).map_or(0.0, |share| f64::from(*share));
-        *delta = (f64::from(*delta) * libm::exp(-(rate + strain) * (1.0 - lasting))) as f32;
+        let detail_retention = tracker.detail_retention.get(vertex).map_or(0.0, |share| f64::from(*share));
+        *delta = (f64::from(*delta) * libm::exp(-(rate + strain) * (1.0 - detail_retention))) as f32;
     }
     delta
 }

@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use super::easing::{Eased, Leads, eased};
+use super::easing::{Eased, EasingTargets, eased};
 use super::easing_limit::{Displaced, uncrossed};
 use crate::context::Context;
 use crate::error::Result;
@@ -28,7 +28,7 @@ struct Coming {
     dt: f64,
     after: Tracker,
     report: StepReport,
-    leads: Leads,
+    leads: EasingTargets,
 }
 
 impl Outlook {
@@ -62,8 +62,8 @@ impl Outlook {
             let report = after.step(ctx, from, &to, dt)?;
             let spacing = tracker.params().spacing;
             let leads = match &report.change {
-                Some(change) => Leads::of(ctx, change, &triangles, spacing)?,
-                None => Leads::default(),
+                Some(change) => EasingTargets::of(ctx, change, &triangles, spacing)?,
+                None => EasingTargets::default(),
             };
             self.steps.push_back(Coming { to, dt, after, report, leads });
         }

@@ -10,22 +10,22 @@ use crate::surface::tracked_mesh::Tracker;
 impl Tracker {
     /// Replaces its mesh by an edited one (m), of any vertices and triangles, at the time of `particles`: those to which its last step went,
     /// or with which it began. The distance of each vertex is measured anew and kept from there on; the parameters stay, detail retention is
-    /// cleared ([`Tracker::set_lasting`]), no vertex is flagged. The report is that of [`Tracker::begin`]. After an error the tracker is
+    /// cleared ([`Tracker::set_detail_retention`]), no vertex is flagged. The report is that of [`Tracker::begin`]. After an error the tracker is
     /// unchanged.
     ///
     /// From then on states contain the edited mesh's triangles: [`Tracker::resume`] still takes the initial mesh.
     ///
     /// # Errors
-    /// As [`Tracker::begin`] and [`Tracker::set_lasting`].
+    /// As [`Tracker::begin`] and [`Tracker::set_detail_retention`].
     pub fn resculpt(
         &mut self,
         ctx: &Context,
         mesh: &TriMesh,
-        lasting: Vec<f32>,
+        detail_retention: Vec<f32>,
         particles: &Particles,
     ) -> Result<StepReport> {
         let ((mut next, report), phases) = ctx.step(4, || Self::begin(ctx, self.params, mesh, particles))?;
-        next.set_lasting(lasting)?;
+        next.set_detail_retention(detail_retention)?;
         // Even if the triangles are the initial ones: sizes and detail retention are no longer those of the initial mesh.
         next.is_rebuilt = true;
         // The surface of the coming particles is the same for every mesh.
@@ -117,7 +117,7 @@ mod tests {
         let ctx = context();
         for rebuild in [false, true] {
             let (mut tracker, first) = followed(&ctx, rebuild, 2);
-            tracker.set_lasting(vec![0.5; tracker.vertices().len()]).unwrap();
+            tracker.set_detail_retention(vec![0.5; tracker.vertices().len()]).unwrap();
             let mut edited = with_bump(&tracker, 2);
             if !rebuild {
                 // A mesh that is not rebuilt may be open.
@@ -125,12 +125,12 @@ mod tests {
             }
             tracker.resculpt(&ctx, &edited, Vec::new(), &ball(2)).unwrap();
             assert!(tracker.is_rebuilt() && tracker.triangles() == edited.triangles);
-            assert!(tracker.lasting.is_empty());
-            tracker.set_lasting(vec![0.25; edited.positions.len()]).unwrap();
+            assert!(tracker.detail_retention.is_empty());
+            tracker.set_detail_retention(vec![0.25; edited.positions.len()]).unwrap();
             let state = tracker.save();
             // A state belongs to the initial mesh.
             let mut back = Tracker::resume(tracker.params, &first, &state).unwrap();
-            assert!(back.save() == state && back.lasting == tracker.lasting);
+            assert!(back.save() == state && back.detail_retention == tracker.detail_retention);
             go_on(&ctx, &mut tracker, [2, 4]);
             go_on(&ctx, &mut back, [2, 4]);
             assert!(back.save() == tracker.save() && state != tracker.save());

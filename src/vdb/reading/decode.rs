@@ -69,7 +69,7 @@ fn kind_of(header: &GridInfo) -> &str {
 }
 
 /// A result whose error message is appended to the file's name.
-type Told<T> = std::result::Result<T, String>;
+type Decoded<T> = std::result::Result<T, String>;
 
 /// Where the grids of a file are.
 enum Source<'a> {
@@ -102,7 +102,7 @@ fn source(path: &Path) -> Result<Source<'_>> {
     Ok(Source::File(name))
 }
 
-fn stored(bytes: &[u8]) -> Told<Source<'static>> {
+fn stored(bytes: &[u8]) -> Decoded<Source<'static>> {
     ffi::read_bytes(bytes).map(Source::Stored).map_err(|error| cannot_read(&error))
 }
 
@@ -160,17 +160,17 @@ pub(in crate::vdb) fn read_points(path: &Path, name: Option<&str>) -> Result<(Po
 }
 
 /// As [`crate::vdb::file::from_bytes`]; the error message is appended to the name of the bytes.
-pub(in crate::vdb) fn from_bytes(bytes: &[u8], name: Option<&str>) -> Told<FloatGrid> {
+pub(in crate::vdb) fn from_bytes(bytes: &[u8], name: Option<&str>) -> Decoded<FloatGrid> {
     named(whole(bytes)?, name, Kinds::Floats).and_then(floats)
 }
 
 /// As [`crate::vdb::file::any_from_bytes`]; the error message is appended to the name of the bytes.
-pub(in crate::vdb) fn any_from_bytes(bytes: &[u8], name: Option<&str>) -> Told<AnyGrid> {
+pub(in crate::vdb) fn any_from_bytes(bytes: &[u8], name: Option<&str>) -> Decoded<AnyGrid> {
     named(whole(bytes)?, name, Kinds::FloatsAndVectors)
 }
 
 /// The grids in bytes whose structure has been checked.
-fn whole(bytes: &[u8]) -> Told<Source<'static>> {
+fn whole(bytes: &[u8]) -> Decoded<Source<'static>> {
     layout::read(Cursor::new(bytes)).map_err(|fault| match fault {
         Fault::Io(error) => error.to_string(),
         Fault::Content(what) => what,
@@ -178,7 +178,7 @@ fn whole(bytes: &[u8]) -> Told<Source<'static>> {
     stored(bytes)
 }
 
-fn headers(source: &Source<'_>) -> Told<Vec<GridInfo>> {
+fn headers(source: &Source<'_>) -> Decoded<Vec<GridInfo>> {
     let headers = match source {
         Source::File(name) => ffi::describe_file(name),
         Source::Stored(stored) => ffi::describe_stored(stored),
@@ -201,7 +201,7 @@ fn info(header: ffi::GridHeader) -> GridInfo {
     }
 }
 
-fn named(mut source: Source<'_>, name: Option<&str>, kinds: Kinds) -> Told<AnyGrid> {
+fn named(mut source: Source<'_>, name: Option<&str>, kinds: Kinds) -> Decoded<AnyGrid> {
     let chosen = choose(&source, name, kinds)?;
     load(&mut source, &chosen, kinds)
 }
@@ -226,7 +226,7 @@ fn nth(mut headers: Vec<GridInfo>, at: usize) -> Option<Chosen> {
 }
 
 /// The grid of that name, or the first one of the accepted kinds.
-fn choose(source: &Source<'_>, name: Option<&str>, kinds: Kinds) -> Told<Chosen> {
+fn choose(source: &Source<'_>, name: Option<&str>, kinds: Kinds) -> Decoded<Chosen> {
     let headers = headers(source)?;
     let first = |wanted: &dyn Fn(&GridInfo) -> bool| headers.iter().position(wanted);
     let floats = |header: &GridInfo| kinds != Kinds::Points && Kinds::Floats.take(header);
@@ -250,7 +250,7 @@ fn choose(source: &Source<'_>, name: Option<&str>, kinds: Kinds) -> Told<Chosen>
 }
 
 /// A grid of a file.
-fn load(source: &mut Source<'_>, chosen: &Chosen, kinds: Kinds) -> Told<AnyGrid> {
+fn load(source: &mut Source<'_>, chosen: &Chosen, kinds: Kinds) -> Decoded<AnyGrid> {
     let grid = AnyGrid::of(found(source, chosen, kinds)?).ok_or(ASTRAY)?;
     if grid.is_finite().map_err(|error| error.to_string())? {
         return Ok(grid);
@@ -259,7 +259,7 @@ fn load(source: &mut Source<'_>, chosen: &Chosen, kinds: Kinds) -> Told<AnyGrid>
 }
 
 /// A grid of a file, as OpenVDB reads it.
-fn found(source: &mut Source<'_>, (at, header, unique): &Chosen, kinds: Kinds) -> Told<ffi::Found> {
+fn found(source: &mut Source<'_>, (at, header, unique): &Chosen, kinds: Kinds) -> Decoded<ffi::Found> {
     if !kinds.take(header) {
         let (name, kind, wanted) = (&header.name, kind_of(header), kinds.words());
         return Err(format!("grid \"{name}\" holds {kind}, but {wanted} are needed"));
@@ -274,6 +274,6 @@ fn found(source: &mut Source<'_>, (at, header, unique): &Chosen, kinds: Kinds) -
 /// The error for a grid whose type differs from the one that the file states.
 const ASTRAY: &str = "the .vdb file is damaged: a grid is not of the type that the file says";
 
-fn floats(grid: AnyGrid) -> Told<FloatGrid> {
+fn floats(grid: AnyGrid) -> Decoded<FloatGrid> {
     grid.floats().ok_or_else(|| ASTRAY.to_string())
 }

@@ -5,17 +5,17 @@ use std::path::Path;
 
 use frazil::geometry::DVec3;
 use frazil::geometry::points::{Column, Points, Values};
-use frazil::io::particles::{self, Cloud};
+use frazil::io::particles::{self, ParticleData};
 
 use crate::common::caches::{IDS, KINDS, POSITIONS, VELOCITIES, Vtu, bgeo, vtk, zipped};
 
-pub fn parse(name: &str, bytes: &[u8]) -> frazil::Result<Cloud> {
+pub fn parse(name: &str, bytes: &[u8]) -> frazil::Result<ParticleData> {
     particles::parse(Path::new(name), bytes)
 }
 
 /// The four particles, whatever file they were in.
 #[track_caller]
-fn are_the_particles(cloud: &Cloud, what: &str) {
+fn are_the_particles(cloud: &ParticleData, what: &str) {
     let positions = POSITIONS.map(|position| DVec3::from(position.map(f64::from)));
     assert_eq!(cloud.positions, positions, "{what}");
     assert_eq!(

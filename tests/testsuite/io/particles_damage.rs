@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use frazil::geometry::DVec3;
 use frazil::geometry::points::Values;
-use frazil::io::particles::{self, Cloud};
+use frazil::io::particles::{self, ParticleData};
 
 use super::particles::parse;
 use crate::common::caches::{Vtu, bgeo, samples, vtk, zipped};
@@ -13,7 +13,7 @@ use crate::common::character;
 
 /// Whatever is read is whole, and whatever is not is a sentence about the file; nothing panics on the way.
 #[track_caller]
-fn is_whole_or_refused(name: &str, bytes: &[u8], what: &str) -> Option<Cloud> {
+fn is_whole_or_refused(name: &str, bytes: &[u8], what: &str) -> Option<ParticleData> {
     let start = Instant::now();
     let cloud = match parse(name, bytes) {
         Ok(cloud) => {
@@ -185,7 +185,7 @@ fn a_position_that_is_not_finite_is_named() {
 }
 
 /// Particles of a file of the outside data.
-fn outside(name: &str) -> Option<Cloud> {
+fn outside(name: &str) -> Option<ParticleData> {
     let path = character::data(&format!("particles/{name}"));
     if path.is_none() {
         skipped(&format!("no particles/{name}"));

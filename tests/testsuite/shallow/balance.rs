@@ -2,7 +2,7 @@
 
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
@@ -53,7 +53,7 @@ fn slopes(ctx: &Context, seed: u64, dice: &mut Dice) -> Shallow {
     let params = Params {
         liquid: Liquid::new([1e-6, 4e-6, 1e-4][dice.below(3)]),
         border: [Border::Open, Border::Closed][dice.below(2)],
-        pace: [Pace::Exact, Pace::Realtime(0.003)][dice.below(2)],
+        pace: [TimeStepping::Exact, TimeStepping::Realtime(0.003)][dice.below(2)],
         ..Params::default()
     };
     Shallow::new(ctx, &solids, params).unwrap()

@@ -2,7 +2,7 @@
 
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
@@ -18,8 +18,13 @@ fn pond(border: Border) -> Shallow {
     let heights = Heights::between(-0.1, 0.1).unwrap();
     let solids =
         Solids::new(grid, heights, (0..grid.cells()).map(|_| vec![[BOTTOMLESS, heights.round(0.0)]]));
-    let params =
-        Params { liquid: Liquid::new(0.0), kept: 1.0, border, pace: Pace::Exact, ..Params::default() };
+    let params = Params {
+        liquid: Liquid::new(0.0),
+        kept: 1.0,
+        border,
+        pace: TimeStepping::Exact,
+        ..Params::default()
+    };
     let mut pond = Shallow::new(&context(), &solids, params).unwrap();
     pond.fill(DEPTH);
     pond

@@ -5,7 +5,7 @@ use frazil::Pool;
 use frazil::shallow::columns::grid::BOTTOMLESS;
 use frazil::shallow::free_fall::Falls;
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::{Detail, Params, Shallow};
@@ -65,7 +65,7 @@ fn nothing_is_lost_while_the_near_cells_move() {
             let top = 0.012 * floor as f64 + 2e-3 * waves(at, cell);
             (floor == 0 || x.abs().max(z.abs()) < 0.015).then_some([top - 0.003, top])
         });
-        let pace = if round == 3 { Pace::Exact } else { Pace::Realtime(0.003) };
+        let pace = if round == 3 { TimeStepping::Exact } else { TimeStepping::Realtime(0.003) };
         let params = Params { border, pace, ..Params::default() };
         let mut detail = Detail::new(&ctx, &solids, params, [10..30, 8..24]).unwrap();
         detail.fill(0.001);
@@ -139,7 +139,7 @@ fn a_lake_at_rest_stays_level_to_a_unit() {
 fn film(slope: f64, near: [std::ops::Range<usize>; 2]) -> (Detail, f64) {
     let (cell, size) = (0.0005, [160, 32]);
     let solids = ground(size, cell, [-0.05, 0.1], |[x, _]| 0.03 - slope * x);
-    let params = Params { kept: 1.0, pace: Pace::Exact, ..Params::default() };
+    let params = Params { kept: 1.0, pace: TimeStepping::Exact, ..Params::default() };
     let mut detail = Detail::new(&context(), &solids, params, near).unwrap();
     // A source a coarse cell: each a row of it; and as many drains below.
     let discharge = 1e-5;
@@ -197,8 +197,12 @@ fn hump(near: [std::ops::Range<usize>; 2], frames: usize) -> Vec<[f64; 2]> {
     let ctx = context();
     let (cell, depth) = (0.001, 0.004);
     let solids = ground([400, 8], cell, [-0.02, 0.1], |_| 0.0);
-    let params =
-        Params { kept: 1.0, liquid: Liquid::new(0.0), pace: Pace::Realtime(0.001), ..Params::default() };
+    let params = Params {
+        kept: 1.0,
+        liquid: Liquid::new(0.0),
+        pace: TimeStepping::Realtime(0.001),
+        ..Params::default()
+    };
     let mut detail = Detail::new(&ctx, &solids, params, near).unwrap();
     detail.fill(depth);
     for x in 0..200 {

@@ -1,7 +1,7 @@
 //! Level of detail where all cells are near, where ground moves, and where bodies cross the edge.
 
 use frazil::geometry::DVec3;
-use frazil::shallow::params::{Friction, Pace};
+use frazil::shallow::params::{Friction, TimeStepping};
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::terrain::Solids;
@@ -47,9 +47,9 @@ fn check(detail: &Detail, poured: f64, what: &str) {
 fn all_cells_may_be_near() {
     let ctx = context();
     for (border, pace, friction, rest) in [
-        (Border::Closed, Pace::Realtime(0.003), Friction::Ground, 0.0),
-        (Border::Open, Pace::Realtime(0.004), Friction::Ground, 1e-6),
-        (Border::Absorbing, Pace::Realtime(0.002), Friction::Walls, 0.0),
+        (Border::Closed, TimeStepping::Realtime(0.003), Friction::Ground, 0.0),
+        (Border::Open, TimeStepping::Realtime(0.004), Friction::Ground, 1e-6),
+        (Border::Absorbing, TimeStepping::Realtime(0.002), Friction::Walls, 0.0),
     ] {
         let params = Params { border, pace, friction, rest, ..Params::default() };
         let whole = [0..SIZE[0], 0..SIZE[1]];

@@ -2,7 +2,7 @@
 
 use frazil::geometry::DVec3;
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::terrain::Solids;
@@ -44,7 +44,7 @@ fn points() -> Vec<FlowPoint> {
 }
 
 fn scene(border: Border, near: [std::ops::Range<usize>; 2]) -> Detail {
-    let params = Params { border, pace: Pace::Realtime(0.003), ..Params::default() };
+    let params = Params { border, pace: TimeStepping::Realtime(0.003), ..Params::default() };
     let mut detail = Detail::new(&context(), &terrain(0.0), params, near).unwrap();
     detail.set_scalars(&scalars()).unwrap();
     detail.set_poured(&[0.25, -50.0, 3.0, 0.0]).unwrap();
@@ -165,7 +165,7 @@ fn all_near_is_a_plain_liquid_and_states_have_what_is_carried() {
     let ctx = context();
     let whole = [0..SIZE[0], 0..SIZE[1]];
     let mut detail = scene(Border::Open, whole.clone());
-    let params = Params { border: Border::Open, pace: Pace::Realtime(0.003), ..Params::default() };
+    let params = Params { border: Border::Open, pace: TimeStepping::Realtime(0.003), ..Params::default() };
     let mut plain = Shallow::new(&ctx, &terrain(0.0), params).unwrap();
     plain.set_scalars(&scalars()).unwrap();
     plain.set_poured(&[0.25, -50.0, 3.0, 0.0]).unwrap();

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use frazil::geometry::DVec3;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::terrain::Solids;
@@ -47,7 +47,7 @@ fn scene(ctx: &Context, phase: f64, params: &Params, near: [Range<usize>; 2]) ->
 }
 
 fn params(border: Border) -> Params {
-    Params { border, pace: Pace::Realtime(0.003), ..Params::default() }
+    Params { border, pace: TimeStepping::Realtime(0.003), ..Params::default() }
 }
 
 fn run(detail: &mut Detail, ctx: &Context, frames: usize) {

@@ -5,7 +5,7 @@ use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::free_fall::mesh::{Balls, Target, bound};
 use frazil::shallow::free_fall::{Droplet, Falls};
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::surface::{Indices, Layout, Up};
@@ -229,7 +229,7 @@ fn fast_liquid_does_not_pass_through_a_thin_floor() {
             }
             cell
         });
-        let pace = Pace::Realtime(0.03);
+        let pace = TimeStepping::Realtime(0.03);
         let liquid = Params { pace, ..params(Falls::default()) };
         let mut liquid = Shallow::new(&ctx, &ground, liquid).unwrap();
         let column = liquid.columns().of_cell([18, 12]).last().unwrap();

@@ -2,7 +2,7 @@
 
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 use frazil::{Context, Pool};
@@ -46,7 +46,7 @@ fn u_tube(levels: [f64; 2], params: Params) -> Shallow {
 }
 
 fn params() -> Params {
-    Params { liquid: Liquid::new(0.0), kept: 1.0, pace: Pace::Exact, ..Params::default() }
+    Params { liquid: Liquid::new(0.0), kept: 1.0, pace: TimeStepping::Exact, ..Params::default() }
 }
 
 /// Level of the left leg less that of the right one (m).

@@ -3,7 +3,7 @@
 use std::process::Command;
 
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::{Params, Shallow};
@@ -156,7 +156,7 @@ fn print_hashes() {
 
 /// Three seconds of blood on a slope that rolls, as in the thesis' Fig. 4.13, where disturbances run at over the speed of waves: the greatest depth
 /// (m), the volume on the slope (ml), and rows in which films were held back.
-fn rolling_film(edge: usize, pace: Pace) -> (f64, f64, u64) {
+fn rolling_film(edge: usize, pace: TimeStepping) -> (f64, f64, u64) {
     let ctx = context();
     let rolling = |[x, z]: [f64; 2]| {
         let bumps = libm::sin(150.0 * x + 1.0) * libm::sin(170.0 * z) + 0.6 * libm::sin(310.0 * z + 90.0 * x);
@@ -177,18 +177,18 @@ fn rolling_film(edge: usize, pace: Pace) -> (f64, f64, u64) {
 
 #[test]
 fn a_fast_film_on_a_rolling_slope_does_not_break_into_ridges() {
-    let (deepest, inside, _) = rolling_film(100, Pace::Exact);
+    let (deepest, inside, _) = rolling_film(100, TimeStepping::Exact);
     assert!((0.7e-3..0.9e-3).contains(&deepest), "{deepest} m");
     assert!((1.5..1.8).contains(&inside), "{inside} ml");
 }
 
 #[test]
 fn a_film_that_is_too_fast_for_real_time_is_held_back_and_stays_smooth() {
-    let (deepest, inside, slowed) = rolling_film(200, Pace::Realtime(0.003));
+    let (deepest, inside, slowed) = rolling_film(200, TimeStepping::Realtime(0.003));
     assert!((0.9e-3..1.2e-3).contains(&deepest), "{deepest} m");
     assert!((1.9..2.1).contains(&inside), "{inside} ml, where exact steps leave 1.6");
     assert!(slowed > 1000, "{slowed} rows");
-    let (_, _, slowed) = rolling_film(100, Pace::Realtime(0.001));
+    let (_, _, slowed) = rolling_film(100, TimeStepping::Realtime(0.001));
     assert_eq!(slowed, 0, "steps of 1 ms are short enough for cells of 1 mm");
 }
 
@@ -203,7 +203,7 @@ fn a_hole_in_the_ground_drains_as_torricelli_says() {
         ..source([0.0; 3], 0.0, 0.0)
     };
     let drained = |point: FlowPoint, time: f64| {
-        let params = Params { liquid: Liquid::WATER, pace: Pace::Exact, ..Params::default() };
+        let params = Params { liquid: Liquid::WATER, pace: TimeStepping::Exact, ..Params::default() };
         let mut liquid = covered(&ctx, &solids, params, |_, _| 0.02);
         liquid.set_flows(&[point], |_| "the hole".into()).unwrap();
         (0..(time / FRAME) as usize).for_each(|_| {

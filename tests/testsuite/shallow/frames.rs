@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use frazil::Context;
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Detail, Params, Shallow};
 
@@ -14,7 +14,7 @@ use crate::common::shallow::{context, covered, ground, source, waves};
 const FRAME: f64 = 1.0 / 60.0;
 
 fn exact() -> Params {
-    Params { pace: Pace::Exact, ..Params::default() }
+    Params { pace: TimeStepping::Exact, ..Params::default() }
 }
 
 /// Runs a step that is cancelled after some time, from another thread; how long it took to answer (s), and whether it was cancelled.
@@ -64,7 +64,7 @@ fn steps_of_a_frame_end_where_one_of_two_liquids_is_dry() {
 fn a_frame_that_takes_long_is_cancelled_within_and_was_never_begun() {
     let ctx = context();
     let solids = ground([60, 60], 0.002, [-0.05, 0.1], |at| 0.004 * waves(at, 0.002));
-    for params in [exact(), Params { pace: Pace::Realtime(0.001), ..Params::default() }] {
+    for params in [exact(), Params { pace: TimeStepping::Realtime(0.001), ..Params::default() }] {
         let mut liquid = covered(&ctx, &solids, params.clone(), |[x, _], _| if x < 0.0 { 0.01 } else { 0.0 });
         liquid.set_flows(&[source([0.02, 0.0, 0.01], 0.004, 1e-6)], |at| at.to_string()).unwrap();
         liquid.step(&ctx, FRAME).unwrap();

@@ -3,7 +3,7 @@
 use frazil::Context;
 use frazil::geometry::DVec3;
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Load, Params, Shallow};
 
@@ -16,7 +16,7 @@ const G: f64 = 9.81;
 
 /// A basin 8 cm wide, with a pool of some depth (m) on level ground at 0.
 fn pool(ctx: &Context, depth: f64, liquid: Liquid) -> Shallow {
-    let params = Params { liquid, pace: Pace::Exact, kept: 0.01, ..Params::default() };
+    let params = Params { liquid, pace: TimeStepping::Exact, kept: 0.01, ..Params::default() };
     covered(ctx, &ground([40; 2], CELL, [-0.01, 0.09], |_| 0.0), params, |_, _| depth)
 }
 

@@ -3,7 +3,7 @@
 use frazil::geometry::DVec3;
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights, TOP};
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::terrain::shapes::Shape;
@@ -39,7 +39,7 @@ fn floor(grid: Grid, height: f64) -> Solids {
 }
 
 fn params() -> Params {
-    Params { liquid: Liquid::WATER, pace: Pace::Realtime(0.005), ..Params::default() }
+    Params { liquid: Liquid::WATER, pace: TimeStepping::Realtime(0.005), ..Params::default() }
 }
 
 /// Checks that nothing is missing, and that all columns hold what they can.

@@ -2,7 +2,7 @@
 
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::terrain::Solids;
@@ -329,7 +329,8 @@ fn the_surface_of_a_film_is_half_as_fast_again() {
     let heights = Heights::between(-0.01, 0.1).unwrap();
     let ground = |cell: usize| heights.round(slope * 0.0005 * (400 - cell % 400) as f64);
     let solids = Solids::new(grid, heights, (0..grid.cells()).map(|cell| vec![[BOTTOMLESS, ground(cell)]]));
-    let params = Params { liquid: Liquid::new(viscosity), kept: 1.0, pace: Pace::Exact, ..Params::default() };
+    let params =
+        Params { liquid: Liquid::new(viscosity), kept: 1.0, pace: TimeStepping::Exact, ..Params::default() };
     let mut shallow = Shallow::new(&ctx, &solids, params).unwrap();
     let columns: Vec<usize> = shallow.columns().indices().collect();
     for column in columns {

@@ -2,7 +2,7 @@
 
 use frazil::geometry::DVec3;
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind};
 use frazil::shallow::terrain::Solids;
@@ -146,7 +146,7 @@ fn basin(ctx: &Context, size: [usize; 2], scalars: &[Scalar]) -> Shallow {
     let heights = Heights::between(0.0, 0.1).unwrap();
     let solids =
         Solids::new(grid, heights, (0..grid.cells()).map(|_| vec![[BOTTOMLESS, heights.round(0.01)]]));
-    let params = Params { pace: Pace::Realtime(0.003), ..Params::default() };
+    let params = Params { pace: TimeStepping::Realtime(0.003), ..Params::default() };
     let mut liquid = Shallow::new(ctx, &solids, params).unwrap();
     liquid.set_scalars(scalars).unwrap();
     liquid

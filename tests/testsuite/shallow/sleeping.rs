@@ -1,7 +1,7 @@
 //! Pools come to rest and sleep, and nothing depends on whether they do.
 
 use frazil::geometry::DVec3;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::terrain::shapes::Shape;
 use frazil::shallow::{Params, Shallow};
 use frazil::{Context, Pool};
@@ -139,7 +139,7 @@ fn sluggish(seed: u64) -> Plan {
     plan.params.kept = [0.0, 0.01][dice.below(2)];
     plan.params.rest = [1e-4, 1e-3, 0.01][dice.below(3)];
     if dice.one_in(3) {
-        plan.params.pace = Pace::Exact;
+        plan.params.pace = TimeStepping::Exact;
         plan.params.liquid.viscosity = plan.params.liquid.viscosity.min(1e-3);
     }
     plan

@@ -1,7 +1,7 @@
 //! Saved states: what is restored flows on to the same bytes, and what is damaged changes nothing.
 
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::pipes::Border;
 use frazil::shallow::sources::{FlowPoint, Kind, Pulse};
 use frazil::shallow::terrain::Solids;
@@ -50,7 +50,7 @@ fn points() -> Vec<FlowPoint> {
     ]
 }
 
-fn params(border: Border, pace: Pace) -> Params {
+fn params(border: Border, pace: TimeStepping) -> Params {
     Params { border, pace, ..Params::default() }
 }
 
@@ -97,11 +97,11 @@ fn difference(one: &[u8], other: &[u8]) -> Option<usize> {
     differs.or((one.len() != other.len()).then_some(one.len().min(other.len())))
 }
 
-const ALL: [(Border, Pace); 4] = [
-    (Border::Closed, Pace::Realtime(0.003)),
-    (Border::Closed, Pace::Exact),
-    (Border::Open, Pace::Exact),
-    (Border::Absorbing, Pace::Realtime(0.002)),
+const ALL: [(Border, TimeStepping); 4] = [
+    (Border::Closed, TimeStepping::Realtime(0.003)),
+    (Border::Closed, TimeStepping::Exact),
+    (Border::Open, TimeStepping::Exact),
+    (Border::Absorbing, TimeStepping::Realtime(0.002)),
 ];
 
 #[test]
@@ -140,7 +140,7 @@ fn a_restored_liquid_flows_on_to_the_same_bytes() {
 #[test]
 fn pouring_between_frames_is_part_of_the_state() {
     let ctx = context(0);
-    let params = params(Border::Closed, Pace::Exact);
+    let params = params(Border::Closed, TimeStepping::Exact);
     let mut straight = scene(&ctx, 7, params.clone());
     let mut dice = Dice(3);
     let mut resumed = other(&ctx, 7, params);
@@ -165,7 +165,7 @@ fn any_number_of_threads_saves_the_same_bytes_and_goes_on_from_them() {
     let heights = Heights::between(-0.02, 0.08).unwrap();
     let ground = |cell: usize| heights.round(1e-5 * (cell % 340) as f64 + 2e-5 * (cell / 340) as f64);
     let solids = Solids::new(grid, heights, (0..grid.cells()).map(|cell| vec![[BOTTOMLESS, ground(cell)]]));
-    let params = params(Border::Open, Pace::Realtime(0.003));
+    let params = params(Border::Open, TimeStepping::Realtime(0.003));
     let contexts = [context(0), context(2)];
     let mut liquids = [0, 1].map(|which| Shallow::new(&contexts[which], &solids, params.clone()).unwrap());
     for liquid in &mut liquids {
@@ -190,7 +190,7 @@ fn any_number_of_threads_saves_the_same_bytes_and_goes_on_from_them() {
 #[test]
 fn a_state_goes_into_a_vector_or_a_slice_that_is_there() {
     let ctx = context(0);
-    let mut shallow = scene(&ctx, 1, params(Border::Open, Pace::Exact));
+    let mut shallow = scene(&ctx, 1, params(Border::Open, TimeStepping::Exact));
     shallow.step(&ctx, FRAME).unwrap();
     let saved = shallow.save();
     assert_eq!(shallow.save_size(), saved.len());
@@ -247,7 +247,7 @@ fn seal(bytes: &mut [u8]) {
 #[test]
 fn a_state_of_something_else_is_refused_with_a_sentence() {
     let ctx = context(0);
-    let closed = params(Border::Closed, Pace::Exact);
+    let closed = params(Border::Closed, TimeStepping::Exact);
     let mut shallow = scene(&ctx, 1, closed.clone());
     shallow.step(&ctx, FRAME).unwrap();
     let saved = shallow.save();
@@ -256,7 +256,7 @@ fn a_state_of_something_else_is_refused_with_a_sentence() {
     elsewhere.step(&ctx, FRAME).unwrap();
     assert_eq!(refusal(&mut elsewhere, &saved), "the saved state belongs to another terrain");
 
-    let mut open = scene(&ctx, 1, params(Border::Open, Pace::Exact));
+    let mut open = scene(&ctx, 1, params(Border::Open, TimeStepping::Exact));
     assert_eq!(refusal(&mut open, &saved), "the saved state belongs to a liquid with another border");
 
     let mut fewer = scene(&ctx, 1, closed.clone());
@@ -308,7 +308,7 @@ fn damaged(saved: &[u8], dice: &mut Dice) -> Vec<u8> {
 #[test]
 fn damaged_states_are_refused_and_change_nothing() {
     let ctx = context(0);
-    let mut shallow = scene(&ctx, 1, params(Border::Open, Pace::Exact));
+    let mut shallow = scene(&ctx, 1, params(Border::Open, TimeStepping::Exact));
     run(&mut shallow, &ctx, 10);
     let saved = shallow.save();
     run(&mut shallow, &ctx, 3);
@@ -330,7 +330,7 @@ fn damaged_states_are_refused_and_change_nothing() {
 #[test]
 fn states_with_wrong_numbers_and_the_right_hash_are_refused_or_flow() {
     let ctx = context(0);
-    let mut shallow = scene(&ctx, 1, params(Border::Open, Pace::Realtime(0.003)));
+    let mut shallow = scene(&ctx, 1, params(Border::Open, TimeStepping::Realtime(0.003)));
     run(&mut shallow, &ctx, 10);
     let saved = shallow.save();
     let before = shallow.save();

@@ -3,7 +3,7 @@
 use frazil::Context;
 use frazil::Pool;
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::Pace;
+use frazil::shallow::params::TimeStepping;
 use frazil::shallow::{Law, Params, Scalar, Shallow, Thickening};
 
 use crate::common::bodies::Dice;
@@ -19,7 +19,7 @@ fn film(ctx: &Context, thickening: Option<Thickening>, dye: f64) -> Shallow {
         liquid: Liquid::new(NU),
         thickening,
         kept: 1.0,
-        pace: Pace::Realtime(1e-3),
+        pace: TimeStepping::Realtime(1e-3),
         ..Params::default()
     };
     let solids = ground([48, 6], 0.001, [-0.05, 0.1], |[x, _]| -SLOPE * x);

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use frazil::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use frazil::shallow::material::Liquid;
-use frazil::shallow::params::{Friction, Pace, Section};
+use frazil::shallow::params::{Friction, Section, TimeStepping};
 use frazil::shallow::terrain::Solids;
 use frazil::shallow::{Params, Shallow};
 use frazil::{Context, Pool};
@@ -21,7 +21,7 @@ const FRAME: f64 = 1.0 / 60.0;
 /// A liquid with friction at walls that loses nothing else.
 fn walled(viscosity: f64) -> Params {
     let (liquid, friction) = (Liquid::new(viscosity), Friction::Walls);
-    Params { liquid, friction, kept: 1.0, pace: Pace::Exact, ..Params::default() }
+    Params { liquid, friction, kept: 1.0, pace: TimeStepping::Exact, ..Params::default() }
 }
 
 /// A scene by chance, with friction at walls.
@@ -166,7 +166,7 @@ fn depths_stay_within_their_columns_whatever_is_asked() {
 fn basins(ctx: &Context, viscosity: f64) -> Shallow {
     let rolling = |[x, z]: [f64; 2]| 0.001 * (libm::sin(900.0 * x) * libm::cos(700.0 * z)) - 0.02 * x;
     let solids = ground([352, 300], CELL, [-0.02, 0.1], rolling);
-    let params = Params { pace: Pace::Realtime(0.003), ..walled(viscosity) };
+    let params = Params { pace: TimeStepping::Realtime(0.003), ..walled(viscosity) };
     covered(ctx, &solids, params, |[x, z], _| 0.002 + 0.001 * libm::sin(300.0 * x + 200.0 * z))
 }
 
@@ -208,7 +208,7 @@ fn a_lake_of_honey_stays_at_rest_and_a_disturbed_one_only_calms_down() {
     let ctx = context();
     let islands = |[x, z]: [f64; 2]| 0.004 * libm::sin(900.0 * x) * libm::cos(700.0 * z);
     let solids = ground([45, 37], CELL, [-0.01, 0.02], islands);
-    let params = Params { pace: Pace::Realtime(0.003), ..walled(0.4) };
+    let params = Params { pace: TimeStepping::Realtime(0.003), ..walled(0.4) };
     let mut liquid = covered(&ctx, &solids, params, |_, _| 0.0);
     liquid.fill(0.002);
     let before = liquid.depths().to_vec();
@@ -228,7 +228,7 @@ fn a_lake_of_honey_stays_at_rest_and_a_disturbed_one_only_calms_down() {
         columns.indices().map(of).sum()
     };
     for viscosity in [0.4, 1e-3] {
-        let params = Params { pace: Pace::Realtime(0.003), ..walled(viscosity) };
+        let params = Params { pace: TimeStepping::Realtime(0.003), ..walled(viscosity) };
         let mut liquid = covered(&ctx, &solids, params, |_, _| 0.0);
         liquid.fill(0.002);
         let rest = energy(&liquid);

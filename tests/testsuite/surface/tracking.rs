@@ -95,7 +95,7 @@ fn detail_fades_with_time_and_strain_but_where_it_is_painted_to_last() {
     let begin = |params: Params| {
         let mut tracker = Tracker::new(&ctx, params, &ball.mesh, &still).unwrap();
         let painted = ball.mesh.positions.iter().map(|position| if position.x > 0.0 { 1.0 } else { 0.0 });
-        tracker.set_lasting(painted.collect()).unwrap();
+        tracker.set_detail_retention(painted.collect()).unwrap();
         tracker
     };
     let shares = |before: &[f32], tracker: &Tracker| -> [f32; 2] {
@@ -119,7 +119,10 @@ fn detail_fades_with_time_and_strain_but_where_it_is_painted_to_last() {
     tracker.step(&ctx, &still, &swollen, 0.125).unwrap();
     let [faded, kept] = shares(&before, &tracker);
     assert!((faded - 1.0 / 1.44).abs() < 0.02 && kept == 1.0, "{faded} {kept}");
-    assert!(tracker.set_lasting(vec![0.5]).is_err() && tracker.set_lasting(vec![2.0; before.len()]).is_err());
+    assert!(
+        tracker.set_detail_retention(vec![0.5]).is_err()
+            && tracker.set_detail_retention(vec![2.0; before.len()]).is_err()
+    );
 }
 
 #[test]

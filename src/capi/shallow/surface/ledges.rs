@@ -7,7 +7,7 @@ use crate::capi::ffi::handle::change;
 use crate::capi::ffi::views::fill;
 use crate::capi::runtime::context::{enter_light, frz_context};
 use crate::capi::shallow::ground::Terrain;
-use crate::capi::shallow::spill::{Spill, frz_shallow};
+use crate::capi::shallow::spill::{ShallowHandle, frz_shallow};
 use crate::shallow::surface::Counts;
 
 /// Finds the ledges, where the ground ends over nothing, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED.
@@ -33,7 +33,7 @@ pub unsafe extern "C" fn frz_shallow_find_ledges(
             }
             let _call = enter_light(context)?;
             let mut spill = change(shallow)?;
-            let Spill { shallow, terrain, ledged: Ledged { ledges, silhouette, is_current }, .. } =
+            let ShallowHandle { shallow, terrain, ledged: Ledged { ledges, silhouette, is_current }, .. } =
                 &mut *spill;
             let columns = shallow.columns();
             *is_current = false;

@@ -7,7 +7,7 @@ use crate::capi::ffi::views::{Sized32, fill, sized};
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{enter_light, frz_context};
 use crate::capi::shallow::ground::{Terrain, cells_in};
-use crate::capi::shallow::spill::{Spill, frz_shallow};
+use crate::capi::shallow::spill::{ShallowHandle, frz_shallow};
 use crate::shallow::surface::heights::minimum_heights::{Distance, Fitted};
 
 /// Distances between a thin film and the ground's mesh, in edges of a cell, each finite and 0 or more.
@@ -105,7 +105,7 @@ pub unsafe extern "C" fn frz_shallow_find_lifts(
             let frz_shallow_distance { least, margin, rim, .. } = distance;
             let _call = enter_light(context)?;
             let mut spill = change(shallow)?;
-            let Spill { shallow, terrain, lifted: Lifted { lifts, is_current }, .. } = &mut *spill;
+            let ShallowHandle { shallow, terrain, lifted: Lifted { lifts, is_current }, .. } = &mut *spill;
             let cells = cells_in(&shallow.columns().grid, bounds)?;
             let Terrain::Mesh(mesh) = terrain else {
                 return Err(Failure::argument(

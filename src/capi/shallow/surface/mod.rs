@@ -6,7 +6,7 @@ pub(in crate::capi) mod prepared;
 
 use std::cell::RefCell;
 
-use super::spill::{Spill, frz_shallow};
+use super::spill::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{change, read};
 use crate::capi::ffi::views::{Sized32, fill, frz_span, sized};
@@ -433,7 +433,8 @@ pub unsafe extern "C" fn frz_shallow_surface(
             let wanted = Wanted::new(layout, target, size)?;
             let _call = enter_light(context)?;
             let mut spill = change(shallow)?;
-            let Spill { shallow, surface, velocities, concentrations, lifted, ledged, .. } = &mut *spill;
+            let ShallowHandle { shallow, surface, velocities, concentrations, lifted, ledged, .. } =
+                &mut *spill;
             let (least, sunk) = if wanted.is_lifted { lifted.current()? } else { Default::default() };
             let ledges = ledged.wanted(wanted.is_skirted, "since the ground or a body moved")?;
             for (scalar, numbers) in concentrations.iter_mut().enumerate() {

@@ -21,7 +21,7 @@ use frazil::geometry::points::{Attribute, Values};
 use frazil::geometry::{DVec3, MeshArray, TriMesh};
 use frazil::io::files::sequence::Pattern;
 use frazil::io::mesh::extension;
-use frazil::io::particles::{self, Cloud};
+use frazil::io::particles::{self, ParticleData};
 use frazil::scene::{FrameChoice, Frames};
 use frazil::surface::{TOO_FAR, estimate_spacing, rough_spacing, specks, transfer};
 use frazil::vdb::file;
@@ -249,8 +249,8 @@ impl Args {
     }
 
     /// The particles of a file (m) that lie in the box; a warning if there are none.
-    fn read(&self, path: &Path) -> Result<Cloud> {
-        let mut cloud: Cloud =
+    fn read(&self, path: &Path) -> Result<ParticleData> {
+        let mut cloud: ParticleData =
             if extension(path) == "vdb" { points_of_vdb(path)?.into() } else { particles::read(path)? };
         if cloud.positions.is_empty() {
             log::warn!("{}: holds no particles: its surface is empty", path.display());
@@ -269,7 +269,7 @@ impl Args {
     }
 
     /// Leaves small groups of particles out; returns the number of these particles.
-    fn leave_out(&self, cloud: &mut Cloud, spacing: f64, path: &Path) -> Result<usize> {
+    fn leave_out(&self, cloud: &mut ParticleData, spacing: f64, path: &Path) -> Result<usize> {
         let Some(least) = self.min_drop else { return Ok(0) };
         let specks = specks(&cloud.positions, spacing, least as usize)?;
         let count = specks.iter().filter(|is| **is).count();
@@ -284,7 +284,7 @@ impl Args {
     }
 
     /// The attributes for the mesh, with the names of its arrays.
-    fn columns(&self, cloud: &Cloud, path: &Path) -> Result<Vec<(String, Vec<f32>)>> {
+    fn columns(&self, cloud: &ParticleData, path: &Path) -> Result<Vec<(String, Vec<f32>)>> {
         let count = cloud.positions.len();
         let wanted = |attribute: &&Attribute| {
             matches!(attribute.values, Values::Float(_) | Values::Vector(_))

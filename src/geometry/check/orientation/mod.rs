@@ -141,12 +141,12 @@ impl Orientation {
 
     /// What remains ambiguous, in a sentence without the mesh's name; `None` if nothing does.
     pub fn warning(&self) -> Option<String> {
-        self.doubts.told()
+        self.doubts.described()
     }
 }
 
 impl Doubts {
-    fn told(&self) -> Option<String> {
+    fn described(&self) -> Option<String> {
         let counted = |count: usize, one: &str, several: &str| {
             (count > 0).then(|| if count == 1 { format!("1 {one}") } else { format!("{count} {several}") })
         };

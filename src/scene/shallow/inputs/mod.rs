@@ -18,7 +18,7 @@ use crate::error::{Error, Result};
 use crate::geometry::check::orientation::Orientation;
 use crate::geometry::{DVec3, TriMesh, mesh};
 use crate::io::files::source;
-use crate::io::records::input_hashes::Seen;
+use crate::io::records::input_hashes::InputHashes;
 use crate::motion::Space;
 use crate::scene::Scene;
 use crate::shallow::columns::grid::{Grid, Heights, MOST_CELLS};
@@ -62,7 +62,7 @@ pub struct Inputs {
     /// Whether all of them are flipped after that, as they face down.
     pub(super) is_turned: bool,
     /// Contents of the files when they were read.
-    pub(in crate::scene) seen: Arc<Seen>,
+    pub(in crate::scene) seen: Arc<InputHashes>,
     /// Warnings about the files, one sentence each; they are logged too.
     pub warnings: Vec<String>,
 }
@@ -82,12 +82,12 @@ impl Inputs {
         if shallow.sequence().is_some() {
             frames.iter().try_for_each(|frame| source::open(&shallow.terrain_at(frame)).map(drop))?;
         }
-        let seen = Arc::new(Seen::default());
+        let seen = Arc::new(InputHashes::default());
         let path = shallow.terrain_at(frames.first);
         let mut terrain = Terrain::read(shallow, frames.first, &seen)?;
         let bounds = terrain.bounds();
-        let grid = grid(shallow, &bounds).map_err(|error| told(&scene.path, error))?;
-        let heights = heights(shallow, &bounds).map_err(|error| told(&scene.path, error))?;
+        let grid = grid(shallow, &bounds).map_err(|error| with_path(&scene.path, error))?;
+        let heights = heights(shallow, &bounds).map_err(|error| with_path(&scene.path, error))?;
         let mut warnings: Vec<String> = wide(shallow, &path, &bounds).into_iter().collect();
         if let Terrain::Mesh(mesh) = &terrain {
             warnings.extend(too_far(&path, mesh, grid.cell));
@@ -97,7 +97,7 @@ impl Inputs {
             .inspect_err(|_| warnings.iter().for_each(|warning| log::warn!("{warning}")))?;
         let orientation = terrain.turn_outward();
         warnings.extend(orientation.warning().map(|what| format!("{}: {what}", path.display())));
-        let mut solids = terrain.solids(ctx, grid, heights).map_err(|error| told(&path, error))?;
+        let mut solids = terrain.solids(ctx, grid, heights).map_err(|error| with_path(&path, error))?;
         let mut is_turned = false;
         if solids.layers() == 0
             && let Terrain::Mesh(mesh) = terrain
@@ -124,7 +124,7 @@ impl Inputs {
             *mesh = orientation.applied_to(std::mem::take(mesh));
             warnings.extend(orientation.warning().map(|what| format!("{}: {what}", own.display())));
             let on_it = triangles::solids(&mesh.positions, &mesh.triangles, grid, heights);
-            let on_it = on_it.map_err(|error| told(own, error))?;
+            let on_it = on_it.map_err(|error| with_path(own, error))?;
             warnings.extend(too_far(own, mesh, grid.cell));
             if orientation.has_open() && orientation.warning().is_none() {
                 let what = "is not closed: below a surface of it that faces up all is solid";
@@ -259,7 +259,7 @@ fn heights(shallow: &Shallow, bounds: &[DVec3; 2]) -> Result<Heights> {
 
 /// The warning about points that follow a position to the side of their own, as for points given high above a slope.
 fn beside(scene: &Scene, shallow: &Shallow, mesh: &TriMesh, attached: &[Option<Attached>]) -> Vec<String> {
-    let told = |(point, attached): (&Point, &Option<Attached>)| {
+    let warning = |(point, attached): (&Point, &Option<Attached>)| {
         let [x, y, z] = attached.as_ref()?.position(mesh);
         let [own_x, _, own_z] = point.point.at;
         let off = ((x - own_x).powi(2) + (z - own_z).powi(2)).sqrt();
@@ -271,7 +271,7 @@ fn beside(scene: &Scene, shallow: &Shallow, mesh: &TriMesh, attached: &[Option<A
             )
         })
     };
-    shallow.points.iter().zip(attached).filter_map(told).collect()
+    shallow.points.iter().zip(attached).filter_map(warning).collect()
 }
 
 /// The warning about a terrain that is probably in another unit.
@@ -289,7 +289,7 @@ fn wide(shallow: &Shallow, path: &Path, [low, high]: &[DVec3; 2]) -> Option<Stri
     })
 }
 
-fn told(path: &Path, error: Error) -> Error {
+fn with_path(path: &Path, error: Error) -> Error {
     match error {
         Error::Argument(what) => Error::file(path, what),
         other => other,

@@ -4,7 +4,7 @@ use nalgebra::Rotation3;
 
 use crate::error::Result;
 use crate::geometry::{DVec3, TriMesh, Vec3};
-use crate::io::records::input_hashes::Seen;
+use crate::io::records::input_hashes::InputHashes;
 use crate::motion::{Key, Keys};
 use crate::scene::KeyPose;
 use crate::scene::shallow::{Form, Obstacle, Shallow};
@@ -45,7 +45,7 @@ impl Obstacle {
     ///
     /// # Errors
     /// A file that cannot be read.
-    fn mesh(&self, first: i32, seen: &Seen) -> Result<Option<TriMesh>> {
+    fn mesh(&self, first: i32, seen: &InputHashes) -> Result<Option<TriMesh>> {
         let Form::Mesh(path, space) = &self.form else { return Ok(None) };
         let mut mesh = read_mesh(path, *space, seen)?;
         let (turn, at) = self.pose(first)?;
@@ -69,7 +69,11 @@ pub(in crate::scene::shallow) fn shapes_at(shallow: &Shallow, frame: i32) -> Res
 ///
 /// # Errors
 /// A file that cannot be read.
-pub(in crate::scene::shallow) fn meshes(shallow: &Shallow, first: i32, seen: &Seen) -> Result<Vec<TriMesh>> {
+pub(in crate::scene::shallow) fn meshes(
+    shallow: &Shallow,
+    first: i32,
+    seen: &InputHashes,
+) -> Result<Vec<TriMesh>> {
     let meshes = shallow.obstacles.iter().map(|obstacle| obstacle.mesh(first, seen));
     Ok(meshes.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
 }

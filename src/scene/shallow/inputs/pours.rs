@@ -18,11 +18,11 @@ pub(in crate::scene::shallow) fn pour(
     let first = scene.shot.frames.first;
     for (index, pour) in of.pours.iter().enumerate().filter(|(_, pour)| pour.frame.unwrap_or(first) == frame)
     {
-        let told = |what: String| Error::file(&scene.path, format!("pour.{}: {what}", index + 1));
+        let refused = |what: String| Error::file(&scene.path, format!("pour.{}: {what}", index + 1));
         let columns = pour.columns(liquid.columns());
         if columns.is_empty() {
             let [x, y, z] = pour.at;
-            return Err(told(format!(
+            return Err(refused(format!(
                 "at ({x}, {y}, {z}) there is only solid, or it lies outside of the area"
             )));
         }
@@ -36,7 +36,7 @@ pub(in crate::scene::shallow) fn pour(
                 pour.volume / ML,
                 lacking / ML
             );
-            return Err(told(what));
+            return Err(refused(what));
         }
     }
     Ok(())

@@ -214,7 +214,7 @@ impl Shallow {
 }
 
 /// Where each scalar is, by name: concentration x volume (its own unit x ml).
-pub(in crate::scene::shallow) fn told(
+pub(in crate::scene::shallow) fn balances(
     liquid: &shallow::Shallow,
 ) -> Result<serde_json::Map<String, serde_json::Value>> {
     let scalars = liquid.scalars().iter().enumerate();
@@ -225,7 +225,7 @@ pub(in crate::scene::shallow) fn told(
                 inside, poured, sourced, drained, absorbed, lost, gained, held, falling, ..
             } = balance;
             let ml = |amount: f64| amount / ML;
-            let told = serde_json::json!({
+            let balance = serde_json::json!({
                 "inside_ml": ml(inside),
                 "poured_ml": ml(poured),
                 "sourced_ml": ml(sourced),
@@ -239,7 +239,7 @@ pub(in crate::scene::shallow) fn told(
                 "dried_ml": ml(balance.dried),
                 "missing": balance.error as f64,
             });
-            Ok((scalar.name.clone(), told))
+            Ok((scalar.name.clone(), balance))
         })
         .collect()
 }

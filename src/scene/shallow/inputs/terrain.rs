@@ -12,7 +12,7 @@ use crate::io::files::hash;
 #[cfg(feature = "cli")]
 use crate::io::image;
 use crate::io::mesh::{extension, parse_polygons_from};
-use crate::io::records::input_hashes::Seen;
+use crate::io::records::input_hashes::InputHashes;
 use crate::motion::Space;
 use crate::scene::shallow::{ImagePlace, Shallow};
 use crate::shallow::columns::grid::{Grid, Heights};
@@ -42,7 +42,7 @@ impl Terrain {
     ///
     /// # Errors
     /// A file that cannot be read, has changed since it was read, or needs a feature that this build lacks.
-    pub fn read(shallow: &Shallow, frame: i32, seen: &Seen) -> Result<Self> {
+    pub fn read(shallow: &Shallow, frame: i32, seen: &InputHashes) -> Result<Self> {
         let path = shallow.terrain_at(frame);
         match (&*extension(&path), shallow.image) {
             ("vdb", _) => of_vdb(&path, seen),
@@ -149,7 +149,7 @@ impl Terrain {
 ///
 /// # Errors
 /// A file that cannot be read, or that has changed since it was read.
-pub(in crate::scene::shallow) fn read_mesh(path: &Path, space: Space, seen: &Seen) -> Result<TriMesh> {
+pub(in crate::scene::shallow) fn read_mesh(path: &Path, space: Space, seen: &InputHashes) -> Result<TriMesh> {
     let mut mesh = parse_polygons_from(path, &seen.read(path)?, space.origin)?.into_triangles();
     let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
     let weld = Weld::of(&positions, &mesh.triangles);
@@ -164,12 +164,12 @@ pub(in crate::scene::shallow) fn read_mesh(path: &Path, space: Space, seen: &See
 }
 
 #[cfg(feature = "cli")]
-fn of_image(path: &Path, position: ImagePlace, seen: &Seen) -> Result<Terrain> {
+fn of_image(path: &Path, position: ImagePlace, seen: &InputHashes) -> Result<Terrain> {
     Ok(Terrain::Image(image::parse(path, &seen.read(path)?)?, position))
 }
 
 #[cfg(not(feature = "cli"))]
-fn of_image(path: &Path, _position: ImagePlace, _seen: &Seen) -> Result<Terrain> {
+fn of_image(path: &Path, _position: ImagePlace, _seen: &InputHashes) -> Result<Terrain> {
     Err(Error::file(path, "needs the feature cli, which this frazil was built without"))
 }
 
@@ -202,7 +202,7 @@ fn relief(image: &image::Grey, position: ImagePlace) -> TriMesh {
 }
 
 #[cfg(feature = "vdb")]
-fn of_vdb(path: &Path, seen: &Seen) -> Result<Terrain> {
+fn of_vdb(path: &Path, seen: &InputHashes) -> Result<Terrain> {
     // OpenVDB reads the file itself: its content must be the same before and after.
     seen.hash(path)?;
     let grid = file::read_named(path, None)?;
@@ -218,6 +218,6 @@ fn of_vdb(path: &Path, seen: &Seen) -> Result<Terrain> {
 }
 
 #[cfg(not(feature = "vdb"))]
-fn of_vdb(path: &Path, _seen: &Seen) -> Result<Terrain> {
+fn of_vdb(path: &Path, _seen: &InputHashes) -> Result<Terrain> {
     Err(Error::file(path, "needs OpenVDB, which this frazil was built without"))
 }

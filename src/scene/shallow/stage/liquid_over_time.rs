@@ -18,7 +18,7 @@ use crate::shallow::{self, Report, Stains};
 type Of<'a> = (&'a Scene, &'a Shallow, &'a Inputs);
 
 /// A scene's liquid, at a frame.
-pub(in crate::scene::shallow) struct Course<'a> {
+pub(in crate::scene::shallow) struct LiquidState<'a> {
     scene: &'a Scene,
     of: &'a Shallow,
     inputs: &'a Inputs,
@@ -36,7 +36,7 @@ pub(in crate::scene::shallow) struct Course<'a> {
     pub is_stirred: bool,
 }
 
-impl<'a> Course<'a> {
+impl<'a> LiquidState<'a> {
     /// The liquid at the first frame.
     ///
     /// # Errors

@@ -27,7 +27,7 @@ use crate::scene::run::{
 use crate::shallow;
 use crate::shallow::remap::Moved;
 use liquid_mesh::{Drawn, Mesher};
-use liquid_over_time::Course;
+use liquid_over_time::LiquidState;
 
 /// Name of the stage, and of the kind of its files.
 const NAME: &str = "liquid";
@@ -47,7 +47,7 @@ pub struct Liquid<'a> {
 
 /// The liquid at a frame.
 pub struct State<'a> {
-    course: Course<'a>,
+    course: LiquidState<'a>,
     mesher: Mesher,
 }
 
@@ -70,7 +70,12 @@ impl<'a> Liquid<'a> {
     }
 
     /// Advances the liquid to a frame, which may be the current one, and warns of points that can no longer act.
-    fn go(&self, ctx: &Context, course: &mut Course<'a>, frame: i32) -> Result<(shallow::Report, Moved)> {
+    fn go(
+        &self,
+        ctx: &Context,
+        course: &mut LiquidState<'a>,
+        frame: i32,
+    ) -> Result<(shallow::Report, Moved)> {
         if frame <= course.frame {
             return Ok(Default::default());
         }
@@ -226,11 +231,11 @@ impl<'a> Stepping for Liquid<'a> {
     fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State<'a>> {
         let of = (self.scene, self.of, self.inputs);
         let course = match after {
-            None => Course::begin(ctx, of)?,
+            None => LiquidState::begin(ctx, of)?,
             Some(frame) => {
                 let path = done.state_file(frame)?;
                 let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
-                Course::resume(ctx, of, frame, &bytes).map_err(|error| match error {
+                LiquidState::resume(ctx, of, frame, &bytes).map_err(|error| match error {
                     Error::Bytes(what) => Error::file(path, what),
                     other => other,
                 })?
@@ -246,7 +251,7 @@ impl<'a> Stepping for Liquid<'a> {
                 to.made_from.map(|made_from| self.written(ctx, state, to, made_from)).transpose()?;
             Ok((Step(written), did))
         })?;
-        let report = told(&state.course, did, step.0.as_ref(), phases)?;
+        let report = report_of(&state.course, did, step.0.as_ref(), phases)?;
         Ok(Stepped { step, report })
     }
 
@@ -296,8 +301,8 @@ impl<'a> Stepping for Liquid<'a> {
 }
 
 /// The report of a frame.
-fn told(
-    course: &Course<'_>,
+fn report_of(
+    course: &LiquidState<'_>,
     (report, moved): (shallow::Report, Moved),
     written: Option<&Written>,
     phases: Vec<PhaseTime>,
@@ -319,7 +324,7 @@ fn told(
         "falling_ml": ml(balance.falling),
         "missing_units": balance.error,
         "drops": liquid.drops().len(),
-        "scalars": scalars::told(liquid)?,
+        "scalars": scalars::balances(liquid)?,
         "wet_columns": wet,
         "deepest_m": liquid.columns().heights.length(deepest.into()),
         "displaced_ml": ml(moved.displaced),

@@ -16,7 +16,7 @@ const NOUN: &str = "liquid";
 
 /// A saved liquid.
 #[derive(Debug, PartialEq)]
-pub(in crate::scene::shallow) struct Kept {
+pub(in crate::scene::shallow) struct SavedLiquid {
     /// The obstacles that stood in it.
     pub shapes: Vec<Shape>,
     /// Its sources, drains and absorbers.
@@ -71,7 +71,7 @@ pub(in crate::scene::shallow) fn save(
 ///
 /// # Errors
 /// Bytes that are not such a state.
-pub(in crate::scene::shallow) fn read(bytes: &[u8]) -> Result<Kept> {
+pub(in crate::scene::shallow) fn read(bytes: &[u8]) -> Result<SavedLiquid> {
     let bytes = packed::unpack(bytes, MAGIC, NOUN)?;
     let mut from = Reader::new(&bytes);
     let count = from.count(4)?;
@@ -86,7 +86,7 @@ pub(in crate::scene::shallow) fn read(bytes: &[u8]) -> Result<Kept> {
         stains = from.bytes(length)?.to_vec();
     }
     from.end()?;
-    Ok(Kept { shapes, points, liquid, stains })
+    Ok(SavedLiquid { shapes, points, liquid, stains })
 }
 
 fn numbers_of(shape: &Shape) -> (u32, Vec<f64>) {

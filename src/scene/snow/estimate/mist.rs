@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::scene::Scene;
 use crate::scene::run::Stored;
-use crate::scene::snow::inspect::object_path::Course;
+use crate::scene::snow::inspect::object_path::ObjectPath;
 use crate::scene::snow::keys::mist::mist_params;
 use crate::snow::mist::{self, LEAST, Params};
 use crate::vdb::file;
@@ -64,7 +64,7 @@ impl MistForecast {
     pub(in crate::scene::snow) fn of(
         ctx: &Context,
         scene: &Scene,
-        courses: &[Course],
+        courses: &[ObjectPath],
         stored: Option<&Stored>,
     ) -> Result<Option<Self>> {
         let Some(params) = mist_params(&scene.values) else { return Ok(None) };
@@ -149,7 +149,7 @@ fn made(stored: &Stored, cell: f64, last: i32) -> Result<Option<(i32, f64)>> {
 
 /// The cells at each frame, if mist fills the boxes of all objects that push grains near the snow, from then until it has dissipated, and
 /// drifts with a uniform wind.
-fn in_boxes(ctx: &Context, scene: &Scene, courses: &[Course], params: &Params) -> Result<Vec<f64>> {
+fn in_boxes(ctx: &Context, scene: &Scene, courses: &[ObjectPath], params: &Params) -> Result<Vec<f64>> {
     let (frames, fps) = (scene.shot.frames, scene.shot.fps);
     let count = frames.count();
     let each = count.div_ceil(MOMENTS).max(1);
@@ -163,7 +163,7 @@ fn in_boxes(ctx: &Context, scene: &Scene, courses: &[Course], params: &Params) -
         let margin = DVec3::repeat(tile);
         ((frame - frames.first) as usize / each, [low - margin - drift, high + margin - drift])
     };
-    let of_course = |course: &Course| joined(course.passing().map(of_air));
+    let of_course = |course: &ObjectPath| joined(course.passing().map(of_air));
     let mut boxes: Vec<(usize, [DVec3; 2])> = courses.iter().flat_map(of_course).collect();
     boxes.sort_by_key(|(at, _)| *at);
     let tiles = |[low, high]: &[DVec3; 2]| (high - low).iter().map(|side| side / tile).product::<f64>();

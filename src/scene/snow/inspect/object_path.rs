@@ -26,7 +26,7 @@ const TALL: f64 = 20.0;
 const SMALL: f64 = 0.02;
 
 /// The path of a moving object.
-pub struct Course<'a> {
+pub struct ObjectPath<'a> {
     scene: &'a Scene,
     inputs: &'a Inputs,
     /// Its name in messages.
@@ -49,7 +49,7 @@ struct Extent {
     moved: f64,
 }
 
-impl<'a> Course<'a> {
+impl<'a> ObjectPath<'a> {
     /// The paths of all moving objects, each posed at every frame.
     ///
     /// # Errors

@@ -115,7 +115,7 @@ pub fn check_mist(table: &Table, values: &Values) -> Result<()> {
 pub fn mist_params(values: &Values) -> Option<Params> {
     let number = |name: &str| values.number(&format!("mist.{name}"));
     let value = |name: &str| values.get(&format!("mist.{name}"));
-    let usual = Params::for_cell(number("cell")?);
+    let defaults = Params::for_cell(number("cell")?);
     Some(Params {
         from_speed: values.settled("mist", None, "from_speed"),
         falling: values.settled("mist", None, "falling"),
@@ -123,12 +123,12 @@ pub fn mist_params(values: &Values) -> Option<Params> {
         half_life: values.settled("mist", None, "half_life"),
         wind: value("wind").and_then(|value| value.numbers()).unwrap_or_default(),
         turbulence: values.settled("mist", None, "turbulence"),
-        turbulence_size: number("turbulence_size").unwrap_or(usual.turbulence_size),
+        turbulence_size: number("turbulence_size").unwrap_or(defaults.turbulence_size),
         confinement: values.settled("mist", None, "confinement"),
         noise: values.settled("mist", None, "noise"),
-        noise_size: number("noise_size").unwrap_or(usual.noise_size),
+        noise_size: number("noise_size").unwrap_or(defaults.noise_size),
         seed: values.settled::<i64>("mist", None, "seed") as i32,
-        ..usual
+        ..defaults
     })
 }
 

@@ -180,7 +180,7 @@ impl Stepping for Base<'_> {
             }
             _ => None,
         };
-        Ok(Stepped { step: Step { frame, changes, whole }, report: told(report) })
+        Ok(Stepped { step: Step { frame, changes, whole }, report: report_of(report) })
     }
 
     fn writer(&self, ctx: &Context, layer: &BaseLayer) -> Result<Writer> {
@@ -223,7 +223,7 @@ fn vdb_bytes(scene: &Scene, frame: i32, grids: &[&FloatGrid], made_from: &str) -
     to_bytes(grids, &WriteOptions { metadata, half: scene.output.half, ..WriteOptions::default() })
 }
 
-fn told(report: StepReport) -> Report {
+fn report_of(report: StepReport) -> Report {
     let serde_json::Value::Object(results) = json!({
         "removed_m3": report.removed_volume,
         "base_m3": report.base_volume,

@@ -68,7 +68,7 @@ pub(in crate::scene::snow) fn ordered(mut points: Points) -> Points {
 }
 
 /// Points whose attributes are either uniform in every frame or never, as the clips of a USD stage require.
-pub(in crate::scene::snow) fn told_apart(mut points: Points) -> Points {
+pub(in crate::scene::snow) fn for_clips(mut points: Points) -> Points {
     if points.attribute(TRAPPED) == Some(&FREE) {
         points.set(TRAPPED, Values::Bool(Column::Each(vec![false; points.count()])));
     }
@@ -243,7 +243,7 @@ type Run = RangeInclusive<i64>;
 
 /// The record of the previous grains in a frame's file: the identities that are gone, and [`print_of`] all of them, if present. `None` if
 /// the file is complete.
-fn told_of_before(
+fn previous_record(
     frame: i32,
     metadata: &[(String, MetaValue)],
 ) -> Result<Option<(Vec<Run>, Option<String>)>> {
@@ -356,7 +356,7 @@ impl Whole {
                 break points;
             }
             let (points, of_file) = read(stored, at)?;
-            let told = told_of_before(at, &of_file).map_err(|error| wrong(stored, at, error))?;
+            let told = previous_record(at, &of_file).map_err(|error| wrong(stored, at, error))?;
             metadata.get_or_insert(of_file);
             match told {
                 None => break points,

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use serde_json::json;
 
 use super::frames;
-use super::grain_files::{self, WHOLE_EVERY, ordered, told_apart};
+use super::grain_files::{self, WHOLE_EVERY, for_clips, ordered};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::{Points, TriMesh};
@@ -240,7 +240,7 @@ impl Stage for Grains<'_> {
 
     fn clip(&self) -> Option<Clip<'_>> {
         let grains = grains::Grains::new(params(self.scene, self.inputs.snow.cell)).ok()?;
-        Some(Clip { kind: "grains", manifest: MANIFEST, prims: Prims::Points(told_apart(grains.points())) })
+        Some(Clip { kind: "grains", manifest: MANIFEST, prims: Prims::Points(for_clips(grains.points())) })
     }
 
     fn needs_every_frame(&self) -> Option<&'static str> {
@@ -303,7 +303,7 @@ impl Stepping for Grains<'_> {
         let report = match &before {
             // Snow cut out by the first poses was removed before the shot began.
             None => self.begin(ctx, &mut state.grains, &after)?,
-            Some(before) => told(&self.move_grains(ctx, state, [before, &after], frame)?),
+            Some(before) => report_of(&self.move_grains(ctx, state, [before, &after], frame)?),
         };
         state.layer = Some((frame, after));
         let is_wanted = to.made_from.is_some() || self.scene.output.grains_delta;
@@ -328,7 +328,7 @@ impl Stepping for Grains<'_> {
                 files.save("grains", "ply", &ply::to_bytes(&points)?)?;
             }
             if output.grains_usd {
-                let points = told_apart(points.clone());
+                let points = for_clips(points.clone());
                 let text = points::frame("grains", files.frame, self.scene.shot.fps, &points);
                 files.save("grains", "usda", text.as_bytes())?;
             }
@@ -341,7 +341,7 @@ impl Stepping for Grains<'_> {
     }
 }
 
-fn told(report: &StepReport) -> Report {
+fn report_of(report: &StepReport) -> Report {
     let serde_json::Value::Object(results) = json!({
         "grains": report.count,
         "born": report.born,

@@ -79,7 +79,7 @@ impl<'a> Mist<'a> {
     }
 
     /// An error of the mist, with the scene's name.
-    fn told(&self, error: Error) -> Error {
+    fn with_path(&self, error: Error) -> Error {
         match error {
             Error::Argument(what) => Error::file(&self.scene.path, format!("mist: {what}")),
             other => other,
@@ -143,7 +143,7 @@ impl<'a> Mist<'a> {
         let wind = self.inputs.wind.as_ref().map(|_| Wind(&sample));
         let fastest = walls.fastest_near(mist, &sources);
         let around = Around { sources: &sources, boundary: &boundary, fastest, wind: wind.as_ref() };
-        mist.step(ctx, &around, times).map_err(|error| self.told(error))
+        mist.step(ctx, &around, times).map_err(|error| self.with_path(error))
     }
 
     /// Advances the base layer to a frame.
@@ -286,7 +286,7 @@ impl Stepping for Mist<'_> {
     fn load(&self, _ctx: &Context, done: &Stored, after: Option<i32>) -> Result<State> {
         let params = self.params()?;
         let mist = match after {
-            None => mist::Mist::new(params).map_err(|error| self.told(error))?,
+            None => mist::Mist::new(params).map_err(|error| self.with_path(error))?,
             Some(frame) => {
                 let path = done.state_file(frame)?;
                 let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
@@ -311,7 +311,7 @@ impl Stepping for Mist<'_> {
                 to.frame
             );
         }
-        Ok(Stepped { step: Step(to.made_from.map(|_| state.mist.clone())), report: told(&report) })
+        Ok(Stepped { step: Step(to.made_from.map(|_| state.mist.clone())), report: report_of(&report) })
     }
 
     fn writer(&self, ctx: &Context, _state: &State) -> Result<Writer> {
@@ -331,7 +331,7 @@ impl Stepping for Mist<'_> {
     }
 }
 
-fn told(report: &StepReport) -> Report {
+fn report_of(report: &StepReport) -> Report {
     let serde_json::Value::Object(results) = json!({
         "cells": report.cells,
         "mist_m3": report.mass,

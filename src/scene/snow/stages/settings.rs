@@ -1,7 +1,7 @@
 //! The settings of the base layer.
 
 use crate::error::Result;
-use crate::io::records::input_hashes::Seen;
+use crate::io::records::input_hashes::InputHashes;
 use crate::scene::run::Settings;
 use crate::scene::run::settings::settings_of;
 use crate::scene::schema::key::{Key, Scope};
@@ -11,7 +11,7 @@ use crate::scene::{Layer, Role, Scene, run};
 ///
 /// # Errors
 /// An input that cannot be read.
-pub(in crate::scene::snow) fn of_base(scene: &Scene, seen: &Seen) -> Result<Settings> {
+pub(in crate::scene::snow) fn of_base(scene: &Scene, seen: &InputHashes) -> Result<Settings> {
     let mut settings = settings_of(scene, "base", seen, &[Role::Collide, Role::Base, Role::Static])?;
     for (key, path) in scene.snow.iter().flat_map(|snow| snow.files()) {
         settings.insert(key.into(), format!("{}{}", run::CONTENT, seen.hash(path)?));

@@ -18,7 +18,7 @@ use crate::geometry::{DetailedMesh, MeshArray, TriMesh, mesh as base_mesh};
 use crate::io::files::sequence::Pattern;
 use crate::io::files::source;
 use crate::io::mesh::{extension, parse_polygons_from};
-use crate::io::records::input_hashes::Seen;
+use crate::io::records::input_hashes::InputHashes;
 use crate::mesh_repair::{Prepared, Repaired, carry_attributes, repair};
 use crate::scene::Scene;
 use crate::surface::{Implicit, Isosurface, Particles, estimate_spacing, rough_spacing};
@@ -34,7 +34,7 @@ pub struct Inputs {
     /// The mesh at the first frame that has particles (m), with the data that it carries.
     pub mesh: Arc<DetailedMesh>,
     /// Detail retention of each vertex: the share that never fades; empty: none.
-    pub(super) lasting: Vec<f32>,
+    pub(super) detail_retention: Vec<f32>,
     /// Initial distance between particles (m).
     pub spacing: f64,
     /// The first frame of the shot that has particles; those before it have no mesh.
@@ -44,7 +44,7 @@ pub struct Inputs {
     /// Frames at which an edited mesh replaces the tracked one, ascending.
     pub(super) sculpts: Vec<i32>,
     /// Contents of the files when they were read.
-    pub(in crate::scene) seen: Arc<Seen>,
+    pub(in crate::scene) seen: Arc<InputHashes>,
     /// Warnings about the files, one sentence each; they are logged too.
     pub warnings: Vec<String>,
 }
@@ -62,7 +62,7 @@ impl Inputs {
             return Err(Error::file(&surface.particles, what));
         }
         let sculpts = sculpts::frames(surface, shot.frames)?;
-        let seen = Arc::new(Seen::default());
+        let seen = Arc::new(InputHashes::default());
         let (begins, particles) = first_particles(ctx, scene, surface, &seen)?;
         let first = surface.files_at(shot.frames, begins).swap_remove(0);
         if particles.ids.is_empty() && particles.velocities.is_empty() && shot.frames.count() > 1 {
@@ -118,7 +118,7 @@ impl Inputs {
             }
             None => {
                 let mesh = reconstructed(ctx, &particles, spacing, surface.cell)
-                    .map_err(|error| told(&first, error))?;
+                    .map_err(|error| with_path(&first, error))?;
                 DetailedMesh { mesh, ..DetailedMesh::default() }
             }
         };
@@ -126,15 +126,15 @@ impl Inputs {
             warnings.extend(odd_size(&mesh.mesh, particles.positions.len(), spacing));
         }
         let fades = surface.half_life.is_some() || surface.fade != 0.0;
-        let lasting = match &surface.mesh {
-            Some(path) if fades => lasting(&mesh).map_err(|what| Error::file(path, what))?,
+        let detail_retention = match &surface.mesh {
+            Some(path) if fades => detail_retention(&mesh).map_err(|what| Error::file(path, what))?,
             // A mesh that is rebuilt stores it in its states: a later frame may be the first that fades.
-            Some(_) if surface.rebuild => lasting(&mesh).unwrap_or_default(),
+            Some(_) if surface.rebuild => detail_retention(&mesh).unwrap_or_default(),
             _ => Vec::new(),
         };
         mesh.arrays.retain(|array| !REPLACED.contains(&&*array.name));
         let mesh = Arc::new(mesh);
-        let mut inputs = Self { mesh, lasting, spacing, begins, particles, sculpts, seen, warnings };
+        let mut inputs = Self { mesh, detail_retention, spacing, begins, particles, sculpts, seen, warnings };
         let of_sculpts = sculpts::check(ctx, surface, &inputs)?;
         inputs.warnings.extend(of_sculpts);
         inputs.warnings.iter().for_each(|warning| log::warn!("{warning}"));
@@ -150,7 +150,7 @@ pub(super) fn read_mesh(
     ctx: &Context,
     surface: &Surface,
     path: &Path,
-    seen: &Seen,
+    seen: &InputHashes,
     spacing: f64,
 ) -> Result<(DetailedMesh, Option<String>)> {
     let bytes = seen.read(path)?;
@@ -165,12 +165,13 @@ pub(super) fn read_mesh(
         let warning = faults(path, &mesh.mesh).or_else(doubts);
         return Ok((mesh, warning));
     }
-    let (mesh, warning) = closed(ctx, mesh, spacing * surface.cell).map_err(|error| told(path, error))?;
+    let (mesh, warning) =
+        closed(ctx, mesh, spacing * surface.cell).map_err(|error| with_path(path, error))?;
     Ok((mesh, warning.map(|warning| format!("{}: {warning}", path.display())).or_else(doubts)))
 }
 
 /// Detail retention, painted in the array `detail` of the vertices: shares 0..=1, as bytes 0 to 255.
-pub(super) fn lasting(mesh: &DetailedMesh) -> std::result::Result<Vec<f32>, String> {
+pub(super) fn detail_retention(mesh: &DetailedMesh) -> std::result::Result<Vec<f32>, String> {
     let is_it = |array: &&MeshArray| array.name == "detail" && array.on == On::Vertices;
     let Some(array) = mesh.arrays.iter().find(is_it) else { return Ok(Vec::new()) };
     let whole = if array.number == Number::U8 { 255.0 } else { 1.0 };
@@ -205,7 +206,12 @@ fn odd_size(mesh: &TriMesh, particles: usize, spacing: f64) -> Option<String> {
 ///
 /// # Errors
 /// A file up to there that cannot be read; no frame of the shot has any; cancel.
-fn first_particles(ctx: &Context, scene: &Scene, surface: &Surface, seen: &Seen) -> Result<(i32, Particles)> {
+fn first_particles(
+    ctx: &Context,
+    scene: &Scene,
+    surface: &Surface,
+    seen: &InputHashes,
+) -> Result<(i32, Particles)> {
     let frames = scene.shot.frames;
     let mut liquid = Liquid::new(surface, scene.shot, seen);
     for frame in frames.first..=frames.last {
@@ -240,7 +246,7 @@ fn reconstructed(ctx: &Context, particles: &Particles, spacing: f64, cell: f64) 
     Ok(Isosurface::new(&phi).mesh(&phi))
 }
 
-fn told(path: &Path, error: Error) -> Error {
+fn with_path(path: &Path, error: Error) -> Error {
     match error {
         Error::Argument(what) => Error::file(path, what),
         other => other,

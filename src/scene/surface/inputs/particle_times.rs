@@ -8,8 +8,8 @@ use crate::geometry::DVec3;
 use crate::geometry::points::Values;
 use crate::io::files::{hash, source};
 use crate::io::mesh::extension;
-use crate::io::particles::{self, Cloud};
-use crate::io::records::input_hashes::Seen;
+use crate::io::particles::{self, ParticleData};
+use crate::io::records::input_hashes::InputHashes;
 use crate::scene::surface::Surface;
 use crate::scene::{Shot, changes_since, partial};
 use crate::surface::{Particles, interpolate};
@@ -23,7 +23,7 @@ const IDS: [&str; 4] = ["id", "ids", "particle_id", "particleid"];
 ///
 /// # Errors
 /// A file that cannot be read, or that holds only the changes since another frame.
-pub fn read_cloud(path: &Path, seen: &Seen) -> Result<Cloud> {
+pub fn read_cloud(path: &Path, seen: &InputHashes) -> Result<ParticleData> {
     if extension(path) != "vdb" {
         return particles::parse(path, &seen.read(path)?);
     }
@@ -42,7 +42,11 @@ pub fn read_cloud(path: &Path, seen: &Seen) -> Result<Cloud> {
 ///
 /// # Errors
 /// As [`read_cloud`]; values that are not finite, two particles with the same id.
-pub(in crate::scene::surface) fn read(path: &Path, surface: &Surface, seen: &Seen) -> Result<Particles> {
+pub(in crate::scene::surface) fn read(
+    path: &Path,
+    surface: &Surface,
+    seen: &InputHashes,
+) -> Result<Particles> {
     let cloud = read_cloud(path, seen)?;
     let named = |names: &'static [&str]| {
         let is_it = |name: &str| names.contains(&&*name.to_lowercase());
@@ -74,7 +78,7 @@ pub(in crate::scene::surface) fn read(path: &Path, surface: &Surface, seen: &See
 pub(in crate::scene::surface) struct Liquid<'a> {
     surface: &'a Surface,
     shot: Shot,
-    seen: &'a Seen,
+    seen: &'a InputHashes,
     /// The particles of the last files, by file number.
     kept: Vec<(i32, Arc<Particles>)>,
 }
@@ -83,7 +87,7 @@ pub(in crate::scene::surface) struct Liquid<'a> {
 pub(in crate::scene::surface) const KEPT: usize = 4;
 
 impl<'a> Liquid<'a> {
-    pub fn new(surface: &'a Surface, shot: Shot, seen: &'a Seen) -> Self {
+    pub fn new(surface: &'a Surface, shot: Shot, seen: &'a InputHashes) -> Self {
         Self { surface, shot, seen, kept: Vec::new() }
     }
 
@@ -114,11 +118,11 @@ impl<'a> Liquid<'a> {
         let to = self.file(below as i32 + 1)?;
         interpolate(&from, &to, self.file_time(), share)
             .map(Arc::new)
-            .map_err(|error| self.told(below, error))
+            .map_err(|error| self.with_path(below, error))
     }
 
     /// An error about missing data of the particles at a time, with their file.
-    pub fn told(&self, time: f64, error: Error) -> Error {
+    pub fn with_path(&self, time: f64, error: Error) -> Error {
         match error {
             Error::Argument(what) => Error::file(self.path(time.floor() as i32), what),
             other => other,

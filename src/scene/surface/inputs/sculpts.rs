@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{REPLACED, lasting, read_mesh};
+use super::{REPLACED, detail_retention, read_mesh};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::mesh::attributes::{Number, On};
@@ -21,7 +21,7 @@ pub struct Sculpt {
     /// The mesh (m), with the same arrays as the mesh of the first frame, in the same order.
     pub mesh: DetailedMesh,
     /// Detail retention of each vertex: the share that never fades; empty: none.
-    pub lasting: Vec<f32>,
+    pub detail_retention: Vec<f32>,
 }
 
 /// The frames of a shot after its first that have an edited mesh, ascending.
@@ -93,14 +93,14 @@ fn read(
     let (mesh, warning) = read_mesh(ctx, surface, &path, &inputs.seen, inputs.spacing)?;
     let mut warnings: Vec<String> = warning.into_iter().collect();
     let fades = surface.half_life.is_some() || surface.fade != 0.0;
-    let lasting = match lasting(&mesh) {
+    let detail_retention = match detail_retention(&mesh) {
         Err(what) if fades => return Err(Error::file(path, what)),
         // States store it: a later frame may be the first that fades.
         other => other.unwrap_or_default(),
     };
     let (mesh, faults) = conformed(mesh, &inputs.mesh);
     warnings.extend(faults.iter().map(|fault| format!("{}: {fault}", path.display())));
-    Ok(Some((Sculpt { path, mesh, lasting }, warnings)))
+    Ok(Some((Sculpt { path, mesh, detail_retention }, warnings)))
 }
 
 /// A mesh with the same data as that of the first frame, so that all frames have the same; and the differences, a sentence each.

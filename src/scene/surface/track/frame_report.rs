@@ -3,19 +3,19 @@
 use serde_json::json;
 
 use crate::scene::run::Report;
-use crate::surface::{Apart, Change, StepReport, Tracker};
+use crate::surface::{Change, StepReport, Tracker, UncoveredPart};
 
 /// Maximum uncovered parts listed in a report.
 const LISTED: usize = 100;
 
 /// The report of a frame with this many particles; `is_resculpted`: whether an edited mesh replaced the tracked one.
-pub(in crate::scene::surface) fn told(
+pub(in crate::scene::surface) fn report_of(
     report: &StepReport,
     particles: usize,
     tracker: &Tracker,
     is_resculpted: bool,
 ) -> Report {
-    let (drops, bubbles): (Vec<&Apart>, Vec<&Apart>) =
+    let (drops, bubbles): (Vec<&UncoveredPart>, Vec<&UncoveredPart>) =
         report.apart.iter().partition(|apart| apart.volume >= 0.0);
     let listed: Vec<serde_json::Value> = report
         .apart

@@ -26,7 +26,7 @@ use crate::scene::run::settings::{first_of, settings_of};
 use crate::scene::run::{
     CONTENT, Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Settings, Stage, Stepped, Stepping, Stored, To,
 };
-use tracked_shot::{At, Walk, reads};
+use tracked_shot::{At, TrackedShot, reads};
 
 /// Name of the stage, and of the kind of its files.
 const NAME: &str = "surface";
@@ -167,24 +167,24 @@ impl Stage for Track<'_> {
 }
 
 impl<'a> Stepping for Track<'a> {
-    type State = Walk<'a>;
+    type State = TrackedShot<'a>;
     type Step = Step;
     type Writer = ();
 
-    fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<Walk<'a>> {
+    fn load(&self, ctx: &Context, done: &Stored, after: Option<i32>) -> Result<TrackedShot<'a>> {
         let Some(frame) = after else {
             // A mesh that is not near the particles is refused before anything is written.
-            return Walk::begin(ctx, self.scene, self.surface, self.inputs);
+            return TrackedShot::begin(ctx, self.scene, self.surface, self.inputs);
         };
         let path = done.state_file(frame)?;
         let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
         let params = self.surface.params(self.inputs.spacing);
         let kept = saved_arrays::resume(params, &self.inputs.mesh, &bytes);
         let kept = kept.map_err(|error| Error::file(path, error.to_string()))?;
-        Walk::resume(ctx, (self.scene, self.surface, self.inputs), frame, kept)
+        TrackedShot::resume(ctx, (self.scene, self.surface, self.inputs), frame, kept)
     }
 
-    fn step(&self, ctx: &Context, walk: &mut Walk<'a>, to: &To<'_>) -> Result<Stepped<Step>> {
+    fn step(&self, ctx: &Context, walk: &mut TrackedShot<'a>, to: &To<'_>) -> Result<Stepped<Step>> {
         walk.go(ctx, to.frame)?;
         let At { tracker, detail, report, source, is_dry, .. } = walk.now();
         let written = || {
@@ -208,7 +208,7 @@ impl<'a> Stepping for Track<'a> {
         Ok(Stepped { step: Step(step), report: report.clone() })
     }
 
-    fn writer(&self, _ctx: &Context, _walk: &Walk<'a>) -> Result<()> {
+    fn writer(&self, _ctx: &Context, _walk: &TrackedShot<'a>) -> Result<()> {
         Ok(())
     }
 

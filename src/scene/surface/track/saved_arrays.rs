@@ -18,7 +18,7 @@ const NUMBERS: [Number; 8] =
 const POSITIONS: [On; 3] = [On::Vertices, On::Corners, On::Faces];
 
 /// A saved mesh.
-pub struct Kept {
+pub struct SavedMesh {
     pub tracker: Tracker,
     /// The data that it carries; `None`: those of the first mesh.
     pub detail: Option<DetailedMesh>,
@@ -64,10 +64,10 @@ pub fn save(tracker: &Tracker, detail: &DetailedMesh, sculpted: Option<i32>) -> 
 ///
 /// # Errors
 /// Bytes that are not such a state, or a state of another mesh.
-pub fn resume(params: Params, first: &DetailedMesh, bytes: &[u8]) -> Result<Kept> {
+pub fn resume(params: Params, first: &DetailedMesh, bytes: &[u8]) -> Result<SavedMesh> {
     if !bytes.starts_with(MAGIC) {
         let tracker = Tracker::resume(params, &first.mesh, bytes)?;
-        return Ok(Kept { tracker, detail: None, sculpted: None });
+        return Ok(SavedMesh { tracker, detail: None, sculpted: None });
     }
     let bytes = packed::unpack(bytes, MAGIC, NOUN)?;
     let mut from = Reader::new(&bytes);
@@ -93,7 +93,7 @@ pub fn resume(params: Params, first: &DetailedMesh, bytes: &[u8]) -> Result<Kept
     let uvs = if from.u32()? == 0 { None } else { Some(uvs(&mut from, vertices, faces)?) };
     from.end()?;
     let detail = Some(DetailedMesh { uvs, arrays, ..DetailedMesh::default() });
-    Ok(Kept { tracker, detail, sculpted })
+    Ok(SavedMesh { tracker, detail, sculpted })
 }
 
 fn uvs(from: &mut Reader<'_>, vertices: usize, faces: usize) -> Result<Uvs> {
@@ -159,7 +159,7 @@ mod tests {
         let (tracker, first, detail) = rebuilt();
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let bytes = save(&tracker, &detail, Some(-7));
-        let Kept { tracker: back, detail: carried, sculpted } = resume(params, &first, &bytes).unwrap();
+        let SavedMesh { tracker: back, detail: carried, sculpted } = resume(params, &first, &bytes).unwrap();
         let carried = carried.unwrap();
         assert!(save(&back, &carried, sculpted) == bytes && carried.uvs == detail.uvs);
         assert_eq!(sculpted, Some(-7));
@@ -173,7 +173,7 @@ mod tests {
         // The tracker's own bytes have their own checksum: the bytes after them are changed.
         let own = 8 + u64::from_le_bytes(plain[..8].try_into().unwrap()) as usize;
         let rounds = std::env::var("FRAZIL_FUZZ").ok().and_then(|text| text.parse().ok()).unwrap_or(2000);
-        let saved = |kept: &Kept| save(&kept.tracker, kept.detail.as_ref().unwrap(), kept.sculpted);
+        let saved = |kept: &SavedMesh| save(&kept.tracker, kept.detail.as_ref().unwrap(), kept.sculpted);
         let [mut refused, mut read] = [0; 2];
         for round in 0..rounds {
             let mut changed = plain.clone();

@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::frame_report::told;
-use super::saved_arrays::Kept;
+use super::frame_report::report_of;
+use super::saved_arrays::SavedMesh;
 use super::vertex_paths::{Trail, Way};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -20,12 +20,12 @@ use crate::scene::surface::inputs::sculpts::{path_at, read_sculpt};
 use crate::scene::surface::{Inputs, Surface};
 use crate::scene::{Frames, Scene};
 use crate::surface::{
-    Change, Displaced, Eased, Leads, Params, Particles, Rest, StepReport, TOO_FAR, Tracker, displaced, eased,
-    uncrossed,
+    Change, Displaced, Eased, EasingTargets, Params, Particles, Rest, StepReport, TOO_FAR, Tracker,
+    displaced, eased, uncrossed,
 };
 
 /// A scene's liquid, and the mesh that follows it.
-pub struct Walk<'a> {
+pub struct TrackedShot<'a> {
     scene: &'a Scene,
     surface: &'a Surface,
     inputs: &'a Inputs,
@@ -58,13 +58,13 @@ pub struct At {
     /// The frame's report.
     pub report: Report,
     way: Way,
-    leads: Leads,
+    leads: EasingTargets,
     pub(in crate::scene::surface) source: Source,
     /// Whether the frame has no particles: its files then hold no mesh.
     pub(in crate::scene::surface) is_dry: bool,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> TrackedShot<'a> {
     /// The mesh at the first frame; none if that has no particles.
     ///
     /// # Errors
@@ -85,17 +85,19 @@ impl<'a> Walk<'a> {
         ctx: &Context,
         of @ (_, surface, inputs): (&'a Scene, &'a Surface, &'a Inputs),
         frame: i32,
-        Kept { mut tracker, detail, sculpted }: Kept,
+        SavedMesh { mut tracker, detail, sculpted }: SavedMesh,
     ) -> Result<Self> {
         if !tracker.is_rebuilt() {
-            tracker.set_lasting(inputs.lasting.clone()).map_err(|error| of_first(surface, error))?;
+            tracker
+                .set_detail_retention(inputs.detail_retention.clone())
+                .map_err(|error| of_first(surface, error))?;
         }
         let detail = detail.map(|detail| {
             let triangles = tracker.triangles().to_vec();
             Arc::new(DetailedMesh { mesh: TriMesh { positions: Vec::new(), triangles }, ..detail })
         });
         let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
-        let (report, way, leads) = (nothing_told(), Way::default(), Leads::default());
+        let (report, way, leads) = (nothing_told(), Way::default(), EasingTargets::default());
         // Nothing of this frame is written again.
         let at = At { tracker, detail, report, way, leads, source, is_dry: false };
         let mut walk = Self::at(of, frame, at);
@@ -246,11 +248,11 @@ impl<'a> Walk<'a> {
         }
         if frame == self.inputs.begins {
             let mut at = first_mesh(ctx, self.surface, self.inputs)?;
-            at.leads = Leads::cut(at.tracker.vertices().len());
+            at.leads = EasingTargets::cut(at.tracker.vertices().len());
             let particles = Arc::new(self.inputs.particles.clone());
             let sculpted = self.resculpt(ctx, &mut at, frame, &particles)?;
             if let Some(report) = sculpted {
-                at.report = told(&report, particles.positions.len(), &at.tracker, true);
+                at.report = report_of(&report, particles.positions.len(), &at.tracker, true);
             }
             return Ok(at);
         }
@@ -263,7 +265,7 @@ impl<'a> Walk<'a> {
         before.tracker.forget_ahead();
         let mut trail = Trail::of(tracker.vertices());
         let way = self.liquid.way(frame);
-        let (mut report, mut leads) = (StepReport::default(), Leads::default());
+        let (mut report, mut leads) = (StepReport::default(), EasingTargets::default());
         let mut from = self.liquid.at(way[0])?;
         // The end of each following step; beyond the shot it need not exist.
         let beyond = self.liquid.way(frame + 1)[1];
@@ -278,13 +280,14 @@ impl<'a> Walk<'a> {
                 tracker.set_ahead(particles);
             }
             let triangles = self.surface.eases().then(|| tracker.triangles().to_vec());
-            let step = tracker.step(ctx, &from, &to, dt).map_err(|error| self.liquid.told(ends[0], error))?;
+            let step =
+                tracker.step(ctx, &from, &to, dt).map_err(|error| self.liquid.with_path(ends[0], error))?;
             let share = (ends[1] - way[0]) / (way[way.len() - 1] - way[0]);
             match &step.change {
                 Some(change) => {
                     trail.follow(&change.before, share);
                     if let Some(triangles) = triangles {
-                        leads = leads.then(&Leads::of(ctx, change, &triangles, self.inputs.spacing)?);
+                        leads = leads.then(&EasingTargets::of(ctx, change, &triangles, self.inputs.spacing)?);
                     }
                     let own = detail.as_deref().unwrap_or(&self.inputs.mesh);
                     detail = Some(Arc::new(match tracker.vertices() {
@@ -306,7 +309,7 @@ impl<'a> Walk<'a> {
         let report = sculpted.into_iter().fold(report, StepReport::followed_by);
         let report = StepReport { phases: phases.times(), ..report };
         report.new_warnings(&mut self.has_warned).for_each(|warning| log::warn!("frame {frame}: {warning}"));
-        at.report = told(&report, from.positions.len(), &at.tracker, is_resculpted);
+        at.report = report_of(&report, from.positions.len(), &at.tracker, is_resculpted);
         Ok(at)
     }
 
@@ -329,15 +332,17 @@ impl<'a> Walk<'a> {
         };
         let old = ctx.pool().install(|| NearestTree::new(&at.tracker.mesh()));
         let triangles = at.tracker.triangles().to_vec();
-        let report =
-            at.tracker.resculpt(ctx, &sculpt.mesh.mesh, sculpt.lasting, particles).map_err(refused)?;
+        let report = at
+            .tracker
+            .resculpt(ctx, &sculpt.mesh.mesh, sculpt.detail_retention, particles)
+            .map_err(refused)?;
         // Vertices of the edited mesh move like those of the previous mesh near them.
         let velocity = |position: &DVec3| {
             let corner = old.nearest(*position).map(|near| triangles[near.triangle][0] as usize);
             corner.and_then(|corner| at.way.of_after.get(corner).copied()).unwrap_or_default()
         };
         at.way.of_after = at.tracker.vertices().iter().map(velocity).collect();
-        at.leads = std::mem::take(&mut at.leads).then(&Leads::cut(at.tracker.vertices().len()));
+        at.leads = std::mem::take(&mut at.leads).then(&EasingTargets::cut(at.tracker.vertices().len()));
         let mesh = Arc::new(sculpt.mesh);
         at.source = Source::of(ctx, self.surface.rebuild, Some(frame), mesh.clone(), particles);
         at.detail = Some(mesh);
@@ -355,20 +360,22 @@ fn first_mesh(ctx: &Context, surface: &Surface, inputs: &Inputs) -> Result<At> {
     let params = surface.params(inputs.spacing);
     let begun = ctx.step(4, || Tracker::begin(ctx, params, &inputs.mesh.mesh, &inputs.particles));
     let ((mut tracker, report), phases) = begun.map_err(|error| of_first(surface, error))?;
-    tracker.set_lasting(inputs.lasting.clone()).map_err(|error| of_first(surface, error))?;
+    tracker
+        .set_detail_retention(inputs.detail_retention.clone())
+        .map_err(|error| of_first(surface, error))?;
     let report = StepReport { phases, ..report };
-    let report = told(&report, inputs.particles.positions.len(), &tracker, false);
+    let report = report_of(&report, inputs.particles.positions.len(), &tracker, false);
     let source = Source::of(ctx, surface.rebuild, None, inputs.mesh.clone(), &inputs.particles);
-    let (way, leads) = (Way::default(), Leads::default());
+    let (way, leads) = (Way::default(), EasingTargets::default());
     Ok(At { tracker, detail: None, report, way, leads, source, is_dry: false })
 }
 
 /// A frame before the first particles.
 fn without_mesh(surface: &Surface, inputs: &Inputs) -> Result<At> {
     let tracker = Tracker::without_mesh(surface.params(inputs.spacing))?;
-    let report = told(&StepReport::default(), 0, &tracker, false);
+    let report = report_of(&StepReport::default(), 0, &tracker, false);
     let source = Source { sculpted: None, mesh: inputs.mesh.clone(), rest: None };
-    let (way, leads) = (Way::default(), Leads::default());
+    let (way, leads) = (Way::default(), EasingTargets::default());
     let detail = Some(Arc::new(inputs.mesh.emptied()));
     Ok(At { tracker, detail, report, way, leads, source, is_dry: true })
 }

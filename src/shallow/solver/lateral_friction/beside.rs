@@ -6,7 +6,7 @@
 
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_mut, strip_of};
-use crate::shallow::solver::flux::{Step, greater, lesser};
+use crate::shallow::solver::flux::{Step, max, min};
 
 /// Walls are ignored beside films thinner than `THIN` times a cell's edge, and count fully beside liquid deeper than `THICK` times it: a
 /// wall beside a film of `THIN` reduces the flow in the adjacent pipe by (2/5)^1/2 `THIN`, or 4 %.
@@ -45,7 +45,7 @@ pub fn counts(step: &Step, depth: i32) -> bool {
 #[inline(always)]
 fn counted(step: &Step, height: f32) -> f32 {
     let part = (height - THIN * step.cell) * (1.0 / ((THICK - THIN) * step.cell));
-    lesser(greater(part, 0.0), 1.0)
+    min(max(part, 0.0), 1.0)
 }
 
 /// The share of the mean of phi^2 in the lowest part x of the depth; phi = 3/2 (2 x - x^2) below a free surface, and 6 (x - x^2) below a
@@ -99,17 +99,17 @@ pub fn side<const FULL: bool, const ROOFED: bool>(
     let over = (beyond.base + beyond.depth - (own.base + own.depth)) as f32;
     let (high, other) = (own.depth as f32, beyond.depth as f32);
     // It is a slope as far as the surfaces differ in height like the bases.
-    let most = lesser(greater(rise, -step.cell), step.cell);
-    let lean = lesser(greater(over, lesser(most, 0.0)), greater(most, 0.0));
+    let most = min(max(rise, -step.cell), step.cell);
+    let lean = min(max(over, min(most, 0.0)), max(most, 0.0));
     let foot = rise - lean;
-    let up = greater(foot, 0.0);
-    let contact = greater(lesser(high, foot + other) - up, 0.0);
-    let below = share::<FULL>(lesser(up * inverse, 1.0));
+    let up = max(foot, 0.0);
+    let contact = max(min(high, foot + other) - up, 0.0);
+    let below = share::<FULL>(min(up * inverse, 1.0));
     let wall = if ROOFED {
-        let top = lesser(greater((beyond.ceiling - own.base) as f32 * inverse, 0.0), 1.0);
+        let top = min(max((beyond.ceiling - own.base) as f32 * inverse, 0.0), 1.0);
         let top = if is_linked { 1.0 } else { top };
         // Without a ceiling this equals the other branch, to the last bit.
-        lesser(below + (1.0 - share::<FULL>(top)), 1.0)
+        min(below + (1.0 - share::<FULL>(top)), 1.0)
     } else {
         below
     };
@@ -255,7 +255,7 @@ fn both_strips<const ROOFED: bool>(
 ) {
     for x in 0..STRIP {
         let high = own.depth[x] as f32;
-        let inverse = 1.0 / greater(high, 1.0);
+        let inverse = 1.0 / max(high, 1.0);
         let room = own.room(x);
         let is_linked = [links[0] >> x & 1 == 1, links[1] >> x & 1 == 1];
         let [one, part] = side::<false, ROOFED>(step, room, inverse, first.room(x), is_linked[0]);

@@ -4,7 +4,7 @@
 use super::Walls;
 use super::beside::{self, Room};
 use crate::shallow::columns::{Columns, NONE, STRIP};
-use crate::shallow::solver::flux::{Step, lesser};
+use crate::shallow::solver::flux::{Step, min};
 use crate::shallow::solver::pressurised::edges::At;
 use crate::shallow::solver::pressurised::network::State;
 
@@ -53,7 +53,7 @@ impl Walls {
         let rooms = rooms(columns, state, [i, j]);
         let mean = mean(rooms);
         let rise = (columns.bases()[i] - columns.bases()[j]) as f32 / step.cell;
-        let lateral = f64::from(step.lateral) * f64::from(1.0 + lesser(rise * rise, 3.0));
+        let lateral = f64::from(step.lateral) * f64::from(1.0 + min(rise * rise, 3.0));
         let of_end = |end: usize| {
             let column = [i, j][end];
             let beyond = sides.map(|side| {
@@ -74,7 +74,7 @@ impl Walls {
             let [Some(first), Some(second)] = others else { return 0.0 };
             let depth = self::mean(self::rooms(columns, state, [first, second]));
             let contact = [before, behind][side];
-            f64::from(lesser(contact / depth.max(1.0), 1.0) * state.flux[axis][first])
+            f64::from(min(contact / depth.max(1.0), 1.0) * state.flux[axis][first])
         });
         let taken = taken[0] + taken[1];
         Beside {

@@ -13,7 +13,7 @@ use super::{Liquid, spread, within};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_mut, strip_of};
 use crate::shallow::solver::fast_films::NORMAL;
-use crate::shallow::solver::flux::{Step, greater, lesser, unpacked};
+use crate::shallow::solver::flux::{Step, max, min, unpacked};
 use crate::shallow::solver::pressurised::network::Network;
 
 /// Maximum reductions: a pipe is coupled to all within 16 cells.
@@ -140,7 +140,7 @@ impl Lines {
 
 /// Count of reductions that a step needs, given the maximum depth (units).
 fn reductions(step: &Step, deepest: i32) -> usize {
-    let deepest = greater(deepest as f32, 1.0);
+    let deepest = max(deepest as f32, 1.0);
     // a in a line of equal pipes without walls.
     let mut a = step.lateral / (1.0 + 2.0 * step.lateral + step.drag / (deepest * deepest));
     let mut count = 0;
@@ -459,19 +459,19 @@ fn begin_strip<const THINS: bool, const AXIS: usize>(
         let depth = [depth[0][x] as f32, depth[1][x] as f32];
         let light = unpacked(light[x])[AXIS];
         let mean = 0.5 * (depth[0] + depth[1]);
-        let driven = step.kept * flux[x] + step.drive * light * fall as f32 * lesser(mean, step.section);
+        let driven = step.kept * flux[x] + step.drive * light * fall as f32 * min(mean, step.section);
         // Without drive, only neighbours move the liquid: the smaller depth is the same from either end.
         let giver = if driven > 0.0 { depth[0] } else { depth[1] };
-        let giver = if driven == 0.0 { lesser(depth[0], depth[1]) } else { giver };
+        let giver = if driven == 0.0 { min(depth[0], depth[1]) } else { giver };
         let square = giver * giver;
         let thinned = if THINS { step.thinned(flux[x], square) } else { 1.0 };
         let drag = light * if THINS { step.drag * thinned } else { step.drag };
         // On a slope a film is thinner than its vertical depth; for friction at the ground this is in `open`.
         let slope = rise as f32 * per_cell;
-        let steep = 1.0 + lesser(slope * slope, 3.0);
+        let steep = 1.0 + min(slope * slope, 3.0);
         let lateral = if THINS { step.lateral * light * thinned } else { step.lateral * light } * steep;
         let open = square * open[x];
-        let beside = lateral * (0.5 * (all[0][x] + all[1][x])) / greater(mean, 1.0);
+        let beside = lateral * (0.5 * (all[0][x] + all[1][x])) / max(mean, 1.0);
         let part = open / (open + drag + beside * open);
         rest[x] = driven * part;
         let part = part * lateral;
@@ -483,5 +483,5 @@ fn begin_strip<const THINS: bool, const AXIS: usize>(
 /// The part of a pipe's section that is in contact, from the contact and the depths at both ends.
 #[inline(always)]
 fn taken(contact: [f32; 2], depth: [i32; 2]) -> f32 {
-    lesser((contact[0] + contact[1]) / greater(depth[0] as f32 + depth[1] as f32, 1.0), 1.0)
+    min((contact[0] + contact[1]) / max(depth[0] as f32 + depth[1] as f32, 1.0), 1.0)
 }

@@ -17,7 +17,7 @@ use crate::shallow::solver::flux::Step;
 use crate::shallow::solver::full::full_of;
 use crate::shallow::solver::lateral_friction::Walls;
 use crate::shallow::solver::link_flow::LinkFlow;
-use crate::shallow::solver::overflow_edges::{Fall, Lips};
+use crate::shallow::solver::overflow_edges::{Fall, OverflowEdges};
 use crate::shallow::solver::rows::filling::Filling;
 use crate::shallow::solver::stop::Stop;
 use crate::shallow::solver::transfers::limiter;
@@ -59,7 +59,7 @@ pub struct State<'a> {
     /// Flow through links.
     pub links: &'a LinkFlow,
     /// Overflow edges: links that liquid falls freely from.
-    pub lips: &'a Lips,
+    pub overflow_edges: &'a OverflowEdges,
     /// Lateral friction of pipes.
     pub walls: &'a Walls,
 }
@@ -253,7 +253,7 @@ impl Network {
                 let at = At::Link(link as u32);
                 let is_node =
                     |column: u32| column != NONE && (self.party_of[column as usize] as usize) < count;
-                let fall = state.lips.at(link);
+                let fall = state.overflow_edges.at(link);
                 if fall != Fall::No {
                     let giver = if fall == Fall::Ahead { from } else { to };
                     if is_node(giver) {
@@ -413,16 +413,18 @@ impl Network {
         flux: &mut [PerColumn<f32>; 2],
         left: &mut [PerColumn<f32>; 2],
         links: &mut LinkFlow,
-        lips: &mut Lips,
+        overflow_edges: &mut OverflowEdges,
     ) {
         let ([flux_east, flux_south], [left_east, left_south]) = (flux, left);
         for edge in &self.edges {
             let lip = match edge.at {
-                At::Link(link) if lips.at(link as usize) != Fall::No => Some(link as usize),
+                At::Link(link) if overflow_edges.at(link as usize) != Fall::No => Some(link as usize),
                 _ => None,
             };
             match edge.ends {
-                _ if lip.is_some() => lip.iter().for_each(|&lip| lips.add_flooded(lip, edge.units.abs())),
+                _ if lip.is_some() => {
+                    lip.iter().for_each(|&lip| overflow_edges.add_flooded(lip, edge.units.abs()))
+                }
                 [_, NONE] if edge.units > 0 => links.lost += edge.units,
                 [_, NONE] => links.gained -= edge.units,
                 _ => {}

@@ -9,7 +9,7 @@ use crate::shallow::solver::active::Active;
 use crate::shallow::solver::fast_films::Fast;
 use crate::shallow::solver::lateral_friction::Walls;
 use crate::shallow::solver::links::{Outside, indices_of};
-use crate::shallow::solver::overflow_edges::Lips;
+use crate::shallow::solver::overflow_edges::OverflowEdges;
 use crate::shallow::solver::pressurised::network::Network;
 
 /// The inputs of a step.
@@ -27,7 +27,7 @@ pub struct Ground<'a> {
     /// Lateral friction of pipes.
     pub walls: &'a Walls,
     /// Overflow edges: links that liquid falls freely from.
-    pub lips: &'a Lips,
+    pub overflow_edges: &'a OverflowEdges,
     /// Whether slow liquid may come to rest.
     pub may_rest: bool,
     /// Rows with columns that may fill up.
@@ -79,6 +79,6 @@ pub(in crate::shallow::solver) fn each_link(
     let within = indices_of(ground.columns, row);
     for owner in row.saturating_sub(1).max(parts.first)..row + 1 {
         let part = parts.see(owner);
-        part.links.each(links, ground.lips, (owner, part.first_link), &within, gives, &mut add);
+        part.links.each(links, ground.overflow_edges, (owner, part.first_link), &within, gives, &mut add);
     }
 }

@@ -13,7 +13,7 @@ pub(in crate::shallow::solver) mod filling;
 mod ground;
 pub(in crate::shallow::solver) mod positions;
 
-use super::flux::{Carried, Kind, Of, Row, Step, flux_row, greater, solved_row};
+use super::flux::{Carried, Kind, Of, Row, Step, flux_row, max, solved_row};
 use super::links::{Outside, indices_of};
 use super::transfers::inflow_limit::most_through_links;
 use super::transfers::scale;
@@ -191,7 +191,14 @@ impl Rows {
                 Some((start, depth)) if index >= start => depth[index - start],
                 _ => own.depth[index - start],
             };
-            own.links.drive::<K>(step, columns, &pipes.links, ground.lips, (row, first_link), depth);
+            own.links.drive::<K>(
+                step,
+                columns,
+                &pipes.links,
+                ground.overflow_edges,
+                (row, first_link),
+                depth,
+            );
         }
         is_held
     }
@@ -244,7 +251,7 @@ impl Rows {
         if may_fill {
             let linked = most_through_links(ground, parts, row, &mut self.linked);
             own.may_fill =
-                into.into_iter().fold(0.0, greater) + linked > ground.room[row] || !ground.network.is_empty();
+                into.into_iter().fold(0.0, max) + linked > ground.room[row] || !ground.network.is_empty();
         }
         let mut is_less = false;
         if over {
@@ -285,7 +292,7 @@ impl Rows {
         }
         let first_link = part.first_link;
         let factor = |column| position.pick(least, beyond, column);
-        part.links.scale(&ground.pipes.links, ground.lips, (row, first_link), true, factor);
+        part.links.scale(&ground.pipes.links, ground.overflow_edges, (row, first_link), true, factor);
     }
 
     /// Applies the transfers of a row's links to the band's own columns.
@@ -302,7 +309,7 @@ impl Rows {
         let (first_link, start) = (part.first_link, part.start);
         let depth = &mut *part.depth;
         let mut next = next.map(|next| (next.start, &mut *next.depth));
-        part.links.move_units(links, ground.lips, (row, first_link), outside, |column, units| {
+        part.links.move_units(links, ground.overflow_edges, (row, first_link), outside, |column, units| {
             if own.contains(&column) {
                 match &mut next {
                     Some((start, depth)) if column >= *start => depth[column - *start] += units,

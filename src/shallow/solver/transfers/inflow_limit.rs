@@ -2,7 +2,7 @@
 //! from the unscaled sums of inflow.
 
 use super::scale;
-use crate::shallow::solver::flux::{greater, lesser};
+use crate::shallow::solver::flux::{max, min};
 use crate::shallow::solver::rows::band_views::Parts;
 use crate::shallow::solver::rows::buffers::{RING, Rows};
 use crate::shallow::solver::rows::positions::Place;
@@ -72,16 +72,16 @@ impl Rows {
                 let k = first_most[at + x];
                 most[at + x] = k;
                 if k < 1.0 {
-                    let along = greater(around.east[x], 0.0) * near.own[x + 1]
-                        - lesser(around.west[x], 0.0) * first_most[at + x - 1];
-                    let across = greater(around.south[x], 0.0) * near.south[x]
-                        - lesser(around.north[x], 0.0) * north_most[x];
+                    let along = max(around.east[x], 0.0) * near.own[x + 1]
+                        - min(around.west[x], 0.0) * first_most[at + x - 1];
+                    let across =
+                        max(around.south[x], 0.0) * near.south[x] - min(around.north[x], 0.0) * north_most[x];
                     // Truncation removes up to a unit from each.
-                    let leaves = greater((along + across) * scale::MARGIN - 4.0, 0.0);
+                    let leaves = max((along + across) * scale::MARGIN - 4.0, 0.0);
                     let room =
                         scale::room(columns.bases()[i], columns.ceilings()[i], part.depth[i - part.start]);
-                    let along = greater(around.west[x], 0.0) - lesser(around.east[x], 0.0);
-                    let across = greater(around.north[x], 0.0) - lesser(around.south[x], 0.0);
+                    let along = max(around.west[x], 0.0) - min(around.east[x], 0.0);
+                    let across = max(around.north[x], 0.0) - min(around.south[x], 0.0);
                     most[at + x] = scale::most(along + across, room + leaves).max(k);
                 }
             }
@@ -119,7 +119,7 @@ impl Rows {
         }
         let first_link = part.first_link;
         let factor = |column| position.pick(most, beyond, column);
-        part.links.scale(&ground.pipes.links, ground.lips, (row, first_link), false, factor);
+        part.links.scale(&ground.pipes.links, ground.overflow_edges, (row, first_link), false, factor);
     }
 }
 

@@ -9,7 +9,7 @@ use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{NONE, STRIP, strip_mut, strip_of};
 use crate::shallow::scalars::amounts::{Act, Changes};
 use crate::shallow::scalars::shares::{LEVELS, MOST, integer, level, nearest, share};
-use crate::shallow::solver::overflow_edges::{Fall, Lips};
+use crate::shallow::solver::overflow_edges::{Fall, OverflowEdges};
 use crate::shallow::solver::pressurised::edges::At;
 use crate::shallow::solver::pressurised::network::Network;
 use crate::shallow::solver::rows::Ground;
@@ -81,7 +81,7 @@ impl Lanes {
                 if units == 0 {
                     continue;
                 }
-                let (from, to, fall) = (links.from[link], links.to[link], ground.lips.at(link));
+                let (from, to, fall) = (links.from[link], links.to[link], ground.overflow_edges.at(link));
                 // Liquid from outside has the concentrations of the liquid inside.
                 let giver = if units > 0 || to == NONE { from } else { to };
                 let moved = share(position.pick(levels, beyond, giver), f64::from(units));
@@ -246,7 +246,7 @@ impl Network {
     pub fn carry(
         &self,
         depth: &[i32],
-        (lips, fallen): (&Lips, &mut [f64]),
+        (overflow_edges, fallen): (&OverflowEdges, &mut [f64]),
         amounts: &mut [f64],
         levels: &mut Vec<f64>,
         changes: &mut Changes,
@@ -257,7 +257,7 @@ impl Network {
         for edge in self.edges.iter().filter(|edge| edge.units != 0) {
             let [from, to] = edge.ends;
             if let At::Link(link) = edge.at
-                && lips.at(link as usize) != Fall::No
+                && overflow_edges.at(link as usize) != Fall::No
             {
                 let giver = if from == NONE { to } else { from } as usize;
                 let moved = share(levels[giver], edge.units.abs() as f64);

@@ -5,7 +5,7 @@
 //! it is safe after each.
 
 use crate::shallow::columns::{STRIP, strip_from, strip_mut, strip_of};
-use crate::shallow::solver::flux::{greater, lesser};
+use crate::shallow::solver::flux::{max, min};
 
 /// Factor on depths and room: sums of four or more rounded transfers then stay within them.
 pub const MARGIN: f32 = 1.0 - 1.0 / (1u32 << 20) as f32;
@@ -71,12 +71,12 @@ fn outflow_of<const FILLS: bool>(
 ) {
     let [east, west, south, north] = around;
     for x in 0..STRIP {
-        let along = greater(east[x], 0.0) - lesser(west[x], 0.0);
-        let across = greater(south[x], 0.0) - lesser(north[x], 0.0);
+        let along = max(east[x], 0.0) - min(west[x], 0.0);
+        let across = max(south[x], 0.0) - min(north[x], 0.0);
         out[x] = along + across;
         over[x] |= i32::from(out[x] > spare(depth[x]));
         if FILLS {
-            into[x] = greater(into[x], coming(around, x));
+            into[x] = max(into[x], coming(around, x));
         }
     }
 }
@@ -88,7 +88,7 @@ pub fn least(depth: &[i32], out: &mut [f32]) -> f32 {
     for strip in 0..out.len() / STRIP {
         least_of(strip_of(depth, strip), strip_mut(out, strip), &mut least);
     }
-    least.into_iter().fold(1.0, lesser)
+    least.into_iter().fold(1.0, min)
 }
 
 #[inline(always)]
@@ -96,7 +96,7 @@ fn least_of(depth: &[i32; STRIP], out: &mut [f32; STRIP], least: &mut [f32; STRI
     for x in 0..STRIP {
         let spare = spare(depth[x]);
         out[x] = if out[x] > spare { spare / out[x] } else { 1.0 };
-        least[x] = lesser(out[x], least[x]);
+        least[x] = min(out[x], least[x]);
     }
 }
 
@@ -173,8 +173,8 @@ fn inflow_of(around: &[&[f32; STRIP]; 4], into: &mut [f32; STRIP]) {
 /// The inflow of a column. Scaling transfers down never increases it, even with rounding.
 #[inline(always)]
 fn coming([east, west, south, north]: &[&[f32; STRIP]; 4], x: usize) -> f32 {
-    let along = greater(west[x], 0.0) - lesser(east[x], 0.0);
-    let across = greater(north[x], 0.0) - lesser(south[x], 0.0);
+    let along = max(west[x], 0.0) - min(east[x], 0.0);
+    let across = max(north[x], 0.0) - min(south[x], 0.0);
     along + across
 }
 
@@ -198,13 +198,13 @@ pub fn find_most(base: &[i32], ceiling: &[i32], depth: &[i32], into: &mut [f32])
         let columns = [base, ceiling, depth].map(|numbers| strip_of(numbers, strip));
         most_of(columns, strip_mut(into, strip), &mut least);
     }
-    least.into_iter().fold(1.0, lesser)
+    least.into_iter().fold(1.0, min)
 }
 
 #[inline(always)]
 fn most_of([base, ceiling, depth]: [&[i32; STRIP]; 3], into: &mut [f32; STRIP], least: &mut [f32; STRIP]) {
     for x in 0..STRIP {
         into[x] = most(into[x], room(base[x], ceiling[x], depth[x]));
-        least[x] = lesser(into[x], least[x]);
+        least[x] = min(into[x], least[x]);
     }
 }

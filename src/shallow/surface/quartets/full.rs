@@ -40,7 +40,7 @@ type Windows<'a> = [[&'a [i32; STRIP]; 2]; 4];
 #[inline(always)]
 fn compare([depth, base, ceiling, under]: Windows<'_>, south: Windows<'_>) -> [u16; 2] {
     let [depth_s, base_s, ceiling_s, under_s] = south;
-    let (mut linked, mut greater) = (0u32, 0u32);
+    let (mut linked, mut max) = (0u32, 0u32);
     for position in 0..STRIP {
         let north = |at: usize| base[at][position].wrapping_add(depth[at][position].max(0));
         let south = |at: usize| base_s[at][position].wrapping_add(depth_s[at][position].max(0));
@@ -56,9 +56,9 @@ fn compare([depth, base, ceiling, under]: Windows<'_>, south: Windows<'_>) -> [u
         let is_linked = (lowest >= most(under, under_s)) & (highest < least(ceiling, ceiling_s));
         linked |= if is_linked { 1 << position } else { 0 };
         // a + d < b + c, without overflow.
-        greater |= if a.wrapping_sub(b) < c.wrapping_sub(d) { 1 << position } else { 0 };
+        max |= if a.wrapping_sub(b) < c.wrapping_sub(d) { 1 << position } else { 0 };
     }
-    [linked as u16, greater as u16]
+    [linked as u16, max as u16]
 }
 
 /// Finds the full quartets and their vertices, and the odd quartets.
@@ -99,12 +99,12 @@ fn find_full_spans(scene: Scene<'_>, found: &mut Found) {
                     } else {
                         windows(arrays, south)
                     };
-                    let [linked, greater] = compare(windows(arrays, strip), windows_south);
+                    let [linked, max] = compare(windows(arrays, strip), windows_south);
                     full = linked & any;
                     if step == end && (corners.east == none || corners.south_east == none) {
                         full &= 0x7fff;
                     }
-                    turned = full & choose(wets, greater);
+                    turned = full & choose(wets, max);
                     found.full_triangles += 2 * count(full) as usize;
                 }
             }
@@ -178,15 +178,15 @@ fn window(numbers: &[i32], strip: usize) -> [&[i32; STRIP]; 2] {
 /// Chooses diagonals: the quartets to divide from north-east to south-west, from which corners are wet and where the sum of the heights
 /// there is larger.
 #[inline(always)]
-fn choose([a, b, c, d]: [u16; 4], greater: u16) -> u16 {
+fn choose([a, b, c, d]: [u16; 4], max: u16) -> u16 {
     if a & b & c & d == u16::MAX {
-        return greater;
+        return max;
     }
     // Whether the ends of the diagonals from north-west and from north-east are both wet or both dry.
     let (from_west_end, from_east_end) = (!(a ^ d), !(b ^ c));
     let all_alike = !(a ^ b);
-    let both = from_west_end & from_east_end & (all_alike & greater | !all_alike & b);
-    let neither = !from_west_end & !from_east_end & greater;
+    let both = from_west_end & from_east_end & (all_alike & max | !all_alike & b);
+    let neither = !from_west_end & !from_east_end & max;
     from_east_end & !from_west_end | both | neither
 }
 

@@ -27,15 +27,15 @@ pub struct Claim {
 }
 
 impl Claims {
-    /// Claims of the objects that remove snow from `from` to `to` (s); `usual` is the default compression, for objects that have none of
+    /// Claims of the objects that remove snow from `from` to `to` (s); `compression` is the default compression, for objects that have none of
     /// their own.
     ///
     /// # Errors
     /// A pose that cannot be computed.
-    pub fn new(objects: &[Object<'_>], usual: f64, [from, to]: [f64; 2]) -> Result<Self> {
-        let share = |object: &Object<'_>| 1.0 - object.compression.unwrap_or(usual);
+    pub fn new(objects: &[Object<'_>], compression: f64, [from, to]: [f64; 2]) -> Result<Self> {
+        let share = |object: &Object<'_>| 1.0 - object.compression.unwrap_or(compression);
         let removing: Vec<_> = objects.iter().filter(|object| object.removes).collect();
-        let first = removing.first().map_or(1.0 - usual, |object| share(object));
+        let first = removing.first().map_or(1.0 - compression, |object| share(object));
         if removing.iter().all(|object| share(object) == first) {
             return Ok(Self::One(first));
         }

@@ -35,7 +35,7 @@ pub(super) fn flipped([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
 }
 
 /// A mesh with the triangles around each vertex.
-pub(super) struct Fans<'m, 'a> {
+pub(super) struct VertexRings<'m, 'a> {
     mesh: &'m mut Improvable<'a>,
     /// For each input vertex, where its triangles begin in `first`; then the count of all.
     starts: Vec<u32>,
@@ -54,7 +54,7 @@ pub(super) struct Fans<'m, 'a> {
     is_touched: Vec<bool>,
 }
 
-impl<'m, 'a> Fans<'m, 'a> {
+impl<'m, 'a> VertexRings<'m, 'a> {
     /// Takes two passes over all triangles.
     pub fn of(mesh: &'m mut Improvable<'a>) -> Self {
         let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
@@ -383,55 +383,58 @@ mod tests {
     fn changes_keep_a_closed_manifold_and_the_fans_of_its_triangles() {
         let mut body = cube();
         let mut mesh = body.improvable();
-        let mut fans = Fans::of(&mut mesh);
-        let ends = |fans: &Fans<'_, '_>, triangle: u32| {
-            let [a, b, _] = fans.corners(triangle);
+        let mut rings = VertexRings::of(&mut mesh);
+        let ends = |rings: &VertexRings<'_, '_>, triangle: u32| {
+            let [a, b, _] = rings.corners(triangle);
             [a, b]
         };
         // The stored triangles around a vertex are those that use it.
-        let check = |fans: &Fans<'_, '_>| {
-            for vertex in 0..fans.mesh.positions.len() as u32 {
+        let check = |rings: &VertexRings<'_, '_>| {
+            for vertex in 0..rings.mesh.positions.len() as u32 {
                 let names =
-                    |&triangle: &u32| fans.is_there(triangle) && fans.corners(triangle).contains(&vertex);
-                let expected: Vec<u32> = (0..fans.mesh.triangles.len() as u32).filter(names).collect();
-                let mut around = fans.around(vertex).to_vec();
+                    |&triangle: &u32| rings.is_there(triangle) && rings.corners(triangle).contains(&vertex);
+                let expected: Vec<u32> = (0..rings.mesh.triangles.len() as u32).filter(names).collect();
+                let mut around = rings.around(vertex).to_vec();
                 around.sort_unstable();
                 assert_eq!(around, expected, "around {vertex}");
             }
         };
-        check(&fans);
+        check(&rings);
         for triangle in [0, 5, 12, 3, 7] {
-            let edge = fans.edge(ends(&fans, triangle)).unwrap();
+            let edge = rings.edge(ends(&rings, triangle)).unwrap();
             assert_eq!(edge.triangles[0], triangle);
             let [a, b, ..] = edge.corners;
-            fans.split(&edge, 0.5 * (fans.position(a) + fans.position(b)));
-            check(&fans);
+            rings.split(&edge, 0.5 * (rings.position(a) + rings.position(b)));
+            check(&rings);
         }
-        assert_eq!((fans.mesh.positions.len(), fans.mesh.triangles.len()), (13, 22));
-        let touched = fans.take_touched();
-        assert!(touched.is_sorted() && touched.contains(&13) && fans.take_touched().is_empty());
+        assert_eq!((rings.mesh.positions.len(), rings.mesh.triangles.len()), (13, 22));
+        let touched = rings.take_touched();
+        assert!(touched.is_sorted() && touched.contains(&13) && rings.take_touched().is_empty());
         let mut flips = 0;
         for triangle in 0..22 {
-            let edge = fans.edge(ends(&fans, triangle)).unwrap();
-            if !fans.are_neighbours(edge.corners[2], edge.corners[3]) {
-                fans.flip(&edge);
-                assert_eq!([fans.corners(triangle), fans.corners(edge.triangles[1])], flipped(edge.corners));
+            let edge = rings.edge(ends(&rings, triangle)).unwrap();
+            if !rings.are_neighbours(edge.corners[2], edge.corners[3]) {
+                rings.flip(&edge);
+                assert_eq!(
+                    [rings.corners(triangle), rings.corners(edge.triangles[1])],
+                    flipped(edge.corners)
+                );
                 flips += 1;
             }
-            check(&fans);
+            check(&rings);
         }
         let mut joined = 0;
         for triangle in 0..22 {
-            let [to, from] = ends(&fans, triangle);
-            if fans.is_there(triangle) && fans.may_join(from, to) {
-                let (position, size) = (fans.position(to), fans.size(to));
-                fans.collapse(&Collapse { from, to, position, size });
+            let [to, from] = ends(&rings, triangle);
+            if rings.is_there(triangle) && rings.may_join(from, to) {
+                let (position, size) = (rings.position(to), rings.size(to));
+                rings.collapse(&Collapse { from, to, position, size });
                 joined += 1;
-                assert!(fans.edge([from, to]).is_none());
+                assert!(rings.edge([from, to]).is_none());
             }
-            check(&fans);
+            check(&rings);
         }
-        fans.finish();
+        rings.finish();
         assert!(flips > 3 && joined > 3, "{flips} {joined}");
         body.check();
         assert_eq!((body.positions.len(), body.triangles.len()), (13 - joined, 22 - 2 * joined));
@@ -441,28 +444,28 @@ mod tests {
     fn rings_go_around_and_sources_follow() {
         let mut body = cube();
         let mut mesh = body.improvable();
-        let mut fans = Fans::of(&mut mesh);
-        let (count, first) = (fans.around(0).len(), fans.ring(0)[0]);
-        let ring = fans.ring_from(0, first, 24).unwrap();
+        let mut rings = VertexRings::of(&mut mesh);
+        let (count, first) = (rings.around(0).len(), rings.ring(0)[0]);
+        let ring = rings.ring_from(0, first, 24).unwrap();
         assert_eq!((ring.len(), ring[0]), (count, first));
         for n in 0..count {
-            let edge = fans.edge([0, ring[n]]).unwrap();
+            let edge = rings.edge([0, ring[n]]).unwrap();
             assert_eq!(edge.corners[2], ring[(n + 1) % count]);
             assert_eq!(edge.corners[3], ring[(n + count - 1) % count]);
         }
-        assert!(fans.ring_from(0, first, count - 1).is_none());
-        let [a, b, _] = fans.corners(0);
-        let edge = fans.edge([a, b]).unwrap();
+        assert!(rings.ring_from(0, first, count - 1).is_none());
+        let [a, b, _] = rings.corners(0);
+        let edge = rings.edge([a, b]).unwrap();
         let other = edge.triangles[1];
-        fans.mesh.sources[other as usize] = Source::New;
-        fans.split(&edge, 0.5 * (fans.position(a) + fans.position(b)));
-        assert_eq!(fans.mesh.sources[12..], [Source::Part(0), Source::New]);
-        assert_eq!(fans.mesh.sources[0], Source::Part(0));
-        assert_eq!((fans.mesh.origins[8], fans.mesh.flags[8]), (None, false));
-        let inner = fans.edge([8, edge.corners[2]]).unwrap();
-        fans.flip(&inner);
+        rings.mesh.sources[other as usize] = Source::New;
+        rings.split(&edge, 0.5 * (rings.position(a) + rings.position(b)));
+        assert_eq!(rings.mesh.sources[12..], [Source::Part(0), Source::New]);
+        assert_eq!(rings.mesh.sources[0], Source::Part(0));
+        assert_eq!((rings.mesh.origins[8], rings.mesh.flags[8]), (None, false));
+        let inner = rings.edge([8, edge.corners[2]]).unwrap();
+        rings.flip(&inner);
         assert_eq!(
-            inner.triangles.map(|triangle| fans.mesh.sources[triangle as usize]),
+            inner.triangles.map(|triangle| rings.mesh.sources[triangle as usize]),
             [Source::Part(0); 2]
         );
     }
