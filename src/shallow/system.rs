@@ -60,7 +60,7 @@ pub struct Report {
     /// Rows, summed over steps, in which columns would have received more than they had room for (K_max below 1).
     pub filled: u64,
     /// Rows, summed over steps, in which films on slopes were too fast for the step length and were limited
-    /// ([`TimeStepping::Realtime`](super::params::Pace)).
+    /// ([`TimeStepping::Realtime`](super::params::TimeStepping)).
     pub slowed: u64,
 }
 

@@ -98,6 +98,8 @@ pub fn write(ctx: &Context, path: &Path, name: &str, points: &Points, options: &
 ///
 /// # Errors
 /// A file that is missing, empty, cut short or damaged; no such grid (the file's grids are named); numbers that are not finite.
+///
+/// [`Values`]: crate::geometry::points::Values
 pub fn read(path: &Path, name: Option<&str>) -> Result<Points> {
     match guard::of(path) {
         Some(guard) => guard.read_points(path, name),

@@ -14,7 +14,7 @@ pub struct Links {
     pub to: Vec<u32>,
     /// The side of the first column that each link crosses.
     pub(in crate::shallow) sides: Vec<Side>,
-    /// As [`Pipes::east`].
+    /// As [`Pipes::east`](super::Pipes::east).
     pub open: Vec<f32>,
     /// Surface outside (units), where `to` is [`NONE`].
     pub level: Vec<i32>,
