@@ -11,7 +11,7 @@ use super::scalars::amounts::Account;
 use super::solver::Flow;
 use super::solver::overflow_edges::OverflowEdges;
 use super::solver::stop::Stop;
-use super::solver::viscosity_by_scalar::Thick;
+use super::solver::thickening::Thick;
 use super::sources::{FlowPoint, Flows};
 use super::terrain::Solids;
 use super::terrain::identity::Identity;

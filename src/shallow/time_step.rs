@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 use super::columns::grid::TOP;
 use super::params::{Friction, Params, Section, TimeStepping};
 use super::solver::fast_films::FAST_WAVES;
-use super::solver::flux::{Step, Thinning};
 use super::solver::rest::Bounds;
+use super::solver::viscous_flux::{Step, Thinning};
 
 /// Steps are shorter than the stability limit by this factor.
 const SAFETY: f64 = 0.9;

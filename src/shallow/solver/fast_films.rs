@@ -9,7 +9,7 @@
 use std::ops::Range;
 
 use super::active::Active;
-use super::flux::{Step, max, min};
+use super::viscous_flux::{Step, max, min};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::per_column::{Array, PerColumn};
 use crate::shallow::columns::{NONE, STRIP, resize_part, strip_from, strip_of};

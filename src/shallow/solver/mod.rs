@@ -1,6 +1,6 @@
 //! The state of the liquid, and one step of it (thesis 4.1.2, Alg. 4.1).
 //!
-//! A step is one pass over the rows (`rows/`): fluxes (`flux.rs`, `fast_films.rs`, `links.rs`), their scaling (`transfers/scale.rs`) and
+//! A step is one pass over the rows (`rows/`): fluxes (`solver/viscous_flux.rs`, `fast_films.rs`, `link_step.rs`), their scaling (`transfers/scale.rs`) and
 //! transfers (`transfers/whole_units.rs`), on the strips that are wet or beside wet ones, unless these are at rest (`active.rs`,
 //! `rest.rs`), with one band of rows for each thread (`rows/bands.rs`, `rows/band_views.rs`). Columns that are full to their ceiling form a
 //! separate network, which is solved first (`pressurised/network.rs`, `pressurised/heads.rs`, `transfers/limiter.rs`); then lateral
@@ -8,18 +8,18 @@
 
 pub(super) mod active;
 pub mod fast_films;
-pub mod flux;
 mod full;
 pub(super) mod lateral_friction;
 mod link_flow;
-pub mod links;
+pub mod link_step;
 pub(super) mod overflow_edges;
 mod pressurised;
 pub mod rest;
 pub(in crate::shallow) mod rows;
 pub mod stop;
+pub(in crate::shallow) mod thickening;
 mod transfers;
-pub(in crate::shallow) mod viscosity_by_scalar;
+pub mod viscous_flux;
 
 use std::ops::Range;
 
@@ -33,7 +33,6 @@ pub(super) use crate::shallow::solver::full::SLACK;
 use crate::shallow::solver::link_flow::LinkFlow;
 use active::{Active, runs};
 use fast_films::{Fast, Films};
-use flux::Step;
 use lateral_friction::{Liquid, Walls};
 use overflow_edges::OverflowEdges;
 use pressurised::network::{Network, State};
@@ -42,6 +41,7 @@ use rows::Ground;
 use rows::band_views::Part;
 use rows::bands::Bands;
 use stop::Stop;
+use viscous_flux::Step;
 
 /// Depths and fluxes, by column index.
 #[derive(Debug, Clone)]

@@ -13,7 +13,7 @@ use crate::shallow::columns::{Columns, NONE};
 use crate::shallow::scalars::MOST;
 use crate::shallow::scalars::shares::level;
 use crate::shallow::solver::fast_films;
-use crate::shallow::solver::flux::{Kind, Of, Step, flux_of, split};
+use crate::shallow::solver::viscous_flux::{Kind, Of, Step, flux_of, split};
 use crate::shallow::time_step::Measures;
 use crate::shallow::{Shallow, time_step};
 

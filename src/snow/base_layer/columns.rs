@@ -8,8 +8,8 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::removed_volume;
-use super::removed_volume::filled;
+use super::voxel_fill;
+use super::voxel_fill::filled;
 use crate::error::Result;
 use crate::numeric::blocks::{BlockEdit, Mask, Origin, Values};
 use crate::vdb::{FloatGrid, Probe};
@@ -130,7 +130,7 @@ pub fn touched(initial: &FloatGrid, changed: &HashSet<Origin>, low: i32, high: i
 pub fn volume(surface: &FloatGrid, low: [i32; 3], high: [i32; 3]) -> Result<f64> {
     let cell = surface.voxel_size() as f32;
     let leaves = surface.leaves()?;
-    let parts: Vec<f64> = leaves.par_iter().map(|leaf| removed_volume::volume(leaf.values, cell)).collect();
+    let parts: Vec<f64> = leaves.par_iter().map(|leaf| voxel_fill::volume(leaf.values, cell)).collect();
     let mut cells: f64 = parts.iter().sum();
     // The bounding box of a stray leaf can contain too many blocks to visit one by one; the tree's tiles are few.
     for tile in surface.tiles()?.iter().filter(|tile| tile.value < 0.0) {

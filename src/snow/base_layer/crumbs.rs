@@ -8,9 +8,9 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use rayon::prelude::*;
 
 use super::columns::{CELLS, add_by_cell};
-use super::press;
-use super::press::{Edit, Scale};
-use super::removed_volume;
+use super::removal;
+use super::removal::{Edit, Scale};
+use super::voxel_fill;
 use crate::context::Context;
 use crate::error::Result;
 use crate::numeric::blocks::{BlockEdit, Mask, Origin, VOXELS, Values, offset};
@@ -247,17 +247,17 @@ fn clear(edit: &mut Edit, cleared: &BTreeMap<usize, f32>, scale: Scale) {
     let origin = edit.surface.origin();
     let mut after = values_of(Some(&edit.surface), scale);
     let mut removed = values_of(edit.removed.as_ref(), scale);
-    let were = removed_volume::parts(&after, scale.cell);
+    let were = voxel_fill::parts(&after, scale.cell);
     for (&index, &value) in cleared {
         let before = after[index];
         removed[index] = removed[index].min(before);
         after[index] = value;
         edit.changed[index >> 6] |= 1 << (index & 63);
     }
-    let are = removed_volume::parts(&after, scale.cell);
+    let are = voxel_fill::parts(&after, scale.cell);
     add_by_cell(&mut edit.heights, |index| were[index] - are[index]);
-    edit.surface = press::pack(origin, after, scale);
-    let removed = press::pack(origin, removed, scale);
+    edit.surface = removal::pack(origin, after, scale);
+    let removed = removal::pack(origin, removed, scale);
     edit.removed = (!matches!(removed, BlockEdit::Constant(_, value) if value > 0.0)).then_some(removed);
 }
 

@@ -9,20 +9,20 @@ mod grids;
 pub mod initial;
 mod marks;
 mod noise;
-mod press;
-pub(in crate::snow) mod removed_volume;
-mod state;
+mod removal;
+mod saved_state;
 mod sweep_region;
+pub(in crate::snow) mod voxel_fill;
 
 use std::borrow::Borrow;
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
 
-pub(in crate::snow) use crate::snow::base_layer::removed_volume::filled;
 pub use far_bodies::Reach;
 pub use grids::{Changes, Grids};
 pub use noise::displace;
+pub(in crate::snow) use voxel_fill::filled;
 
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
@@ -36,7 +36,7 @@ use crate::sweep::{
 use crate::vdb::{FloatGrid, GridClass, MetaValue, Probe, distances};
 use columns::Columns;
 use noise::Displacement;
-use press::{Edit, Scale};
+use removal::{Edit, Scale};
 use sweep_region::snow_masks;
 
 /// How objects press into the snow.
@@ -126,7 +126,7 @@ impl BaseLayer {
         let (low, high) = surface.active_bbox().ok_or_else(|| Error::argument("the snow is empty"))?;
         let (volume, initial) = ctx.phase("measure", || {
             let volume = known.map_or_else(|| columns::volume(&surface, low, high), Ok)?;
-            Ok((volume, state::fingerprint(&surface)?))
+            Ok((volume, saved_state::fingerprint(&surface)?))
         })?;
         let grids = Grids::new(surface, volume)?;
         let changes = Changes::none(&grids, half_width)?;
@@ -350,8 +350,9 @@ impl BaseLayer {
             })
             .collect::<Result<_>>()?;
         let band = Band { inside: self.half_width, outside };
-        let snowy =
-            |origins: &[Origin]| Ok(self.grids.surface.probe(origins)?.iter().map(press::has_snow).collect());
+        let snowy = |origins: &[Origin]| {
+            Ok(self.grids.surface.probe(origins)?.iter().map(removal::has_snow).collect())
+        };
         let bounds = [relative(self.low, 0), relative(self.high, 0)];
         Voxeliser::new(ctx, parts.concat(), lattice, band, bounds, snowy)
     }
@@ -406,7 +407,7 @@ impl BaseLayer {
             .zip(&snow)
             .filter_map(|(piece, snow)| {
                 ctx.advance();
-                if ctx.check().is_err() { None } else { press::subtract(piece, snow, scale) }
+                if ctx.check().is_err() { None } else { removal::subtract(piece, snow, scale) }
             })
             .collect())
     }

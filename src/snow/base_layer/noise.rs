@@ -9,8 +9,8 @@ use std::collections::HashMap;
 use fastnoise_lite::{FastNoiseLite, NoiseType};
 use rayon::prelude::*;
 
-use super::press;
-use super::press::Scale;
+use super::removal;
+use super::removal::Scale;
 use crate::context::Context;
 use crate::error::Result;
 use crate::numeric::blocks::{Block, BlockEdit, Origin, Values, offset};
@@ -121,7 +121,7 @@ pub fn displace(ctx: &Context, grid: &mut FloatGrid, params: &NoiseParams) -> Re
     let edits: Vec<BlockEdit> = pieces
         .into_iter()
         .filter_map(|piece| match piece {
-            Piece::Near(origin, cells) => Some(press::from_cells(origin, cells, scale)),
+            Piece::Near(origin, cells) => Some(removal::from_cells(origin, cells, scale)),
             Piece::Inside(_) => None,
         })
         .collect();

@@ -45,8 +45,8 @@ use params::Division;
 use solver::layout::locate;
 use surroundings::{Bounds, Obstacles, TIES, have_stayed};
 
-pub use crate::snow::grains::birth::removal::{Base, Removal, removals};
 pub use crate::snow::grains::heap::Start;
+pub use birth::removed_snow::{Base, Removal, removals};
 pub use birth::sourcing::PACKING;
 pub use colliders::ground::Ground;
 pub use params::Params;

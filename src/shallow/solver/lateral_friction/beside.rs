@@ -6,7 +6,7 @@
 
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_mut, strip_of};
-use crate::shallow::solver::flux::{Step, max, min};
+use crate::shallow::solver::viscous_flux::{Step, max, min};
 
 /// Walls are ignored beside films thinner than `THIN` times a cell's edge, and count fully beside liquid deeper than `THICK` times it: a
 /// wall beside a film of `THIN` reduces the flow in the adjacent pipe by (2/5)^1/2 `THIN`, or 4 %.

@@ -4,9 +4,9 @@
 use super::Walls;
 use super::beside::{self, Room};
 use crate::shallow::columns::{Columns, NONE, STRIP};
-use crate::shallow::solver::flux::{Step, min};
 use crate::shallow::solver::pressurised::edges::At;
 use crate::shallow::solver::pressurised::network::State;
+use crate::shallow::solver::viscous_flux::{Step, min};
 
 /// Friction of a pipe.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -13,8 +13,8 @@ use super::{Liquid, spread, within};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_from, strip_mut, strip_of};
 use crate::shallow::solver::fast_films::NORMAL;
-use crate::shallow::solver::flux::{Step, max, min, unpacked};
 use crate::shallow::solver::pressurised::network::Network;
+use crate::shallow::solver::viscous_flux::{Step, max, min, unpacked};
 
 /// Maximum reductions: a pipe is coupled to all within 16 cells.
 const MOST: usize = 4;

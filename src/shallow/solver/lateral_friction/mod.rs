@@ -24,8 +24,8 @@ use std::ops::Range;
 
 use super::active::Active;
 use super::fast_films::Fast;
-use super::flux::Step;
 use super::pressurised::network::Network;
+use super::viscous_flux::Step;
 use crate::shallow::columns::grid::TOP;
 use crate::shallow::columns::{Columns, STRIP, strip_of};
 use crate::shallow::pipes::{Links, Pipes};

@@ -13,7 +13,6 @@ use super::nodes::{EQUAL, Node, section};
 use crate::shallow::columns::per_column::{Array, PerColumn};
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_mut, strip_of};
 use crate::shallow::pipes::Pipes;
-use crate::shallow::solver::flux::Step;
 use crate::shallow::solver::full::full_of;
 use crate::shallow::solver::lateral_friction::Walls;
 use crate::shallow::solver::link_flow::LinkFlow;
@@ -22,6 +21,7 @@ use crate::shallow::solver::rows::filling::Filling;
 use crate::shallow::solver::stop::Stop;
 use crate::shallow::solver::transfers::limiter;
 use crate::shallow::solver::transfers::limiter::Party;
+use crate::shallow::solver::viscous_flux::Step;
 
 /// Columns of a network for which capacity is reserved from the beginning.
 const ROOM: usize = 1024;

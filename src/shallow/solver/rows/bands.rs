@@ -8,9 +8,9 @@ use super::buffers::Rows;
 use super::filling::Filling;
 use super::{Ground, Stepped};
 use crate::shallow::columns::{Columns, STRIP, strip_of};
-use crate::shallow::solver::flux::Step;
 use crate::shallow::solver::full::SLACK;
 use crate::shallow::solver::transfers::scale;
+use crate::shallow::solver::viscous_flux::Step;
 
 /// Minimum columns for a step to be divided among threads: below, starting them takes longer than they save.
 pub const LEAST_COLUMNS: usize = 100_000;

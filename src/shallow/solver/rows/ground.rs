@@ -8,7 +8,7 @@ use crate::shallow::scalars::amounts::{Act, Changes};
 use crate::shallow::solver::active::Active;
 use crate::shallow::solver::fast_films::Fast;
 use crate::shallow::solver::lateral_friction::Walls;
-use crate::shallow::solver::links::{Outside, indices_of};
+use crate::shallow::solver::link_step::{Outside, indices_of};
 use crate::shallow::solver::overflow_edges::OverflowEdges;
 use crate::shallow::solver::pressurised::network::Network;
 

@@ -13,11 +13,11 @@ pub(in crate::shallow::solver) mod filling;
 mod ground;
 pub(in crate::shallow::solver) mod positions;
 
-use super::flux::{Carried, Kind, Of, Row, Step, flux_row, max, solved_row};
-use super::links::{Outside, indices_of};
+use super::link_step::{Outside, indices_of};
 use super::transfers::inflow_limit::most_through_links;
 use super::transfers::scale;
 use super::transfers::whole_units::{find_woken, move_units};
+use super::viscous_flux::{Carried, Kind, Of, Row, Step, flux_row, max, solved_row};
 use crate::numeric::cpu::dispatch;
 use crate::shallow::columns::{NONE, STRIP};
 use crate::shallow::scalars::MOST;

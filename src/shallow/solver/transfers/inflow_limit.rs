@@ -2,11 +2,11 @@
 //! from the unscaled sums of inflow.
 
 use super::scale;
-use crate::shallow::solver::flux::{max, min};
 use crate::shallow::solver::rows::band_views::Parts;
 use crate::shallow::solver::rows::buffers::{RING, Rows};
 use crate::shallow::solver::rows::positions::Place;
 use crate::shallow::solver::rows::{Ground, each_link};
+use crate::shallow::solver::viscous_flux::{max, min};
 
 impl Rows {
     /// K_max of a row's columns, as if nothing flowed out; returns whether any is not 1.

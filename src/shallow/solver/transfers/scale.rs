@@ -5,7 +5,7 @@
 //! it is safe after each.
 
 use crate::shallow::columns::{STRIP, strip_from, strip_mut, strip_of};
-use crate::shallow::solver::flux::{max, min};
+use crate::shallow::solver::viscous_flux::{max, min};
 
 /// Factor on depths and room: sums of four or more rounded transfers then stay within them.
 pub const MARGIN: f32 = 1.0 - 1.0 / (1u32 << 20) as f32;

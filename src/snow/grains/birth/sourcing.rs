@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::claims::Claims;
-use super::removal::Removal;
+use super::removed_snow::Removal;
 use crate::error::Result;
 use crate::geometry::DVec3;
 use crate::numeric::blocks::{DIM, Origin, VOXELS};

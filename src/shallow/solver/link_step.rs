@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use super::fast_films;
-use super::flux::{Kind, Step, flux_of, min, split};
 use super::link_flow::beyond;
 use super::overflow_edges::{Fall, OverflowEdges, edge};
 use super::rows::band_views::LinkPart;
+use super::viscous_flux::{Kind, Step, flux_of, min, split};
 use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::pipes::Links;
 

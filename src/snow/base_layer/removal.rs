@@ -1,11 +1,11 @@
-//! Pressing a sweep into the snow, block by block: snow = max(snow, -sweep), removed = max(snow, sweep).
+//! Removes a sweep from the snow, block by block: snow = max(snow, -sweep), removed = max(snow, sweep).
 //!
 //! The intersection is taken before the subtraction: base(t) minus base(t + dt) would leave a ghost surface of zero thickness wherever
 //! nothing moved.
 
 use super::columns::{CELLS, add_by_cell};
-use super::removed_volume;
-use super::removed_volume::filled;
+use super::voxel_fill;
+use super::voxel_fill::filled;
 use crate::numeric::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::sweep::Piece;
 use crate::vdb::Probe;
@@ -68,7 +68,7 @@ fn remove_all(origin: Origin, before: &Values, mask: Mask, snow: &Probe<'_>, sca
         Probe::Tile { .. } => BlockEdit::Constant(origin, -scale.background),
     };
     let mut heights = [0.0; CELLS];
-    let were = removed_volume::parts(before, scale.cell);
+    let were = voxel_fill::parts(before, scale.cell);
     add_by_cell(&mut heights, |index| were[index]);
     Edit {
         surface: BlockEdit::Constant(origin, scale.background),
@@ -101,7 +101,7 @@ fn remove_part(origin: Origin, before: &Values, cells: &Values, scale: Scale) ->
     if changed == [0; 8] {
         return None;
     }
-    let (were, are) = (removed_volume::parts(before, scale.cell), removed_volume::parts(&after, scale.cell));
+    let (were, are) = (voxel_fill::parts(before, scale.cell), voxel_fill::parts(&after, scale.cell));
     add_by_cell(&mut heights, |index| were[index] - are[index]);
     let removed = pack(origin, removed, scale);
     let outside = matches!(removed, BlockEdit::Constant(_, value) if value > 0.0);
@@ -118,7 +118,7 @@ const ALONG: f32 = 0.9;
 
 /// Whether the snow and a sweep face the same way at a voxel.
 fn is_along(snow: &Values, sweep: &Values, index: usize) -> bool {
-    let (one, other) = (removed_volume::direction(snow, index), removed_volume::direction(sweep, index));
+    let (one, other) = (voxel_fill::direction(snow, index), voxel_fill::direction(sweep, index));
     one.zip(other).is_some_and(|([a, b, c], [d, e, f])| a * d + b * e + c * f > ALONG)
 }
 

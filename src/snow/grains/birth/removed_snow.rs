@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::context::Context;
 use crate::error::Result;
 use crate::numeric::blocks::{BlockEdit, DIM, Origin, VOXELS};
-use crate::snow::base_layer::{filled, removed_volume};
+use crate::snow::base_layer::{filled, voxel_fill};
 use crate::vdb::{FloatGrid, Probe};
 
 /// Snow that a step removed from a block.
@@ -61,7 +61,7 @@ pub(in crate::snow::grains::birth) fn volumes(
 /// Volume (cells) that a block lost.
 pub(in crate::snow::grains::birth) fn lost(old: &Probe<'_>, new: &Probe<'_>, cell: f32) -> f64 {
     let volume = |probe: &Probe<'_>| match probe {
-        Probe::Leaf(leaf) => removed_volume::volume(leaf.values, cell),
+        Probe::Leaf(leaf) => voxel_fill::volume(leaf.values, cell),
         Probe::Tile { value, .. } => f64::from(filled(*value, cell)) * VOXELS as f64,
     };
     match (old, new) {
