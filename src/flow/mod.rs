@@ -147,7 +147,7 @@ impl Flow {
         self.tiles = tiles;
     }
 
-    /// Takes the velocity at faces of its tiles from the surrounding air, except for faces that bound an active cell of a set.
+    /// Sets the velocity at the faces of `tiles` from the surrounding air, except at faces of cells that are active in `set`.
     fn read_around(&mut self, tiles: &Tiles, set: &Tiles) {
         let Some(around) = &self.around else { return };
         for axis in 0..3 {

@@ -1,5 +1,5 @@
-//! Scene files (TOML): they describe a shot, are read with every default filled in ([`Scene::read`], `schema/`, `systems/`), checked against their
-//! inputs and run frame by frame.
+//! Scene files (TOML): they describe a shot, are read with every default filled in ([`Scene::read`], `schema/`, `systems/`), checked
+//! against their inputs and run frame by frame.
 //!
 //! [`run`] runs any stage; [`snow`], [`surface`] and [`shallow`] have the inputs, the check and the stages of a system; the stage `objects`
 //! writes the objects as they move. A new stage is a type with the traits [`run::Stage`] and [`run::Stepping`] beside its system, listed in
@@ -105,7 +105,7 @@ pub struct Shot {
 /// The layer of snow before the first frame, and how it is edited.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snow {
-    /// What the snow lies on; optional if `layer` is a .vdb, where only grains lie on it.
+    /// What the snow lies on. Optional if `layer` is a .vdb file; then only grains lie on it.
     pub ground: Option<Ground>,
     /// How the layer is given.
     pub layer: Layer,
@@ -149,7 +149,7 @@ pub enum Layer {
 pub struct Object {
     /// A glTF character, a mesh file, or the pattern of a sequence of them (`body.%04d.obj`).
     pub file: PathBuf,
-    /// For a character: only the nodes of this name (`*` matches any letters) and their descendants.
+    /// For a character: only the nodes of this name (`*` matches any characters, `?` exactly one) and their descendants.
     pub node: Option<String>,
     /// The character's clip; `None`: its only one.
     pub clip: Option<String>,

@@ -98,7 +98,7 @@ impl Shallow {
         Self::beside(ctx, solids, params, None)
     }
 
-    /// As [`Shallow::new`], beside cells that belong to another liquid.
+    /// As [`Shallow::new`], but without the cells that belong to another liquid.
     pub(super) fn beside(
         ctx: &Context,
         solids: &Solids,

@@ -29,7 +29,7 @@ pub struct Tracker {
     pub(super) detail_retention: Vec<f32>,
     /// Vertices where the last step found a change.
     pub(super) flags: Vec<bool>,
-    /// Vertices beside which the mesh has not covered the surface since the first frame: that is no change.
+    /// Vertices beside which the mesh has never covered the surface, since the first frame: this is not reported as a change.
     pub(super) bare: Vec<bool>,
     /// Distance from the surface up to which distances are known (r).
     pub(super) reach: f64,

@@ -31,13 +31,13 @@ use crate::error::{Error, Result};
 use crate::geometry::check::topology::Topology;
 use crate::geometry::{DVec3, TriMesh};
 
-/// Successive reaches of the band around vertices that do not find the surface at the first frame (r).
+/// How far the band reaches (r), tried one after the other at the first frame, around vertices that have not found the surface.
 const TRIES: [f64; 2] = [5.0, REACH[1]];
 
-/// Share of the vertices that determines the reach: a spike does not widen the band everywhere.
+/// The reach covers the distance of this fraction of the vertices, so that a spike does not widen the band everywhere.
 const MOST: f64 = 0.999;
-/// If the share `MOST` would need a reach over this (r), the share `OFTEN` determines it instead, with this as the minimum; around the
-/// remaining vertices the band is widened locally.
+/// If `MOST` would need a reach above `WIDE` (r), the reach is what `OFTEN` needs, but at least `WIDE`; around the remaining vertices the
+/// band is widened locally.
 const WIDE: f64 = 2.5;
 const OFTEN: f64 = 0.95;
 /// Minimum displacement of a vertex by projection (r): anything less is rounding.
@@ -227,7 +227,8 @@ impl Tracker {
         Ok(report)
     }
 
-    /// The particles' surface that the mesh does not cover: whole parts, and the vertices beside other uncovered positions.
+    /// What the mesh does not cover of the particles' surface: whole uncovered parts, and the vertices beside uncovered positions of other
+    /// parts.
     fn cover(
         &self,
         ctx: &Context,

@@ -40,7 +40,7 @@ pub use moving_mesh::body::{Body, Shape};
 #[cfg(feature = "vdb")]
 pub use samples::{SamplesSettings, samples};
 
-// For the rooms above, tests and benchmarks.
+// For the modules that depend on this one, tests and benchmarks.
 #[doc(hidden)]
 pub use crate::distance::Face;
 pub use crate::distance::lattice::{Fixed, Lattice, UNITS};

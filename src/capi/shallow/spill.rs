@@ -17,7 +17,7 @@ use crate::shallow::terrain::Solids;
 use crate::shallow::terrain::shapes::Shape;
 use crate::shallow::{Load, Params, Shallow};
 
-/// A small amount of liquid on a ground: blood, coffee or paint in a fraction of a frame.
+/// A small amount of liquid on the ground (blood, coffee or paint), computed in a fraction of a frame's time.
 ///
 /// In real time: calls that a host makes in each frame follow stricter rules than all others. These calls are frz_shallow_step, _replay,
 /// _update_terrain, _update_heights, _set_bodies, _loads, _save, _restore, _surface, _find_lifts, _find_ledges, _drops, _drops_mesh,
@@ -26,10 +26,11 @@ use crate::shallow::{Load, Params, Shallow};
 /// system call except to read the thread's clock when a step has a budget. Memory grows only when more is needed than ever before, for
 /// instance more columns because a body uncovers another layer; failing calls may allocate too.
 ///
-/// A cancel takes effect at the beginning of such a call, and also during a frame that may take long: one with exact steps, with over some
-/// two million columns times steps, or with many full columns. Such a frame first copies what it changes, so that a cancel leaves the
-/// liquid as it was. None of these calls has phases, which all other work has: frz_context_progress and frz_context_timings do not see
-/// them. Phases take locks and memory, and a poll between them may take longer than the few milliseconds of a frame.
+/// A cancel takes effect at the beginning of such a call, and also during a frame that may take long: one with exact steps, one whose
+/// columns times its steps exceed about two million, or one with many full columns. Such a frame first copies what it changes, so that a
+/// cancel leaves the liquid as it was. None of these calls has phases, which all other work has: frz_context_progress and
+/// frz_context_timings do not see them. Phases take locks and memory, and a poll between them may take longer than the few milliseconds of
+/// a frame.
 pub struct frz_shallow {
     _opaque: [u8; 0],
 }

@@ -117,7 +117,8 @@ impl<'a> Run<'a> {
         Ok(run)
     }
 
-    /// Refuses frames whose upstream frames, or those of a frame that must be stepped through, neither exist nor will be made.
+    /// Refuses to make a frame if an upstream frame that it needs, or that a frame on the way to it from the state that is resumed needs,
+    /// neither exists nor will be made.
     fn refuse_missing(
         &self,
         stage: &dyn Stage,
@@ -144,7 +145,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// The frames of a stage's upstream stages as they are now, in its order, except those that this run will make again.
+    /// The existing frames of a stage's upstream stages, in the order in which the stage lists them, except frames that this run will make
+    /// again.
     fn upstream(&self, stage: &dyn Stage, folder: &Path) -> Result<Vec<Stored>> {
         let of = |name: &&str| {
             let mut stored = Stored::read(folder, name)?;

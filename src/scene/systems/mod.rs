@@ -23,7 +23,7 @@ mod tests {
     const TEXT: &str =
         "[shot]\nframes = \"1-2\"\n[snow]\nground = 0\narea = [0, 0, 1, 1]\ndepth = 0.2\ncell = 0.01\n";
 
-    /// All keys and a new one, declared here and nowhere else.
+    /// All keys of snow and a new one, which is declared only here.
     fn with_a_new_key() -> &'static [Key] {
         let new = Key::new("snow", "glitter", Kind::Number(0.0, 2.0, "m"), "how far it can be seen")
             .or("0.5")

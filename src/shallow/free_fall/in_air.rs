@@ -10,7 +10,7 @@ use super::waiting::Waiting;
 use crate::shallow::columns::resize_part;
 use crate::shallow::scalars::shares::MOST;
 
-/// Capacity for landings: columns for each packet.
+/// Capacity of the list of landings: this many columns for each packet.
 pub(in crate::shallow::free_fall) const SPLASHES: usize = 4;
 
 /// All liquid in the air.
@@ -58,7 +58,7 @@ impl Falling {
         &self.waiting
     }
 
-    /// Restores what [`Falling::packets`] and [`Falling::waiting`] returned; the links must be as many.
+    /// Restores what [`Falling::packets`] and [`Falling::waiting`] returned; the number of links must be the same as then.
     pub fn set(&mut self, packets: impl Iterator<Item = Packet>, waiting: impl Iterator<Item = Waiting>) {
         self.packets.clear();
         self.packets.extend(packets);

@@ -38,7 +38,8 @@ impl Pipes {
         Self::with_rules(columns, Rules::bordered(border))
     }
 
-    /// As [`Pipes::new`], but pipes over cliffs are links, and steps may be walls.
+    /// As [`Pipes::new`], but with these rules: pipes over cliffs are links, and where the ground beside a column rises steeply it is a
+    /// wall (`Rules::steepest`).
     pub(super) fn with_rules(columns: &Columns, rules: Rules) -> Self {
         let mut pipes = Self {
             east: PerColumn::new(Array::OpenEast, columns.len(), 0.0),

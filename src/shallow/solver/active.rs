@@ -221,7 +221,7 @@ impl Active {
         self.asleep_depths[row]
     }
 
-    /// Makes the strips of some runs active, which are in order, and otherwise only those beside liquid.
+    /// Makes the strips of `runs` (in ascending order) active, and besides them only strips beside liquid.
     pub(super) fn reset(
         &mut self,
         columns: &Columns,

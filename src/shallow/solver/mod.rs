@@ -1,10 +1,10 @@
 //! The state of the liquid, and one step of it (thesis 4.1.2, Alg. 4.1).
 //!
-//! A step is one pass over the rows (`rows/`): fluxes (`solver/viscous_flux.rs`, `fast_films.rs`, `link_step.rs`), their scaling (`transfers/scale.rs`) and
-//! transfers (`transfers/whole_units.rs`), on the strips that are wet or beside wet ones, unless these are at rest (`active.rs`,
-//! `rest.rs`), with one band of rows for each thread (`rows/bands.rs`, `rows/band_views.rs`). Columns that are full to their ceiling form a
-//! separate network, which is solved first (`pressurised/network.rs`, `pressurised/heads.rs`, `transfers/limiter.rs`); then lateral
-//! friction, if enabled (`lateral_friction/`). Scalars follow transfers (`transfers/scalars.rs`).
+//! A step is one pass over the rows (`rows/`): fluxes (`solver/viscous_flux.rs`, `fast_films.rs`, `link_step.rs`), their scaling
+//! (`transfers/scale.rs`) and transfers (`transfers/whole_units.rs`), on the strips that are wet or beside wet ones, unless these are at
+//! rest (`active.rs`, `rest.rs`), with one band of rows for each thread (`rows/bands.rs`, `rows/band_views.rs`). Columns that are full to
+//! their ceiling form a separate network, which is solved first (`pressurised/network.rs`, `pressurised/heads.rs`, `transfers/limiter.rs`);
+//! then lateral friction, if enabled (`lateral_friction/`). Scalars follow transfers (`transfers/scalars.rs`).
 
 pub(super) mod active;
 pub mod fast_films;
@@ -64,7 +64,7 @@ pub struct Flow {
     pub(super) walls: Walls,
     /// Amounts of scalars.
     pub(super) amounts: Amounts,
-    /// Whether nothing sleeps, for comparison.
+    /// Whether sleeping is disabled, to compare results with and without it.
     is_sleepless: bool,
 }
 
@@ -78,7 +78,7 @@ pub(super) struct Stored<'a> {
     pub numbers: [&'a mut [f32]; 4],
     /// As [`Flow::heads`].
     pub heads: &'a mut [f32],
-    /// Including upper bounds of the depths of rows.
+    /// The bands of rows, with an upper bound of the depth in each row.
     pub bands: &'a mut Bands,
     /// Flow through links.
     pub links: &'a mut LinkFlow,
@@ -89,7 +89,7 @@ pub(super) struct Stored<'a> {
 }
 
 impl Stored<'_> {
-    /// Clears the active strips of a range; others are empty.
+    /// Clears the active strips of a range; inactive ones are already empty.
     pub fn clear(&mut self, strips: std::ops::Range<usize>) {
         let first = strips.start;
         for run in runs(&self.active[strips]) {
@@ -106,7 +106,7 @@ impl Stored<'_> {
 }
 
 impl Flow {
-    /// Flow in dry columns.
+    /// The initial state: all columns dry, no flow.
     pub fn new(columns: &Columns, pipes: &Pipes) -> Self {
         let none = |array| PerColumn::new(array, columns.len(), 0.0);
         Self {
@@ -183,8 +183,8 @@ impl Flow {
         }
     }
 
-    /// Makes the strips of some runs active, which are in order, and otherwise only those beside liquid: call it after changing what is
-    /// [`Stored`].
+    /// Makes the strips of `runs` (in ascending order) active, and besides them only strips beside liquid. Call it after changing what
+    /// [`Stored`] refers to.
     pub(super) fn wake(
         &mut self,
         columns: &Columns,
@@ -237,7 +237,7 @@ impl Flow {
         after - before
     }
 
-    /// Changes the count of indices of a part of the columns; their contents are then unspecified.
+    /// Changes the number of indices in the range `part` to `len`; the values in this range are then unspecified.
     pub(super) fn resize_part(&mut self, part: Range<usize>, len: usize) {
         self.depth.resize_part(part.clone(), len, 0);
         for numbers in self.flux.iter_mut().chain(&mut self.left) {
@@ -248,7 +248,7 @@ impl Flow {
         self.network.resize_part(part, len);
     }
 
-    /// Updates what depends on the columns of some rows, and on the links unless these join the same columns.
+    /// Updates what depends on the columns of `rows`, and, unless the links join the same columns as before, what depends on the links.
     pub(super) fn refit(
         &mut self,
         columns: &Columns,
@@ -389,7 +389,7 @@ impl Flow {
         scaled
     }
 
-    /// Divides steps among so many threads, if that is faster; returns whether it is.
+    /// Divides steps among this many threads, if that is faster; returns whether it is.
     pub fn divide(&mut self, columns: &Columns, threads: usize) -> bool {
         self.bands.divide(columns, threads);
         self.bands.are_several()

@@ -9,7 +9,7 @@ use crate::shallow::columns::{STRIP, strip_from, strip_mut, strip_of};
 /// The coefficients of a step that all pipes share.
 #[derive(Debug, Clone, Copy)]
 pub struct Step {
-    /// zeta = omega^dt, times the ratio of this step to the last one, which stored fluxes refer to.
+    /// zeta = omega^dt, times the length of this step over that of the last one: stored fluxes are per last step.
     pub kept: f32,
     /// dt^2 g unit / dx^2 (1 / units).
     pub drive: f32,
@@ -18,9 +18,9 @@ pub struct Step {
     /// [`FAST_WAVES`](super::fast_films::FAST_WAVES) divided by `drive` (units). Divided by a depth: the factor by which the
     /// inertia of a fast film is reduced.
     pub lighter: f32,
-    /// The maximum transfer of a pipe of a fast film in a step, as part of a column's depth.
+    /// The maximum transfer of a pipe of a fast film in a step, as a fraction of the donor's depth.
     pub fastest: f32,
-    /// Maximum depth in the section A (units), for stability; for whole sections, as in the thesis, this is dx.
+    /// Upper limit of H in the section A = dx H (units), for stability; with whole sections (A = dx^2, as in the thesis) it is dx.
     pub section: f32,
     /// Whether all sections are dx^2.
     pub is_whole: bool,
@@ -40,14 +40,16 @@ pub struct Step {
     pub cell: f32,
     /// Maximum surface difference (units) at which the liquid in a pipe comes to rest.
     pub level: i32,
-    /// Maximum flux at which it does, as part of the depth in its section: below both limits no motion is visible.
+    /// Maximum flux at which the liquid in a pipe comes to rest, as a fraction of the depth in its section. Below this and `level` no
+    /// motion is visible.
     pub slow: f32,
 }
 
 /// Carreau's law, as a function of a flux and the donor's depth.
 #[derive(Debug, Clone, Copy)]
 pub struct Thinning {
-    /// 3 lambda dx / (dt unit), with the step that fluxes refer to: times flux / depth^2 it is lambda times the shear rate at the ground.
+    /// 3 lambda dx / (dt unit), where dt is the step that fluxes are per: multiplied by flux / depth^2, it gives lambda times the shear
+    /// rate at the ground.
     pub shear: f32,
     /// The minimum viscosity, as part of that at rest.
     pub thinnest: f32,
@@ -65,7 +67,7 @@ pub trait Kind {
     const THINS: bool;
 }
 
-/// A variant: viscous, with whole sections, shear-thinning, or not.
+/// A variant, by three independent flags: viscous or not, whole sections or not, shear-thinning or not.
 pub struct Of<const VISCOUS: bool, const WHOLE: bool, const THINS: bool>;
 
 impl<const VISCOUS: bool, const WHOLE: bool, const THINS: bool> Kind for Of<VISCOUS, WHOLE, THINS> {
@@ -146,7 +148,7 @@ impl Step {
     }
 }
 
-/// x^p for x from 1 and p from -1/2 to 0, to a relative 1e-5; the same on every processor, and vectorisable.
+/// x^p for x >= 1 and -1/2 <= p <= 0, with a relative error of about 1e-5; the same on every processor, and vectorisable.
 #[inline(always)]
 fn power(x: f32, p: f32) -> f32 {
     const MANTISSA: u32 = 0x7f_ffff;

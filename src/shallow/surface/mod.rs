@@ -9,7 +9,7 @@
 //! | room | [min, max) of a column: from the underside of its solid to its ceiling; the rooms of a cell do not overlap |
 //! | linked | two columns of neighbouring cells (8), one of them wet, where each one's room holds the other's height |
 //! | quartet | the columns of 2 x 2 cells, named by the north-west cell (minimum x and z) |
-//! | group | four columns of a quartet, or three that are not part of such four, in which every pair with a wet column is linked |
+//! | group | four columns of a quartet in which every pair that includes a wet column is linked; or three such columns, if they are not part of a group of four |
 //! | full | a quartet whose four columns on a layer are a group is full on this layer |
 //! | odd | a quartet with a wet column that is in no full group; it is searched for groups column by column |
 //! | wall | a column at whose solid a neighbour's surface ends, below the neighbour's ceiling |
@@ -52,7 +52,8 @@ pub use self_check::{Check, check};
 /// Builds surfaces; reuses its memory.
 #[derive(Debug, Default)]
 pub struct Surface {
-    /// For each strip, the one above it, in the columns of the last call of `reserve` or of the first call.
+    /// For each strip, the strip above it, in the columns given to the last `reserve`, or, if there was none, to the first call that needed
+    /// it.
     above: Vec<u32>,
     found: Found,
     walls: Walls,
@@ -60,7 +61,7 @@ pub struct Surface {
     search: Search,
     normals: Normals,
     around: Around,
-    /// Height of each index as shown (units).
+    /// Height (units) at which each index is drawn: see `heights/shown.rs`.
     heights: Vec<i32>,
 }
 

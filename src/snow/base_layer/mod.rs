@@ -163,8 +163,8 @@ impl BaseLayer {
         Ok(())
     }
 
-    /// From the next step on, removes islands with fewer voxels than this, crumbs of ragged edges and thin walls, where a step changed the
-    /// snow. Initially 0: all islands stay.
+    /// From the next step on, removes islands with fewer voxels than this (crumbs left by ragged edges and thin walls) where a step changed
+    /// the snow. Initially 0: all islands stay.
     pub fn set_min_crumb(&mut self, voxels: usize) {
         self.min_crumb = voxels;
     }
@@ -197,7 +197,7 @@ impl BaseLayer {
     /// When memory runs out.
     pub fn take_changes(&mut self) -> Result<Changes> {
         let none = Changes::none(&self.grids, self.half_width)?;
-        // A caller that takes the changes has the grids before them.
+        // A caller that takes the changes has the grids as they were before the step.
         Ok(Changes { before: Vec::new(), ..std::mem::replace(&mut self.changes, none) })
     }
 

@@ -27,8 +27,8 @@ pub use sources::{Source, Start};
 #[cfg(feature = "vdb")]
 pub use surroundings::{Surroundings, Walls};
 
-/// Share of the faces whose air may be faster than a sub-step allows, because it is pressed through gaps as narrow as a cell: its path is
-/// then clamped to [`FARTHEST`] cells. Otherwise a dozen such cells among two million would nearly double the sub-steps of a sleigh's mist.
+/// Fraction of the faces at which air may be too fast for a sub-step; such air is pressed through gaps as narrow as a cell, and its path is
+/// clamped to [`FARTHEST`] cells. Otherwise a dozen such cells among two million would nearly double the sub-steps of a sleigh's mist.
 const JETS: f64 = 1.0e-4;
 /// Density below which there is no mist.
 pub const LEAST: f32 = 2.0e-3;
@@ -228,7 +228,8 @@ impl Mist {
         let speeds = around.sources.iter().map(Source::fastest);
         let fastest = speeds.fold(self.bulk(), |most, speed| most.max(speed));
         let speed = f64::from(fastest).max(around.fastest) + self.params.gravity.abs() * dt;
-        // Integer divisions of the longest sub-steps, so that frames of other lengths have the same sub-steps.
+        // Each of the longest sub-steps is divided into the same whole number of parts, so that frames of other lengths have the same
+        // sub-steps.
         let least = ((dt / LONGEST * (1.0 - 1.0e-9)).ceil() as usize).clamp(1, MOST);
         Ok(self.parts(speed, dt)?.div_ceil(least) * least)
     }
@@ -250,7 +251,7 @@ impl Mist {
         Ok((count as usize).max(1))
     }
 
-    /// Adds the mist that grains raise along a part, two shares 0..=1, of their paths in a step of `dt` (s).
+    /// Adds the mist that grains raise in a step of `dt` (s) along the part of their paths between two fractions (0..=1) of the step.
     fn raise(&mut self, ctx: &Context, sources: &[Source], dt: f64, shares: [f64; 2]) -> Result<()> {
         let ways = sources::ways(sources, &self.params, dt, shares);
         let seeds = sources::seeds(ctx, &ways, &self.params)?;

@@ -43,7 +43,8 @@ pub struct Change {
     pub origins: Vec<Option<u32>>,
     /// For each triangle, where it comes from.
     pub sources: Vec<Source>,
-    /// Positions (m) to which the step took the vertices before the change; after several steps, of the first step that changed the mesh.
+    /// Positions (m), after the step's motion, of the vertices that existed before the change. For several steps combined, those of the
+    /// first step that changed the mesh.
     pub before: Vec<DVec3>,
     /// For each new vertex, its signed distance from the particles' surface (m); after several steps, in the last.
     pub delta: Vec<f32>,
@@ -114,7 +115,7 @@ impl Change {
         (0..).zip(sums).map(mean).collect()
     }
 
-    /// Count of new triangles, including parts of others.
+    /// Count of triangles that are not unchanged old ones: new ones, and parts of old ones.
     pub fn made_triangles(&self) -> usize {
         self.sources.iter().filter(|source| !matches!(source, Source::Whole(_))).count()
     }

@@ -181,7 +181,7 @@ impl Guard {
             .args([COMMAND, PROTOCOL, &limits.memory.to_string(), &limits.seconds.to_string()])
             .args(wanted.arguments())
             .arg(path)
-            // Each heap of a thread takes 64 MB of address space.
+            // Each malloc arena, one for each thread, takes 64 MB of address space.
             .env("MALLOC_ARENA_MAX", "1")
             .stdin(Stdio::from(input))
             .stdout(Stdio::null())
@@ -221,7 +221,7 @@ impl Guard {
         }
     }
 
-    /// Why a child left no parcel.
+    /// The error for a child that left no parcel (its result, `parcel.rs`).
     fn fall(&self, path: &Path, status: Option<ExitStatus>, words: &str, limits: Limits) -> Error {
         const ENDED: [i32; 3] = [1, 2, 15];
         const KILLED: i32 = 9;
