@@ -42,8 +42,7 @@ pub mod terrain;
 pub mod time_step;
 pub mod two_level;
 
-pub use crate::shallow::params::Thickening;
-pub use params::Params;
+pub use params::{Params, Thickening};
 pub use readback::body_loads::Load;
 pub use readback::probe::{Reading, View};
 pub use readback::snapshot::Snapshot;

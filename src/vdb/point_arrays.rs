@@ -103,14 +103,14 @@ pub(in crate::vdb) fn of_grid(
 }
 
 /// Zeros, or none when memory runs out.
-pub(in crate::vdb) fn room<T: Copy + Default>(count: usize) -> Option<Vec<T>> {
+fn room<T: Copy + Default>(count: usize) -> Option<Vec<T>> {
     let mut values = Vec::new();
     values.try_reserve_exact(count).ok()?;
     values.resize(count, T::default());
     Some(values)
 }
 
-pub(in crate::vdb) fn shared<T: Copy>(values: Vec<T>, uniform: bool) -> Column<T> {
+fn shared<T: Copy>(values: Vec<T>, uniform: bool) -> Column<T> {
     match values.first() {
         Some(&value) if uniform => Column::Uniform(value),
         _ => Column::Each(values),
@@ -118,10 +118,7 @@ pub(in crate::vdb) fn shared<T: Copy>(values: Vec<T>, uniform: bool) -> Column<T
 }
 
 /// Assigns positions to voxels anew, if the file has a transform other than a voxel size or stores points outside their voxels.
-pub(in crate::vdb) fn position(
-    points: &mut Points,
-    head: &ffi::PointsHead,
-) -> std::result::Result<(), String> {
+fn position(points: &mut Points, head: &ffi::PointsHead) -> std::result::Result<(), String> {
     if !head.is_linear {
         return Err(format!("grid \"{}\" has points in a space that is not linear", head.name));
     }

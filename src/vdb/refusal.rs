@@ -9,7 +9,7 @@ const CANCELLED: &str = "frazil: cancelled";
 const MEMORY: [&str; 5] = ["bad_alloc", "length_error", "vector::", "basic_string::", "array new length"];
 
 /// Whether an exception means out of memory.
-pub(super) fn is_of_memory(what: &str) -> bool {
+fn is_of_memory(what: &str) -> bool {
     MEMORY.iter().any(|word| what.contains(word))
 }
 

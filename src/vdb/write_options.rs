@@ -36,7 +36,7 @@ pub(in crate::vdb) fn codec_number(compression: Compression) -> i32 {
 }
 
 /// Position of the random identifier in a file: 36 characters.
-pub(in crate::vdb) const UUID: std::ops::Range<usize> = 21..57;
+const UUID: std::ops::Range<usize> = 21..57;
 
 /// The bytes of a file, with the random identifier replaced by one derived from the rest.
 pub(in crate::vdb) fn named_by_content(bytes: &cxx::CxxString) -> Vec<u8> {

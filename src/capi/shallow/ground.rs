@@ -148,12 +148,12 @@ impl Moving {
 }
 
 /// All cells of a grid.
-pub(in crate::capi::shallow) fn all_cells(grid: &Grid) -> [Range<usize>; 2] {
+fn all_cells(grid: &Grid) -> [Range<usize>; 2] {
     grid.size.map(|count| 0..count)
 }
 
 /// How far (cells) a cell's centre may lie outside a box and still count as inside.
-pub(in crate::capi::shallow) const ROUNDING: f64 = 1e-6;
+const ROUNDING: f64 = 1e-6;
 
 /// The cells whose centres lie within a host's box; all cells for NULL.
 ///

@@ -162,7 +162,7 @@ pub(in crate::mesh_repair) fn longest([a, b, c]: &[DVec3; 3]) -> f64 {
 /// stored at vertices, the triangle is marked.
 #[derive(Clone, Copy)]
 pub struct Traced<'a> {
-    /// The mesh at the first frame, with what it carried then.
+    /// The mesh at the first frame, with the attributes that it had then.
     pub first: &'a DetailedMesh,
     /// A search tree of its triangles, for callers that make many changes; none: it is rebuilt each time.
     pub tree: Option<&'a NearestTree>,

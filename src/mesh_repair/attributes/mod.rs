@@ -354,26 +354,26 @@ mod tests {
         let new = TriMesh { positions, triangles: vec![[0, 1, 4], [0, 4, 3], [0, 3, 2]] };
         let vertices = kept.map(|n| Some(n as u32));
         let sources = [Source::Part(2), Source::Part(3), Source::Whole(1)];
-        let places: Vec<[f32; 2]> = (0..7u8).map(|n| [f32::from(n), 0.5 * f32::from(n)]).collect();
-        let found = |places: &[[f32; 2]], corners| {
-            let uvs = Some(Uvs { coordinates: places.to_vec(), corners, missing: 0 });
+        let coordinates: Vec<[f32; 2]> = (0..7u8).map(|n| [f32::from(n), 0.5 * f32::from(n)]).collect();
+        let found = |coordinates: &[[f32; 2]], corners| {
+            let uvs = Some(Uvs { coordinates: coordinates.to_vec(), corners, missing: 0 });
             let detail = DetailedMesh { mesh: old.clone(), uvs, arrays: Vec::new() };
             let traced = Traced { first: &detail, tree: None, positions: &[], spacing: 1.0 };
             carried(&detail, new.clone(), &vertices, &sources, Some(&traced)).uvs.unwrap()
         };
-        let uvs = found(&places[..6], None);
-        assert_eq!((uvs.coordinates, uvs.corners), (kept.map(|n| places[n]).to_vec(), None));
+        let uvs = found(&coordinates[..6], None);
+        assert_eq!((uvs.coordinates, uvs.corners), (kept.map(|n| coordinates[n]).to_vec(), None));
         let mut indices = old.triangles.as_flattened().to_vec();
         for has_seam in [false, true] {
             if has_seam {
                 // The third triangle's coordinates lie elsewhere: the first vertex has none there.
                 indices[6] = 6;
             }
-            let uvs = found(&places, Some(indices.clone()));
+            let uvs = found(&coordinates, Some(indices.clone()));
             let first = if has_seam { 6 } else { 0 };
             assert_eq!(
                 (uvs.coordinates, uvs.corners),
-                (places.clone(), Some(vec![first, 2, 5, 0, 5, 4, 0, 4, 3]))
+                (coordinates.clone(), Some(vec![first, 2, 5, 0, 5, 4, 0, 4, 3]))
             );
         }
     }
@@ -413,17 +413,18 @@ mod tests {
         let vertices = [0, 1, 2, 5].map(Some);
         let sources = [0, 1].map(Source::Whole);
         for has_seam in [false, true] {
-            let mut places = vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+            let mut coordinates =
+                vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
             if has_seam {
-                places[4] = [7.0, 7.0];
+                coordinates[4] = [7.0, 7.0];
             }
-            let uvs = Some(Uvs { coordinates: places.clone(), corners: None, missing: 0 });
+            let uvs = Some(Uvs { coordinates: coordinates.clone(), corners: None, missing: 0 });
             let detail = DetailedMesh { mesh: soup.clone(), uvs, arrays: Vec::new() };
             let uvs = carried(&detail, square.clone(), &vertices, &sources, None).uvs.unwrap();
             if has_seam {
-                assert_eq!((uvs.coordinates, uvs.corners), (places, Some(vec![0, 1, 2, 3, 4, 5])));
+                assert_eq!((uvs.coordinates, uvs.corners), (coordinates, Some(vec![0, 1, 2, 3, 4, 5])));
             } else {
-                let kept = [0, 1, 2, 5].map(|n: usize| places[n]);
+                let kept = [0, 1, 2, 5].map(|n: usize| coordinates[n]);
                 assert_eq!((&uvs.coordinates[..], uvs.corners), (&kept[..], None));
             }
         }

@@ -27,7 +27,7 @@ pub fn of(system: System) -> &'static [Key] {
     }
 }
 
-pub(in crate::scene) fn ordered<const N: usize>(lists: [&[Key]; N]) -> Vec<Key> {
+fn ordered<const N: usize>(lists: [&[Key]; N]) -> Vec<Key> {
     let mut keys = lists.concat();
     keys.sort_by_key(|key| match key.table {
         "shot" => 0,

@@ -1,4 +1,4 @@
-//! The one place that knows all systems: their keys, and the way from a file to a scene and back.
+//! The one place that knows all systems: their keys, and how a scene is read from a file and written back to one.
 
 mod file;
 pub(in crate::scene) mod keys;

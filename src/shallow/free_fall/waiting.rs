@@ -9,10 +9,10 @@ use crate::shallow::scalars::shares::MOST;
 pub(in crate::shallow) const LIP: usize = 40;
 
 /// Intervals after which liquid of less than a drop is released anyway.
-pub(in crate::shallow::free_fall) const PATIENCE: u32 = 60;
+const PATIENCE: u32 = 60;
 
 /// An overflow edge drips if a drop takes longer than this many intervals; otherwise it pours, in a packet each interval.
-pub(in crate::shallow::free_fall) const DRIPS: i64 = 8;
+const DRIPS: i64 = 8;
 
 /// Liquid that went over a link and is not a packet yet.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -15,9 +15,8 @@ use super::system::Shallow;
 use crate::error::{Error, Result};
 use crate::numeric::cpu::dispatch;
 use amounts::{ACCOUNTS, Account, Amounts};
-pub use law::Law;
-pub use law::Scalar;
 pub(super) use law::check_scalar;
+pub use law::{Law, Scalar};
 pub use shares::MOST;
 use shares::{LEVELS, Levels};
 

@@ -22,8 +22,7 @@ mod shape;
 mod strain;
 mod vertex_rings;
 
-pub use improvable::Improvable;
-pub use improvable::Size;
+pub use improvable::{Improvable, Size};
 use rayon::prelude::*;
 
 use crate::context::Context;

@@ -356,9 +356,9 @@ impl Whole {
                 break points;
             }
             let (points, of_file) = read(stored, at)?;
-            let told = previous_record(at, &of_file).map_err(|error| wrong(stored, at, error))?;
+            let record = previous_record(at, &of_file).map_err(|error| wrong(stored, at, error))?;
             metadata.get_or_insert(of_file);
-            match told {
+            match record {
                 None => break points,
                 Some((gone, of)) => later.push((at, points, gone, of)),
             }

@@ -26,5 +26,4 @@ pub(in crate::shallow::surface) fn three(first: u32, others: [(usize, u32); 2], 
 }
 
 /// For each corner, the triangle of the other three, facing up.
-pub(in crate::shallow::surface::quartets) const TRIANGLES: [[usize; 3]; 4] =
-    [[1, 2, 3], [0, 2, 3], [1, 0, 3], [0, 2, 1]];
+const TRIANGLES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [1, 0, 3], [0, 2, 1]];

@@ -53,7 +53,7 @@ pub fn renew(blocks: &mut [Block], mut fresh: Vec<Vec<Touch>>) {
 
 /// Clears the impulses of grains that are pressed from opposite sides: they would grow as long as both sides press, and throw
 /// the grain when one of them leaves. The touches must be sorted.
-pub(in crate::snow::grains::colliders) fn release_pressed(touches: &mut [Touch]) {
+fn release_pressed(touches: &mut [Touch]) {
     for touches in touches.chunk_by_mut(|a, b| a.grain == b.grain) {
         let is_pressed = touches.iter().enumerate().any(|(index, touch)| {
             touches[..index].iter().any(|other| dot(touch.normal, other.normal) < OPPOSITE)
@@ -65,4 +65,4 @@ pub(in crate::snow::grains::colliders) fn release_pressed(touches: &mut [Touch])
 }
 
 /// Two normals with a cosine below this press a grain from opposite sides.
-pub(in crate::snow::grains::colliders) const OPPOSITE: f32 = -0.5;
+const OPPOSITE: f32 = -0.5;
