@@ -40,7 +40,7 @@ fn what_tools_write_is_ignored() {
         "target/release/frazil",
         "python/frazil/__pycache__/mesh.cpython-311.pyc",
         "tests/python/__pycache__/test_frazil.cpython-311.pyc",
-        "python/dist/frazil-0.1.0.whl",
+        "python/dist/frazil-0.2.0.whl",
         "python/build/lib/frazil/mesh.py",
         "python/frazil.egg-info/PKG-INFO",
         "dist/frazil.tar.gz",
