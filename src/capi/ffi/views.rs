@@ -408,24 +408,6 @@ pub(in crate::capi) unsafe fn fill<T: Sized32>(pointer: *mut T, size: Option<usi
     Ok(())
 }
 
-/// Runs the work of a call that returns a report, which is written to the host unless the pointer is NULL; all zeroes after a failure.
-///
-/// # Safety
-/// As [`fill`], without a size.
-pub(in crate::capi) unsafe fn reports<T: Sized32>(
-    report: *mut T,
-    work: impl FnOnce() -> Outcome<T>,
-) -> Outcome {
-    if report.is_null() {
-        return work().map(drop);
-    }
-    // SAFETY: guaranteed by the caller.
-    unsafe {
-        fill(report, None, T::zeroed())?;
-        fill(report, None, work()?)
-    }
-}
-
 /// Maximum size (bytes) accepted for a struct of a newer header.
 const LARGEST: usize = 4096;
 

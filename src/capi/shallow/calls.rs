@@ -2,7 +2,7 @@
 
 use crate::capi::ffi::guard::{Outcome, frz_status, guard};
 use crate::capi::ffi::handle::{HandleType, change, required};
-use crate::capi::ffi::views::{Sized32, reports};
+use crate::capi::ffi::views::{Sized32, fill};
 use crate::capi::runtime::context::{enter_light, frz_context};
 use crate::context::Context;
 
@@ -10,11 +10,11 @@ use crate::context::Context;
 ///
 /// # Safety
 /// The pointers must be NULL or valid.
-pub(in crate::capi) unsafe fn changes<N: HandleType, T: Sized32>(
+pub(in crate::capi) unsafe fn changes<N: HandleType, T: Sized32, R: Into<T>>(
     context: *mut frz_context,
     object: *mut N,
     report: *mut T,
-    work: impl FnOnce(&Context, &mut N::Value) -> Outcome<T>,
+    work: impl FnOnce(&Context, &mut N::Value) -> Outcome<R>,
 ) -> frz_status {
     // SAFETY: guaranteed by the caller.
     guard(|| unsafe {
@@ -29,9 +29,9 @@ pub(in crate::capi) unsafe fn changes<N: HandleType, T: Sized32>(
 ///
 /// # Safety
 /// The pointer must be NULL or valid.
-pub(in crate::capi) unsafe fn informs<T: Sized32>(
+pub(in crate::capi) unsafe fn informs<T: Sized32, R: Into<T>>(
     info: *mut T,
-    work: impl FnOnce() -> Outcome<T>,
+    work: impl FnOnce() -> Outcome<R>,
 ) -> frz_status {
     // SAFETY: guaranteed by the caller.
     guard(|| unsafe { reports(required(info, T::NAME)?, work) })
@@ -51,4 +51,22 @@ pub(in crate::capi) unsafe fn answers(out: *mut f64, work: impl FnOnce() -> Outc
     tell(0.0);
     tell(work()?);
     Ok(())
+}
+
+/// Runs the work of a call that returns a report, which is written to the host unless the pointer is NULL; all zeroes after a failure.
+///
+/// # Safety
+/// As [`fill`], without a size.
+pub(in crate::capi) unsafe fn reports<T: Sized32, R: Into<T>>(
+    report: *mut T,
+    work: impl FnOnce() -> Outcome<R>,
+) -> Outcome {
+    if report.is_null() {
+        return work().map(drop);
+    }
+    // SAFETY: guaranteed by the caller.
+    unsafe {
+        fill(report, None, T::zeroed())?;
+        fill(report, None, work()?.into())
+    }
 }

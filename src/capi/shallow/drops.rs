@@ -173,7 +173,7 @@ pub unsafe extern "C" fn frz_shallow_drops_bound(
     unsafe {
         informs(size, || {
             let most = read(shallow)?.shallow.params().falls.map_or(0, |falls| falls.most);
-            Ok(bound(most).into())
+            Ok(bound(most))
         })
     }
 }

@@ -1,7 +1,7 @@
 //! Flow points of a host, and the triangles that they move with.
 
 use super::ground::Terrain;
-use crate::capi::ffi::guard::{Failure, Outcome};
+use crate::capi::ffi::guard::{Outcome, refuse};
 use crate::capi::ffi::views::{Sized32, meaning};
 use crate::capi::mesh::triangles::no_flags;
 use crate::shallow::sources::{FlowPoint, Kind, Pulse};
@@ -91,9 +91,8 @@ impl Attached {
         let on = is_attached.then_some((given.triangle, given.shares));
         if let Some((_, shares)) = &on {
             let sum: f64 = shares.iter().sum();
-            if sum.is_nan() || (sum - 1.0).abs() >= 1e-6 {
-                return Err(Failure::argument(format!("the sum of the shares {shares:?} is not 1")));
-            }
+            let is_one = (sum - 1.0).abs() < 1e-6;
+            refuse(!is_one, || format!("the sum of the shares {shares:?} is not 1"))?;
         }
         let at = on.as_ref().map_or(Ok(given.at), |on| terrain.position(on))?;
         let pulse = Pulse { frequency: given.pulse_frequency, share: given.pulse_share };

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::lists::one_for_each;
-use crate::capi::ffi::guard::{Failure, Outcome};
+use crate::capi::ffi::guard::{Failure, Outcome, refuse};
 use crate::capi::ffi::views::frz_view;
 use crate::context::Context;
 use crate::error::Result;
@@ -181,9 +181,7 @@ pub(in crate::capi) unsafe fn cells_in(grid: &Grid, bounds: *const f64) -> Outco
     let bounds = unsafe { bounds.cast::<[f64; 4]>().read_unaligned() };
     let [x0, z0, x1, z1] = bounds;
     // Negated, so that NaN is refused too.
-    if !(x0 <= x1 && z0 <= z1) {
-        return Err(Failure::argument(format!("bounds = {bounds:?} m have no inside")));
-    }
+    refuse(!(x0 <= x1 && z0 <= z1), || format!("bounds = {bounds:?} m have no inside"))?;
     let range = |axis: usize, low: f64, high: f64| {
         let count = grid.size[axis] as f64;
         // In cells, from the centre of the first; rounding excludes none.

@@ -1,6 +1,6 @@
 //! Arrays from a host: of structs, and of as many numbers as there are things.
 
-use crate::capi::ffi::guard::{Failure, Outcome};
+use crate::capi::ffi::guard::{Failure, Outcome, refuse};
 use crate::capi::ffi::handle::required;
 use crate::capi::ffi::views::{Plain, Sized32, check_size, frz_span, frz_view, sized};
 
@@ -43,18 +43,15 @@ pub(in crate::capi) unsafe fn stride_of<T: Sized32>(
     if count == 0 {
         return Ok(0);
     }
-    if list.is_null() {
-        return Err(Failure::argument(format!("{all}: the data is NULL, but the count is {count}")));
-    }
+    refuse(list.is_null(), || format!("{all}: the data is NULL, but the count is {count}"))?;
     // SAFETY: guaranteed by the caller: at least the size of one is there.
     let stride = unsafe { list.cast::<u32>().read_unaligned() } as usize;
     // Checked before use.
     check_size::<T>(stride).map_err(first)?;
     let sizes = frz_view { data: list.cast(), count, stride };
     // SAFETY: as above; the sizes must be equal for the structs to be contiguous.
-    if unsafe { sizes.in_place::<u32>(all) }?.any(|size| size as usize != stride) {
-        return Err(Failure::argument(format!("{all}: their struct_size differs")));
-    }
+    let is_other = unsafe { sizes.in_place::<u32>(all) }?.any(|size| size as usize != stride);
+    refuse(is_other, || format!("{all}: their struct_size differs"))?;
     Ok(stride)
 }
 
@@ -70,10 +67,8 @@ pub(in crate::capi) unsafe fn one_for_each<'a, T: Plain>(
 ) -> Outcome<impl ExactSizeIterator<Item = T> + Clone + use<'a, T>> {
     // SAFETY: guaranteed by the caller.
     let given = unsafe { view.in_place::<T>(name) }?;
-    if given.len() != count {
-        let text = format!("{name}: {} elements, but {there_are} {count} {things}", given.len());
-        return Err(Failure::argument(text));
-    }
+    let len = given.len();
+    refuse(len != count, || format!("{name}: {len} elements, but {there_are} {count} {things}"))?;
     Ok(given)
 }
 
@@ -105,8 +100,6 @@ pub(in crate::capi) unsafe fn numbers<const N: usize>(first: *const f64, name: &
 
 /// An index of one of `count` things that were set; `name` is that of the argument.
 pub(in crate::capi) fn check_index(name: &str, index: usize, count: usize) -> Outcome<usize> {
-    match index < count {
-        true => Ok(index),
-        false => Err(Failure::argument(format!("{name} = {index} is none of the {count} that were set"))),
-    }
+    refuse(index >= count, || format!("{name} = {index} is none of the {count} that were set"))?;
+    Ok(index)
 }

@@ -3,7 +3,7 @@
 use super::lists::{one_for_each, stride_of};
 use super::spill::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::fields::fields_of;
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::guard::{Outcome, frz_status, guard, refuse};
 use crate::capi::ffi::handle::change;
 use crate::capi::ffi::views::{Sized32, fill, frz_view};
 use crate::shallow::Load;
@@ -72,9 +72,7 @@ pub unsafe extern "C" fn frz_shallow_loads(
         put(loads, (0..count).map(|_| Load::default()))?;
         let ShallowHandle { shallow, velocities_of_bodies: own, loads: felt, .. } = &mut *change(shallow)?;
         let bodies = shallow.bodies().len();
-        if count != bodies {
-            return Err(Failure::argument(format!("count = {count} is not that of the {bodies} bodies")));
-        }
+        refuse(count != bodies, || format!("count = {count} is not that of the {bodies} bodies"))?;
         own.clear();
         if velocities.data.is_null() && velocities.count == 0 {
             own.resize(bodies, [0.0; 3]);

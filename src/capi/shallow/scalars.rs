@@ -7,7 +7,7 @@ use super::lists::{check_index, one_for_each, read_list};
 use super::read::Requested;
 use super::spill::frz_shallow;
 use crate::capi::ffi::fields::fields_of;
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::guard::{Outcome, frz_status, guard, refuse};
 use crate::capi::ffi::handle::{change, read};
 use crate::capi::ffi::views::{Sized32, frz_span, frz_view, meaning, required_text};
 use crate::error::Result;
@@ -86,10 +86,7 @@ pub(in crate::capi) unsafe fn read_scalars(
     scalars: *const frz_shallow_scalar,
     count: usize,
 ) -> Outcome<Vec<Scalar>> {
-    if count > FRZ_SHALLOW_MOST_SCALARS as usize {
-        let text = format!("{count} scalars are more than {FRZ_SHALLOW_MOST_SCALARS}");
-        return Err(Failure::argument(text));
-    }
+    refuse(count > MOST, || format!("{count} scalars are more than {MOST}"))?;
     let mut given = Vec::new();
     // SAFETY: guaranteed by the caller.
     let scalar = |scalar: frz_shallow_scalar| unsafe { scalar.scalar() };

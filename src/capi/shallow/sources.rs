@@ -178,5 +178,5 @@ pub unsafe extern "C" fn frz_shallow_get_balance(
     balance: *mut frz_shallow_balance,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe { informs(balance, || Ok(read(shallow)?.shallow.balance().into())) }
+    unsafe { informs(balance, || Ok(read(shallow)?.shallow.balance())) }
 }

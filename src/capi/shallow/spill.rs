@@ -8,7 +8,7 @@ use crate::context::Context;
 use crate::shallow::free_fall::Droplet;
 use crate::shallow::free_fall::mesh::Balls;
 use crate::shallow::surface::Surface;
-use crate::shallow::{Load, Shallow};
+use crate::shallow::{Load, Moved, Shallow};
 
 /// A small amount of liquid on the ground (blood, coffee or paint), computed in a fraction of a frame's time.
 ///
@@ -81,5 +81,13 @@ impl ShallowHandle {
             loads: Vec::new(),
             steps: Vec::with_capacity(1024),
         })
+    }
+    /// After a change of the ground: minimum heights and ledges must be found again where it has moved.
+    pub fn after(&mut self, moved: Moved) -> Moved {
+        if moved.cells > 0 {
+            self.lifted.is_current = false;
+            self.ledged.is_current = false;
+        }
+        moved
     }
 }

@@ -6,7 +6,7 @@ use super::calls::answers;
 use super::lists::one_for_each;
 use super::params::FRZ_SHALLOW_NO_SCALAR;
 use super::spill::frz_shallow;
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::guard::{Outcome, frz_status, guard, refuse};
 use crate::capi::ffi::handle::{HandleType, answer, change, destroy, read, required};
 use crate::capi::ffi::views::{Sized32, fill, frz_span, frz_view, given_or_defaults, write_bytes};
 use crate::capi::mesh::triangles::no_flags;
@@ -53,9 +53,7 @@ unsafe impl Sized32 for frz_shallow_staining {
 impl frz_shallow_staining {
     fn staining(&self) -> Outcome<Staining> {
         no_flags(self.flags, 0)?;
-        if self.reserved != 0 {
-            return Err(Failure::argument(format!("reserved = {} is not 0", self.reserved)));
-        }
+        refuse(self.reserved != 0, || format!("reserved = {} is not 0", self.reserved))?;
         let absorbing = Absorbing { capacity: self.capacity, rate: self.rate };
         let staining = Staining {
             scalar: (self.scalar != FRZ_SHALLOW_NO_SCALAR).then_some(self.scalar as usize),

@@ -3,15 +3,14 @@
 use super::calls::changes;
 use super::ground::{cells_in, read_heights};
 use super::lists::read_list;
-use super::spill::frz_shallow;
-use super::surroundings::Surroundings;
+use super::spill::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::fields::fields_of;
 use crate::capi::ffi::guard::{Outcome, frz_status};
 use crate::capi::ffi::views::{Sized32, frz_view, meaning};
 use crate::capi::runtime::context::frz_context;
 use crate::geometry::DVec3;
+use crate::shallow::Moved;
 use crate::shallow::terrain::shapes::Shape;
-use crate::shallow::{Moved, Shallow};
 
 /// How a change of the ground affected the liquid.
 #[repr(C)]
@@ -39,29 +38,6 @@ unsafe impl Sized32 for frz_shallow_moved {
 
 fields_of!(Moved => frz_shallow_moved { cells, displaced, held, fallen });
 
-/// A call that changes the ground and reports the effect.
-///
-/// # Safety
-/// The pointers must be NULL or valid.
-unsafe fn moves(
-    context: *mut frz_context,
-    shallow: *mut frz_shallow,
-    moved: *mut frz_shallow_moved,
-    work: impl FnOnce(&mut Shallow, &mut Surroundings) -> Outcome<Moved>,
-) -> frz_status {
-    // SAFETY: guaranteed by the caller.
-    unsafe {
-        changes(context, shallow, moved, |_, spill| {
-            let done = work(&mut spill.shallow, &mut spill.around)?;
-            if done.cells > 0 {
-                spill.lifted.is_current = false;
-                spill.ledged.is_current = false;
-            }
-            Ok(done.into())
-        })
-    }
-}
-
 /// Moves the vertices of the mesh that the liquid was created with, in real time (frz_shallow): bones and organs move or deform. The liquid
 /// is carried along, and none of it is lost; flow points on triangles move with them. After a failure all is as it was.
 ///
@@ -81,7 +57,8 @@ pub unsafe extern "C" fn frz_shallow_update_terrain(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so is the view.
     unsafe {
-        moves(context, shallow, moved, |shallow, around| {
+        changes(context, shallow, moved, |_, spill| {
+            let ShallowHandle { shallow, around, .. } = &mut *spill;
             let cells = cells_in(&shallow.columns().grid, bounds)?;
             let mesh = around.terrain.mesh()?;
             mesh.take(&positions)?;
@@ -89,7 +66,7 @@ pub unsafe extern "C" fn frz_shallow_update_terrain(
             let moved = shallow.update_cells(cells, |cell| mesh.caster.at(cell))?;
             mesh.come();
             around.carry_flows(|flow, at| shallow.move_flow(flow, at))?;
-            Ok(moved)
+            Ok(spill.after(moved))
         })
     }
 }
@@ -112,12 +89,14 @@ pub unsafe extern "C" fn frz_shallow_update_heights(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so is the view.
     unsafe {
-        moves(context, shallow, moved, |shallow, around| {
+        changes(context, shallow, moved, |_, spill| {
+            let ShallowHandle { shallow, around, .. } = &mut *spill;
             let (grid, range) = (shallow.columns().grid, shallow.columns().heights);
             let cells = cells_in(&grid, bounds)?;
             let solids = around.terrain.heights()?;
             read_heights(&heights, &grid, &range, cells.clone(), solids)?;
-            Ok(shallow.update_cells(cells, |cell| &solids[cell])?)
+            let moved = shallow.update_cells(cells, |cell| &solids[cell])?;
+            Ok(spill.after(moved))
         })
     }
 }
@@ -205,9 +184,11 @@ pub unsafe extern "C" fn frz_shallow_set_bodies(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     unsafe {
-        moves(context, shallow, moved, |shallow, around| {
+        changes(context, shallow, moved, |_, spill| {
+            let ShallowHandle { shallow, around, .. } = &mut *spill;
             read_list(bodies, count, ["body", "bodies"], &mut around.shapes, frz_shallow_body::shape)?;
-            Ok(shallow.set_bodies(&around.shapes)?)
+            let moved = shallow.set_bodies(&around.shapes)?;
+            Ok(spill.after(moved))
         })
     }
 }

@@ -3,7 +3,7 @@
 use std::ffi::c_void;
 
 use super::liquid::{DetailHandle, frz_shallow_detail};
-use crate::capi::ffi::guard::{Failure, frz_status, guard};
+use crate::capi::ffi::guard::{frz_status, guard, refuse};
 use crate::capi::ffi::handle::{change, clear, read, required};
 use crate::capi::ffi::views::frz_view;
 use crate::capi::runtime::context::{enter_light, frz_context};
@@ -43,7 +43,7 @@ pub unsafe extern "C" fn frz_shallow_detail_update_terrain(
             let moved = detail.update_terrain(&solids)?;
             mesh.come();
             around.carry_flows(|flow, at| detail.move_flow(flow, at))?;
-            Ok(moved.into())
+            Ok(moved)
         })
     }
 }
@@ -71,7 +71,7 @@ pub unsafe extern "C" fn frz_shallow_detail_update_heights(
             read_heights(&heights, &grid, &range, all_cells(&grid), own)?;
             let mut solids = Solids::empty(grid, range);
             own.iter().for_each(|solid| solids.push(solid));
-            Ok(detail.update_terrain(&solids)?.into())
+            Ok(detail.update_terrain(&solids)?)
         })
     }
 }
@@ -97,7 +97,7 @@ pub unsafe extern "C" fn frz_shallow_detail_set_bodies(
         changes(context, detail, moved, |_, spread| {
             let shapes = &mut spread.around.shapes;
             read_list(bodies, count, ["body", "bodies"], shapes, frz_shallow_body::shape)?;
-            Ok(spread.detail.set_bodies(shapes)?.into())
+            Ok(spread.detail.set_bodies(shapes)?)
         })
     }
 }
@@ -114,7 +114,7 @@ pub unsafe extern "C" fn frz_shallow_detail_surface_bound(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe { informs(size, || Ok(bound(&read(detail)?.detail).into())) }
+    unsafe { informs(size, || Ok(bound(&read(detail)?.detail))) }
 }
 
 /// Writes the surface of all liquid as triangles, in real time (frz_shallow_detail): one mesh, without a crack between small and large
@@ -142,9 +142,7 @@ pub unsafe extern "C" fn frz_shallow_detail_surface(
         for (flag, name) in
             [(FRZ_SHALLOW_LIFTED, "FRZ_SHALLOW_LIFTED"), (FRZ_SHALLOW_SKIRTED, "FRZ_SHALLOW_SKIRTED")]
         {
-            if wanted.has(flag) {
-                return Err(Failure::argument(format!("{name} is not for liquid in cells of two sizes")));
-            }
+            refuse(wanted.has(flag), || format!("{name} is not for liquid in cells of two sizes"))?;
         }
         if !*is_reserved {
             surface.reserve(detail);

@@ -315,5 +315,5 @@ pub unsafe extern "C" fn frz_shallow_detail_get_balance(
     balance: *mut frz_shallow_balance,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe { informs(balance, || Ok(read(detail)?.detail.balance().into())) }
+    unsafe { informs(balance, || Ok(read(detail)?.detail.balance())) }
 }

@@ -35,7 +35,7 @@ pub unsafe extern "C" fn frz_shallow_find_ledges(
                 _ => ledges.find(columns),
             }
             *is_current = true;
-            Ok(ledges.bound().into())
+            Ok(ledges.bound())
         })
     }
 }

@@ -8,7 +8,7 @@ use self::prepared::{Needs, wanted_lifts};
 use super::calls::informs;
 use super::spill::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::fields::fields_of;
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
+use crate::capi::ffi::guard::{Outcome, frz_status, guard, refuse};
 use crate::capi::ffi::handle::{change, read};
 use crate::capi::ffi::views::{Sized32, fill, frz_span, given, given_or_defaults};
 use crate::capi::mesh::triangles::no_flags;
@@ -133,16 +133,16 @@ pub(in crate::capi) fn check_buffers(buffers: &[Buffer<'_>], index_bits: u32) ->
         let [first, end] = ends(span, *bytes);
         for (other, before, bytes, _) in &buffers[..at] {
             let [other_first, other_end] = ends(before, *bytes);
-            if first < other_end && other_first < end && !span.data.is_null() && !before.data.is_null() {
-                return Err(Failure::argument(format!("{name} and {other} overlap")));
-            }
+            let overlap = first < other_end && other_first < end;
+            refuse(overlap && !span.data.is_null() && !before.data.is_null(), || {
+                format!("{name} and {other} overlap")
+            })?;
         }
     }
     let has_indices = buffers.iter().any(|(name, span, ..)| *name == "indices" && !span.data.is_null());
-    if !has_indices || [16, 32].contains(&index_bits) {
-        return Ok(());
-    }
-    Err(Failure::argument(format!("index_bits = {index_bits} is not 16 or 32")))
+    refuse(has_indices && ![16, 32].contains(&index_bits), || {
+        format!("index_bits = {index_bits} is not 16 or 32")
+    })
 }
 
 /// Indices of a size that [`check_buffers`] has let pass.
@@ -367,7 +367,7 @@ pub unsafe extern "C" fn frz_shallow_surface_bound(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    unsafe { informs(size, || Ok(bound(read(shallow)?.shallow.columns()).into())) }
+    unsafe { informs(size, || Ok(bound(read(shallow)?.shallow.columns()))) }
 }
 
 /// Writes the liquid's surface as triangles, in real time (frz_shallow): the wet columns and the dry ones around them. It ends at the

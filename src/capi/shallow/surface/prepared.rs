@@ -1,7 +1,7 @@
 //! What surfaces are built with besides the depths: velocities and concentrations; minimum heights and ledges, and whether these match the
 //! current ground.
 
-use crate::capi::ffi::guard::{Failure, Outcome};
+use crate::capi::ffi::guard::{Outcome, refuse};
 use crate::error::Result;
 use crate::shallow::Shallow;
 use crate::shallow::scalars::MOST;
@@ -66,11 +66,9 @@ pub(in crate::capi) struct Ledged {
 impl Ledged {
     /// The ledges, if a surface needs them; a failure if it needs them and there are none.
     pub(in crate::capi) fn wanted(&self, is_skirted: bool, when: &str) -> Outcome<Option<&Ledges>> {
-        if is_skirted && !self.is_current {
-            return Err(Failure::argument(format!(
-                "FRZ_SHALLOW_SKIRTED: frz_shallow_find_ledges has found no ledges {when}"
-            )));
-        }
+        refuse(is_skirted && !self.is_current, || {
+            format!("FRZ_SHALLOW_SKIRTED: frz_shallow_find_ledges has found no ledges {when}")
+        })?;
         Ok(is_skirted.then_some(&self.ledges))
     }
 
@@ -104,11 +102,8 @@ pub(in crate::capi) fn wanted_lifts<'a>(
     known: Option<(&'a [i32], &'a [i32])>,
     when: &str,
 ) -> Outcome<(&'a [i32], &'a [i32])> {
-    match known {
-        _ if !is_lifted => Ok(Default::default()),
-        Some(lifts) => Ok(lifts),
-        None => Err(Failure::argument(format!(
-            "FRZ_SHALLOW_LIFTED: frz_shallow_find_lifts has found no minimum heights {when}"
-        ))),
-    }
+    refuse(is_lifted && known.is_none(), || {
+        format!("FRZ_SHALLOW_LIFTED: frz_shallow_find_lifts has found no minimum heights {when}")
+    })?;
+    Ok(known.filter(|_| is_lifted).unwrap_or_default())
 }
