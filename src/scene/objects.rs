@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use super::run::{
-    Clip, FrameFiles, Kind, MovingMesh, Prims, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To,
-};
+use super::run::{FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To};
 use super::{Role, Scene, moving};
 use crate::context::Context;
 use crate::error::Result;
@@ -12,6 +10,7 @@ use crate::geometry::{DVec3, TriMesh, Uvs, Vec3};
 use crate::io::records::input_hashes::InputHashes;
 use crate::io::records::manifest::Keeps;
 use crate::io::usd::materials::Look;
+use crate::io::usd::{ClipPrims, Clips, MeshPrim};
 use crate::io::{mesh, usd};
 use crate::motion::Drawn;
 use crate::scene::run::settings::settings_of;
@@ -103,12 +102,12 @@ impl Stage for Objects<'_> {
         Keeps::Whole
     }
 
-    fn clip(&self) -> Option<Clip<'_>> {
+    fn clip(&self) -> Option<Clips<'_>> {
         let uvs = self.bodies.iter().map(|body| body.motion().drawn().uvs);
         let named = self.names.iter().cloned().zip(uvs);
-        let mesh = |(name, uvs)| MovingMesh { name, look: Look::Object, uvs, primvars: Vec::new() };
-        let meshes = named.map(mesh).collect();
-        Some(Clip { kind: "objects", manifest: MANIFEST, prims: Prims::Meshes(meshes) })
+        let mesh =
+            |(name, uvs)| MeshPrim { name, look: Look::Object, moves: true, uvs, primvars: Vec::new() };
+        Some(Clips::new("objects", ClipPrims::Meshes(named.map(mesh).collect())))
     }
 }
 
