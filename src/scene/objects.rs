@@ -74,20 +74,12 @@ impl Stage for Objects<'_> {
         &[Kind { name: "objects", extensions: &["usda", "ply"] }]
     }
 
-    fn writes(&self, _kind: &str) -> bool {
-        true
-    }
-
     fn loose_files(&self) -> &'static [&'static str] {
         if self.scene.output.objects_usd { &[MANIFEST] } else { &[] }
     }
 
     fn settings(&self) -> Result<Settings> {
         settings_of(self.scene, self.name(), self.seen, &Role::MOVING)
-    }
-
-    fn of_first_state(&self, _settings: &Settings) -> Settings {
-        Settings::new()
     }
 
     fn remembers(&self) -> bool {

@@ -51,7 +51,9 @@ pub trait Stage: Sync {
     fn kinds(&self) -> &'static [Kind];
 
     /// Whether this scene has files of a kind.
-    fn writes(&self, kind: &str) -> bool;
+    fn writes(&self, _kind: &str) -> bool {
+        true
+    }
 
     /// Extension of its exact states, lower-case letters but not `json`: `state/base.0012.vdb`.
     fn state_extension(&self) -> &'static str {
@@ -70,7 +72,9 @@ pub trait Stage: Sync {
     fn settings(&self) -> Result<Settings>;
 
     /// Those of its settings that determine the state before the first frame: a run cannot resume from a state with others.
-    fn of_first_state(&self, settings: &Settings) -> Settings;
+    fn of_first_state(&self, _settings: &Settings) -> Settings {
+        Settings::new()
+    }
 
     /// The stages whose frames it reads, all earlier in the scene's order.
     fn upstream(&self) -> &'static [&'static str] {
@@ -98,7 +102,9 @@ pub trait Stage: Sync {
     }
 
     /// What another run can resume from after a frame.
-    fn keeps(&self, frame: i32) -> Keeps;
+    fn keeps(&self, _frame: i32) -> Keeps {
+        Keeps::State
+    }
 
     /// The setting that requires every frame to be made, if one does.
     fn needs_every_frame(&self) -> Option<&'static str> {

@@ -177,11 +177,7 @@ impl Stored {
     ///
     /// # Errors
     /// As [`Stored::state_file`]; what `resume` refuses, with the name of the file.
-    pub(in crate::scene) fn resume<T>(
-        &self,
-        frame: i32,
-        resume: impl FnOnce(&[u8]) -> Result<T>,
-    ) -> Result<T> {
+    pub fn resume<T>(&self, frame: i32, resume: impl FnOnce(&[u8]) -> Result<T>) -> Result<T> {
         let path = self.state_file(frame)?;
         let bytes = std::fs::read(&path).map_err(|error| Error::io(&path, "read", error))?;
         resume(&bytes).map_err(|error| Error::file(path, error.to_string()))

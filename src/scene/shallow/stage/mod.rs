@@ -15,7 +15,6 @@ use crate::error::{Error, Result};
 use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{MeshArray, TriMesh};
 use crate::io::mesh;
-use crate::io::records::manifest::Keeps;
 use crate::io::usd::materials::Look;
 use crate::io::usd::{ClipPrims, Clips, MeshPrim, primvars};
 use crate::scene::Scene;
@@ -183,10 +182,6 @@ impl Stage for Liquid<'_> {
     fn reads(&self, frame: i32) -> Reads {
         let files = self.of.sequence().map(|_| self.of.terrain_at(frame));
         Reads { files: files.into_iter().collect(), ahead: Vec::new() }
-    }
-
-    fn keeps(&self, _frame: i32) -> Keeps {
-        Keeps::State
     }
 
     fn volumes(&self) -> Vec<Volume> {

@@ -10,7 +10,6 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::{Points, TriMesh};
 use crate::io::particles::ply;
-use crate::io::records::manifest::Keeps;
 use crate::io::usd::{ClipPrims, Clips, points};
 use crate::scene::run::settings::first_of;
 use crate::scene::run::{FrameFiles, Kind, Reads, Report, Settings, Stage, Stepped, Stepping, Stored, To};
@@ -207,10 +206,6 @@ impl Stage for Grains<'_> {
 
     fn reads(&self, frame: i32) -> Reads {
         Reads { files: moving::files(self.scene, frame), ahead: Vec::new() }
-    }
-
-    fn keeps(&self, _frame: i32) -> Keeps {
-        Keeps::State
     }
 
     fn loose_files(&self) -> &'static [&'static str] {

@@ -10,7 +10,6 @@ use crate::error::{Error, Result};
 use crate::flow::{Solids, Tiles};
 use crate::geometry::points::Values;
 use crate::geometry::{DVec3, Points, TriMesh};
-use crate::io::records::manifest::Keeps;
 use crate::io::usd::{Field, Holds};
 use crate::motion::{Keys, Rigid};
 use crate::scene::run::settings::first_of;
@@ -234,10 +233,6 @@ impl Stage for Mist<'_> {
 
     fn reads(&self, frame: i32) -> Reads {
         Reads { files: moving::files(self.scene, frame), ahead: Vec::new() }
-    }
-
-    fn keeps(&self, _frame: i32) -> Keeps {
-        Keeps::State
     }
 
     fn volumes(&self) -> Vec<Volume> {

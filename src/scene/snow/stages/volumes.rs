@@ -212,10 +212,6 @@ impl Stage for Volumes<'_> {
         settings_of(self.scene, self.name(), &self.inputs.seen, &[])
     }
 
-    fn of_first_state(&self, _settings: &Settings) -> Settings {
-        Settings::new()
-    }
-
     fn upstream(&self) -> &'static [&'static str] {
         match (self.needs.base, self.needs.grains, self.needs.mist) {
             (true, true, true) => &["base", "grains", "mist"],

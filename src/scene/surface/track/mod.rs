@@ -16,7 +16,6 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{DetailedMesh, MeshArray, TriMesh, Vec3};
-use crate::io::records::manifest::Keeps;
 use crate::io::usd::materials::Look;
 use crate::io::usd::{ClipPrims, Clips, MeshPrim, primvars};
 use crate::io::{mesh, usd};
@@ -131,10 +130,6 @@ impl Stage for Track<'_> {
 
     fn reads(&self, frame: i32) -> Reads {
         reads(self.scene, self.surface, self.inputs, frame)
-    }
-
-    fn keeps(&self, _frame: i32) -> Keeps {
-        Keeps::State
     }
 
     fn clip(&self) -> Option<Clips<'_>> {
