@@ -320,6 +320,17 @@ impl Columns {
         (0..).map_while(move |layer| self.column(cell, layer))
     }
 
+    /// The column of a cell that contains a height (m) or is nearest to it, and how far off that is (m).
+    pub fn nearest(&self, cell: [usize; 2], height: f64) -> Option<(usize, f64)> {
+        let off = |index: usize| {
+            let [base, ceiling] =
+                [self.bases()[index], self.ceilings()[index]].map(|height| self.heights.metres(height));
+            (base - height).max(height - ceiling).max(0.0)
+        };
+        let all = self.of_cell(cell).map(|index| (index, off(index)));
+        all.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
     /// b of every index (units), padded by 16 more numbers, so that SIMD loads may read past the last index.
     pub fn bases(&self) -> &[i32] {
         &self.base
