@@ -5,6 +5,7 @@ pub mod polygons;
 pub mod uvs;
 pub mod weld;
 
+use super::shape::six_volumes;
 use super::{DVec3, Vec3};
 use crate::error::{Error, Result};
 
@@ -74,11 +75,8 @@ impl TriMesh {
     pub fn volume(&self) -> f64 {
         let Some((low, _)) = self.bounds() else { return 0.0 };
         let origin: DVec3 = low.cast();
-        let six = |triangle: usize| {
-            let [a, b, c] = self.corners(triangle).map(|p| p - origin);
-            a.dot(&b.cross(&c))
-        };
-        (0..self.triangles.len()).map(six).sum::<f64>() / 6.0 + 0.0
+        let six = (0..self.triangles.len()).map(|triangle| six_volumes(&self.corners(triangle), &origin));
+        six.sum::<f64>() / 6.0 + 0.0
     }
 
     /// Surface area (m2).
@@ -157,6 +155,30 @@ pub fn renumbered(triangles: &[[u32; 3]], used: &[u32]) -> Vec<[u32; 3]> {
     let mut positions = vec![0; used.last().map_or(0, |&last| last as usize + 1)];
     used.iter().zip(0..).for_each(|(&vertex, position)| positions[vertex as usize] = position);
     triangles.iter().map(|triangle| triangle.map(|vertex| positions[vertex as usize])).collect()
+}
+
+/// The vertices out of `count` that triangles use, ascending, and the triangles re-indexed to these.
+pub fn compact(count: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u32; 3]>) {
+    let names = used(count, triangles).unwrap_or_else(|| (0..count as u32).collect());
+    let triangles = renumbered(triangles, &names);
+    (names, triangles)
+}
+
+/// Drops values whose mark is set; those beyond the marks stay.
+pub fn drop_marked<T>(values: &mut Vec<T>, marks: &[bool]) {
+    let mut marks = marks.iter();
+    values.retain(|_| marks.next() != Some(&true));
+}
+
+/// Re-indexes corners after marked vertices, which none of them is, were dropped.
+pub fn renumber_kept(corners: &mut [u32], is_dropped: &[bool]) {
+    let mut kept = 0;
+    let number = |is_dropped: &bool| {
+        kept += u32::from(!is_dropped);
+        kept - u32::from(!is_dropped)
+    };
+    let numbers: Vec<u32> = is_dropped.iter().map(number).collect();
+    corners.iter_mut().for_each(|vertex| *vertex = numbers[*vertex as usize]);
 }
 
 /// Spacing of 32-bit numbers at a coordinate: the resolution of a mesh file there.

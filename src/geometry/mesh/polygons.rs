@@ -2,9 +2,8 @@
 
 use super::validate;
 use crate::error::{Error, Result};
-use crate::geometry::triangulate::ear_clipping;
 use crate::geometry::triangulate::ear_clipping::turn;
-use crate::geometry::triangulate::monotone;
+use crate::geometry::triangulate::{ear_clipping, monotone};
 use crate::geometry::{DVec3, DetailedMesh, MeshArray, TriMesh, Uvs, Vec3};
 
 /// Maximum corners of a polygon: cutting it takes some 300 bytes for each, which no memory limit sees.

@@ -5,7 +5,8 @@ use rayon::prelude::*;
 use super::openvdb::HALF_WIDTH;
 use crate::context::Context;
 use crate::error::{Error, Result};
-use crate::geometry::DVec3;
+use crate::geometry::coords::{around, cell_of};
+use crate::geometry::{Coord, DVec3};
 use crate::numeric::blocks::{DIM, VOXELS};
 use crate::vdb::FloatGrid;
 use crate::vdb::level_set::from_particles;
@@ -60,13 +61,10 @@ pub fn spheres(ctx: &Context, positions: &[DVec3], radius: f64, cell: f64) -> Re
 fn most_blocks(positions: &[DVec3], reach: f64, cell: f64) -> u64 {
     let blocks = (reach / DIM as f64).ceil();
     let edge = blocks * DIM as f64 * cell;
-    let cube = |position: &DVec3| [0, 1, 2].map(|axis| (position[axis] / edge).floor() as i32);
-    let mut cubes: Vec<[i32; 3]> = positions.par_iter().map(cube).collect();
+    let mut cubes: Vec<Coord> = positions.par_iter().map(|position| cell_of(&(position / edge))).collect();
     cubes.par_sort_unstable();
     cubes.dedup();
-    let around =
-        |[x, y, z]: [i32; 3]| (0..27).map(move |n| [x + n / 9 - 1, y + n / 3 % 3 - 1, z + n % 3 - 1]);
-    let mut cubes: Vec<[i32; 3]> = cubes.into_iter().flat_map(around).collect();
+    let mut cubes: Vec<Coord> = cubes.into_iter().flat_map(around).collect();
     cubes.par_sort_unstable();
     cubes.dedup();
     cubes.len() as u64 * (blocks as u64).pow(3)

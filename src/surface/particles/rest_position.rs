@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::geometry::{Coord, DVec3};
 use crate::mesh_repair::Source;
 use crate::surface::Particles;
+use crate::surface::pieces::in_pieces;
 use crate::surface::topology::change::Change;
 use crate::surface::tracked_mesh::Tracker;
 
@@ -75,15 +76,10 @@ impl Rest {
         ctx.phase("rest", || {
             let field = Field::of(self, now, spacing, at)?;
             ctx.check()?;
-            let parts: Vec<Vec<Option<DVec3>>> = at
-                .par_chunks(PIECE)
-                .map(|piece| {
-                    ctx.check()?;
-                    let mut scratch = Scratch::default();
-                    Ok(piece.iter().map(|position| field.first(*position, &mut scratch)).collect())
-                })
-                .collect::<Result<_>>()?;
-            Ok(parts.concat())
+            in_pieces(ctx, at, PIECE, |_, piece| {
+                let mut scratch = Scratch::default();
+                piece.iter().map(|position| field.first(*position, &mut scratch)).collect()
+            })
         })
     }
 

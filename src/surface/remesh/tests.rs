@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use super::shape::{least_angle, normal};
+use super::shape::least_angle;
 use super::*;
 use crate::context::Pool;
 use crate::error::Error;
 use crate::geometry::check::topology::Topology;
+use crate::geometry::shape::normal;
 use crate::geometry::test_meshes;
 use crate::mesh_repair::Source;
 

@@ -16,20 +16,21 @@ use std::collections::{BTreeMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::mesh_distance::{between, far, node};
+use super::mesh_distance::{far, node};
 use super::particle_count::{Bounds, is_within};
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
 use crate::error::Result;
-use crate::geometry::Coord;
-use crate::geometry::DVec3;
 use crate::geometry::check::topology::{bodies, parts};
+use crate::geometry::coords::{around, between, cell_of, cells_at, is_between, nodes_of, plus};
+use crate::geometry::shape::{longest_first, six_volumes};
+use crate::geometry::{Coord, DVec3};
 use crate::mesh_repair::{CellSet, Shape};
 use crate::numeric::blocks::{VOXELS, offset};
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::level_set::sampler::Sampler;
-use crate::surface::particles::grid::cell_of;
+use crate::surface::pieces::in_pieces;
 
 /// How much farther from phi = 0 than its detail the mesh must be to be flagged (spacings; a cell at least).
 const SLACK: f64 = 0.5;
@@ -75,7 +76,7 @@ impl Everywhere<'_> {
         for node in mesh.differing(ctx)? {
             let position = DVec3::from(plus(node, origin).map(f64::from));
             if !self.specks.iter().any(|speck| is_within(speck, &position)) {
-                cells_at(node).for_each(|cell| _ = set.add(cell));
+                cells_at(node).into_iter().for_each(|cell| _ = set.add(cell));
             }
         }
         mesh.stray(ctx)?.into_iter().for_each(|cell| _ = set.add(cell));
@@ -110,7 +111,7 @@ struct Large {
 impl Large {
     /// Whether a block is within `by` blocks of it.
     fn is_near(&self, block: Coord, by: i32) -> bool {
-        (0..3).all(|axis| (self.low[axis] - by..=self.high[axis] + by).contains(&block[axis]))
+        is_between(block, self.low.map(|at| at - by), self.high.map(|at| at + by))
     }
 }
 
@@ -127,23 +128,15 @@ impl Compared<'_> {
     fn differing(&self, ctx: &Context) -> Result<Vec<Coord>> {
         let passed = self.passed(ctx)?;
         let origin = self.origin.map(|at| at >> 3);
-        let known = self.distances.coords().iter().map(|block| [0, 1, 2].map(|at| block[at] - origin[at]));
+        let known = self.distances.coords().iter().map(|block| plus(*block, origin.map(|at| -at)));
         let mut blocks: Vec<Coord> = known.chain(passed.keeps.keys().copied()).collect();
         blocks.sort_unstable();
         blocks.dedup();
-        let lists: Vec<Vec<Coord>> = blocks
-            .par_iter()
-            .map(|block| {
-                ctx.check()?;
-                Ok(self.differing_in(*block, &passed))
-            })
-            .collect::<Result<_>>()?;
-        Ok(lists.concat())
+        in_pieces(ctx, &blocks, 1, |_, blocks| self.differing_in(blocks[0], &passed))
     }
 
     fn differing_in(&self, block: Coord, passed: &Passed) -> Vec<Coord> {
-        let around = between(block.map(|at| at - 1), block.map(|at| at + 1));
-        let near = around.filter_map(|block| passed.keeps.get(&block).copied());
+        let near = around(block).into_iter().filter_map(|block| passed.keeps.get(&block).copied());
         let large = passed.large.iter().filter(|large| large.is_near(block, 1)).map(|large| large.keeps);
         let allowed = self.slack + near.chain(large).fold(0.0, f32::max);
         let there = plus(block, self.origin.map(|at| at >> 3));
@@ -238,7 +231,7 @@ impl Compared<'_> {
             ctx.check()?;
             let corners = || part.iter().map(move |triangle| self.corners(&triangles[*triangle as usize]));
             let Some([first, ..]) = corners().next() else { continue };
-            let six = corners().map(|[a, b, c]| (a - first).dot(&(b - first).cross(&(c - first))));
+            let six = corners().map(|corners| six_volumes(&corners, &first));
             let is_hollow = six.sum::<f64>() < 0.0;
             if is_hollow
                 && corners().flatten().all(|position| self.phi_at(&mut sampler, position) < -self.slack)
@@ -259,15 +252,15 @@ impl Compared<'_> {
         let mut due: Vec<Coord> = Vec::new();
         for cell in surface {
             set.add(cell);
-            due.extend((0..8).map(|n| plus(cell, corner(n))));
+            due.extend(nodes_of(cell));
         }
         let mut seen: HashSet<Coord> = HashSet::new();
         while let Some(node) = due.pop() {
-            let is_there = (0..3).all(|axis| (low[axis]..=high[axis] + 1).contains(&node[axis]));
+            let is_there = is_between(node, low, high.map(|at| at + 1));
             if !is_there || !seen.insert(node) || self.is_inside(node) || self.phi_of(node) >= -self.slack {
                 continue;
             }
-            cells_at(node).for_each(|cell| _ = set.add(cell));
+            cells_at(node).into_iter().for_each(|cell| _ = set.add(cell));
             for axis in 0..3 {
                 for by in [-1, 1] {
                     let mut beside = node;
@@ -316,29 +309,6 @@ impl Compared<'_> {
 fn raise(all: &mut BTreeMap<Coord, f32>, block: Coord, keeps: f32) {
     let most = all.entry(block).or_default();
     *most = most.max(keeps);
-}
-
-fn plus(a: Coord, b: Coord) -> Coord {
-    [0, 1, 2].map(|axis| a[axis] + b[axis])
-}
-
-/// A corner of a cell, relative to its first node.
-fn corner(n: i32) -> Coord {
-    [n >> 2, n >> 1 & 1, n & 1]
-}
-
-/// The eight cells around a node.
-fn cells_at(node: Coord) -> impl Iterator<Item = Coord> {
-    (0..8).map(move |n| plus(node, corner(n).map(|at| -at)))
-}
-
-/// The corners of a triangle, rotated so that its longest edge is the first.
-fn longest_first([a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
-    match [(a - b).norm_squared(), (b - c).norm_squared(), (c - a).norm_squared()] {
-        [ab, bc, ca] if ab >= bc && ab >= ca => [a, b, c],
-        [_, bc, ca] if bc >= ca => [b, c, a],
-        _ => [c, a, b],
-    }
 }
 
 /// Calls `see` with positions on a triangle whose first edge is its longest, at most a cell apart.

@@ -7,11 +7,11 @@ use super::hidden::Everywhere;
 use super::uncovered_parts::is_near;
 use crate::context::Context;
 use crate::error::Result;
+use crate::geometry::coords::cell_of;
 use crate::geometry::{Coord, DVec3};
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::Implicit;
 use crate::surface::params::Params;
-use crate::surface::particles::grid::cell_of;
 use crate::surface::tracked_mesh::Tracker;
 use crate::surface::tracker::{Covered, Next};
 

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::geometry::coords::nodes_of;
 use crate::geometry::{Coord, DVec3};
 use crate::surface::Particles;
 use crate::surface::params::{Params, Weighting};
@@ -122,7 +123,7 @@ impl Field<'_> {
     fn carry_by_maps(&self, ctx: &Context, vertices: &mut [DVec3], order: &mut [(Coord, u32)]) -> Result<()> {
         sort(vertices, self.spacing, order);
         let groups: Vec<&[(Coord, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
-        let mut nodes: Vec<Coord> = groups.iter().flat_map(|group| corners(group[0].0)).collect();
+        let mut nodes: Vec<Coord> = groups.iter().flat_map(|group| nodes_of(group[0].0)).collect();
         nodes.par_sort_unstable_by_key(|node| (node.map(|x| x >> 1), *node));
         nodes.dedup();
         // Nodes in the same particle cell share the particles around them.
@@ -143,7 +144,7 @@ impl Field<'_> {
         };
         let follow = |group: &[(Coord, u32)]| {
             let cell = group[0].0;
-            let around = corners(cell).each_ref().map(find);
+            let around = nodes_of(cell).each_ref().map(find);
             let way = |(_, vertex): &(Coord, u32)| {
                 let at = vertices[*vertex as usize] / self.spacing - DVec3::from(cell.map(f64::from));
                 blended(&around, at).unwrap_or_else(|| self.mean_far(vertices[*vertex as usize]))
@@ -238,11 +239,6 @@ fn add(groups: &[&[(Coord, u32)]], ways: &[Vec<DVec3>], vertices: &mut [DVec3]) 
     for ((_, vertex), way) in groups.iter().copied().flatten().zip(ways.iter().flatten()) {
         vertices[*vertex as usize] += way;
     }
-}
-
-/// The eight nodes of a cell: bits x, y and z of their index.
-fn corners(cell: Coord) -> [Coord; 8] {
-    std::array::from_fn(|n| [0, 1, 2].map(|axis| cell[axis] + (n >> (2 - axis) & 1) as i32))
 }
 
 /// Blends the maps at the corners of a cell at a position in it (0..1 on each axis): weights grow with proximity and with the particle

@@ -3,10 +3,10 @@
 
 use std::collections::BTreeMap;
 
+use crate::geometry::coords::{between, cell_of};
 use crate::geometry::{Coord, DVec3};
 use crate::numeric::blocks::DIM;
 use crate::surface::level_set::band::reach_in;
-use crate::surface::particles::grid::cell_of;
 use crate::surface::tracked_mesh::{DRIFT, REACH, Tracker, WIDER};
 
 /// Blocks of the band, ascending, and its reach in each (cells).
@@ -44,9 +44,7 @@ impl Tracker {
             }
         }
         let blocks = |([low, high], reach): ([Coord; 2], f64)| {
-            let on = move |axis: usize| low[axis]..=high[axis];
-            let all = on(0).flat_map(move |x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z])));
-            all.map(move |block| (block, reach as f32))
+            between(low, high).map(move |block| (block, reach as f32))
         };
         sorted(boxes.into_iter().flat_map(blocks).collect())
     }

@@ -8,7 +8,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::check::deviation::NearestTree;
 use crate::geometry::check::topology::{around, bodies};
-use crate::geometry::mesh::{renumbered, used};
+use crate::geometry::mesh::compact;
 use crate::geometry::{DVec3, TriMesh, Vec3};
 use crate::mesh_repair::{Source, weights};
 use crate::surface::topology::change::Change;
@@ -201,8 +201,7 @@ impl Patch {
     }
 
     fn of(vertices: usize, triangles: Vec<[u32; 3]>, is_loose: impl Fn(u32) -> bool) -> Self {
-        let names = used(vertices, &triangles).unwrap_or_else(|| (0..vertices as u32).collect());
-        let triangles = renumbered(&triangles, &names);
+        let (names, triangles) = compact(vertices, &triangles);
         Self { is_loose: names.iter().map(|name| is_loose(*name)).collect(), names, triangles }
     }
 

@@ -19,21 +19,8 @@ impl Tracker {
     /// Parameters out of range.
     pub fn without_mesh(params: Params) -> Result<Self> {
         params.validate()?;
-        Ok(Self {
-            params,
-            vertices: Vec::new(),
-            triangles: Vec::new(),
-            delta: Vec::new(),
-            detail_retention: Vec::new(),
-            flags: Vec::new(),
-            bare: Vec::new(),
-            reach: crate::surface::tracked_mesh::REACH[0],
-            // Its state includes its own triangles: none.
-            is_rebuilt: true,
-            sizes: Vec::new(),
-            drift: Drift::default(),
-            ahead: Ahead::default(),
-        })
+        // Its state includes its own triangles: none.
+        Ok(Self { is_rebuilt: true, ..Self::of(params, Vec::new(), Vec::new()) })
     }
 
     /// A step to a frame without particles.
