@@ -5,6 +5,7 @@ pub mod polygons;
 pub mod uvs;
 pub mod weld;
 
+use super::check::edges::{Use, edge_uses, imbalance, is_same_edge};
 use super::shape::six_volumes;
 use super::{DVec3, Vec3};
 use crate::error::{Error, Result};
@@ -88,37 +89,27 @@ impl TriMesh {
         (0..self.triangles.len()).map(twice).sum::<f64>() / 2.0 + 0.0
     }
 
-    /// The edges of each triangle, sorted, smaller vertex index first: with 1 if the triangle runs along the edge in this order, else -1.
-    fn edge_uses(&self) -> Vec<((u32, u32), i32)> {
-        let mut edges: Vec<((u32, u32), i32)> = self
-            .triangles
-            .iter()
-            .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
-            .map(|(i, j)| if i < j { ((i, j), 1) } else { ((j, i), -1) })
-            .collect();
-        edges.sort_unstable();
-        edges
+    fn edge_uses(&self) -> Vec<Use> {
+        edge_uses(self.positions.len(), &self.triangles)
     }
 
     /// Whether every edge is used as often in one direction as in the other.
     pub fn is_closed(&self) -> bool {
-        let edges = self.edge_uses();
-        edges.chunk_by(|a, b| a.0 == b.0).all(|uses| uses.iter().map(|(_, way)| way).sum::<i32>() == 0)
+        self.edge_uses().chunk_by(is_same_edge).all(|run| imbalance(&self.triangles, run) == 0)
     }
 
     /// Whether it is closed and no edge has more than two triangles.
     pub fn is_manifold(&self) -> bool {
-        let edges = self.edge_uses();
-        edges.chunk_by(|a, b| a.0 == b.0).all(|uses| uses.len() == 2 && uses[0].1 + uses[1].1 == 0)
+        let is_whole = |run: &[Use]| run.len() == 2 && imbalance(&self.triangles, run) == 0;
+        self.edge_uses().chunk_by(is_same_edge).all(is_whole)
     }
 
     /// Vertices minus edges plus faces, counting only used vertices: 2 for a sphere.
     pub fn euler_characteristic(&self) -> i64 {
-        let mut used: Vec<u32> = self.triangles.as_flattened().to_vec();
-        used.sort_unstable();
-        used.dedup();
-        let edges = self.edge_uses().chunk_by(|a, b| a.0 == b.0).count();
-        used.len() as i64 - edges as i64 + self.triangles.len() as i64
+        let used =
+            used(self.positions.len(), &self.triangles).map_or(self.positions.len(), |used| used.len());
+        let edges = self.edge_uses().chunk_by(is_same_edge).count();
+        used as i64 - edges as i64 + self.triangles.len() as i64
     }
 
     /// The mesh with its triangles flipped.
@@ -230,15 +221,8 @@ pub fn coincident(positions: impl Iterator<Item = DVec3>) -> Vec<u32> {
     // Open addressing, at most half full: several times faster than a map; a host needs this in every step.
     let bits = (2 * keys.len().max(1)).next_power_of_two().ilog2().max(1);
     let mut slots = vec![u32::MAX; 1 << bits];
-    let home = |key: &[u64; 3]| {
-        let mixed = key.iter().fold(0u64, |hash, part| {
-            let hash = (hash.rotate_left(23) ^ part).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            hash ^ hash >> 32
-        });
-        (mixed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - bits)) as usize
-    };
     let first = |(key, number): (&[u64; 3], u32)| {
-        let mut slot = home(key);
+        let mut slot = home(key, bits);
         loop {
             match slots[slot] {
                 u32::MAX => {
@@ -251,6 +235,15 @@ pub fn coincident(positions: impl Iterator<Item = DVec3>) -> Vec<u32> {
         }
     };
     keys.iter().zip(0..).map(first).collect()
+}
+
+/// The slot of a key in a hash table of 2^`bits` slots.
+fn home(key: &[u64; 3], bits: u32) -> usize {
+    let mixed = key.iter().fold(0u64, |hash, part| {
+        let hash = (hash.rotate_left(23) ^ part).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        hash ^ hash >> 32
+    });
+    (mixed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - bits)) as usize
 }
 
 /// Checks the vertices and faces of a mesh.

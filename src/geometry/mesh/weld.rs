@@ -16,7 +16,7 @@
 //!
 //! The nearest corners are joined first, and never both ends of an edge: a triangle as thin as the rounding is kept.
 
-use super::coincident;
+use super::{coincident, home};
 use crate::geometry::DVec3;
 use crate::geometry::check::topology::Sets;
 use crate::geometry::lists::Lists;
@@ -371,17 +371,10 @@ fn near_pairs(steps: &[[i64; 3]], some: &[u32]) -> (Vec<NearPair>, Vec<u32>) {
     let cell = |at: [i64; 3]| at.map(|step| step.div_euclid(CELL));
     // Open addressing, at most half full; each slot leads to the last vertex of its cell, and each vertex to the one before it.
     let bits = (2 * some.len().max(1)).next_power_of_two().ilog2().max(1);
-    let home = |key: [i64; 3]| {
-        let mixed = key.iter().fold(0u64, |hash, &part| {
-            let hash = (hash.rotate_left(23) ^ part as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            hash ^ hash >> 32
-        });
-        (mixed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - bits)) as usize
-    };
     let mut slots = vec![u32::MAX; 1 << bits];
     let mut before = vec![u32::MAX; steps.len()];
     let find = |slots: &[u32], key: [i64; 3]| {
-        let mut slot = home(key);
+        let mut slot = home(&key.map(|part| part as u64), bits);
         while slots[slot] != u32::MAX && cell(steps[slots[slot] as usize]) != key {
             slot = (slot + 1) & ((1 << bits) - 1);
         }

@@ -145,8 +145,8 @@ impl Parts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
     use crate::geometry::Vec3;
+    use crate::surface::test_particles::context;
 
     /// An octahedron with its corners at a distance `size` (m) from a centre.
     fn octahedron(centre: [f32; 3], size: f32) -> TriMesh {
@@ -190,7 +190,7 @@ mod tests {
 
     #[test]
     fn a_small_drop_and_a_small_cavity_become_no_needles() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         for (mut mesh, corners) in [(spindle(1, 6).reversed(), 8), (spindle(2, 4), 10)] {
             assert!(mesh.is_closed() && mesh.positions.len() == corners);
             let far = |mesh: &TriMesh| {
@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn the_smallest_drop_and_its_larger_neighbour_keep_their_volumes() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let mut mesh = octahedron([0.0; 3], 0.01);
         mesh.append(&octahedron([5.0, 1.0, 0.0], 0.02));
         // A corner that sticks out.

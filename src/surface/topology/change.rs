@@ -264,14 +264,13 @@ fn flagged(unfit: &Unfit<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
     use crate::geometry::check::faults::Faults;
-    use crate::surface::test_particles::{own_surface, two_balls};
+    use crate::surface::test_particles::{context, own_surface, two_balls};
     use crate::surface::{Params, Tracker};
 
     #[test]
     fn two_balls_become_one_and_part_again() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         // Together and apart, with a hollow in time to merge.
         let away = |frame: i32| 9.0 - 0.25 * f64::from(if frame < 24 { frame } else { 48 - frame });
         let at = |frame: i32| two_balls(5.5, DVec3::new(away(frame), 0.1, 0.2));

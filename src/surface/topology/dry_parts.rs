@@ -78,9 +78,8 @@ impl Change {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::{Context, Pool};
     use crate::geometry::coords::between;
-    use crate::surface::test_particles::{numbered, own_surface, shell};
+    use crate::surface::test_particles::{context, numbered, own_surface, shell};
     use crate::surface::{Params, Particles, Tracker};
 
     const FRAMES: i32 = 28;
@@ -106,7 +105,7 @@ mod tests {
 
     /// Follows it to the end: the count of specks removed, and the counts of vertices at both drops in each of the last frames.
     fn followed(min_drop: usize) -> (usize, Vec<[usize; 2]>) {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let mut from = splash(0).0;
         let mesh = own_surface(&ctx, &from.positions);
         let params = Params { rebuild: true, min_drop, ..Params::for_spacing(1.0) };
@@ -139,7 +138,7 @@ mod tests {
     #[test]
     fn a_hollow_goes_with_the_drop_around_it() {
         const LEAST: usize = 1200;
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let ball = shell(DVec3::zeros(), 0.0, 7.0);
         let hollow = shell(DVec3::new(-20.0, 0.3, 0.2), 4.0, 6.5);
         assert!(hollow.len() < LEAST && ball.len() >= LEAST, "{} and {}", hollow.len(), ball.len());

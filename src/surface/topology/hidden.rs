@@ -330,15 +330,10 @@ fn each_position([a, b, c]: [DVec3; 3], mut see: impl FnMut(DVec3)) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
     use crate::geometry::check::faults::Faults;
     use crate::geometry::{TriMesh, Vec3};
-    use crate::surface::test_particles::{numbered, own_surface, shell, two_balls};
+    use crate::surface::test_particles::{context, numbered, own_surface, shell, two_balls};
     use crate::surface::{Params, Tracker};
-
-    fn context() -> Context {
-        Context::new(Pool::new(2).unwrap())
-    }
 
     /// A mesh tracked along particles that stay where they are.
     fn followed(ctx: &Context, mesh: &TriMesh, positions: &[DVec3], every: bool) -> Tracker {
@@ -361,7 +356,7 @@ mod tests {
 
     #[test]
     fn a_hollow_with_liquid_in_it_is_filled() {
-        let ctx = context();
+        let ctx = context(2);
         let positions = shell(DVec3::zeros(), 0.0, 6.5);
         let mut mesh = own_surface(&ctx, &positions);
         let hollow = own_surface(&ctx, &shell(DVec3::new(2.5, 0.3, 0.2), 0.0, 2.0));
@@ -375,7 +370,7 @@ mod tests {
 
     #[test]
     fn a_bubble_of_the_liquid_is_meshed() {
-        let ctx = context();
+        let ctx = context(2);
         let places = shell(DVec3::zeros(), 5.0, 8.5);
         let whole = own_surface(&ctx, &places);
         let of_part = |part: Vec<u32>| {
@@ -394,7 +389,7 @@ mod tests {
 
     #[test]
     fn a_needle_across_a_gap_is_cut() {
-        let ctx = context();
+        let ctx = context(2);
         let positions = two_balls(3.5, DVec3::new(-7.0, 0.0, 0.0)).positions;
         let mut mesh = own_surface(&ctx, &positions);
         // The tip of a triangle that faces the other ball is pulled up to it.
@@ -424,7 +419,7 @@ mod tests {
 
     #[test]
     fn detail_stays_as_it_is() {
-        let ctx = context();
+        let ctx = context(2);
         let positions = shell(DVec3::zeros(), 0.0, 6.5);
         let mut mesh = own_surface(&ctx, &positions);
         // A bump of 2 m on one side, a dent of 1.5 m on the other.

@@ -93,13 +93,12 @@ impl Tracker {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
-    use crate::surface::test_particles::{numbered, own_surface, shell};
+    use crate::surface::test_particles::{context, numbered, own_surface, shell};
 
     #[test]
     fn a_vertex_that_jumps_alone_has_a_step_to_come_back() {
         let particles = numbered(shell(DVec3::zeros(), 0.0, 3.2));
-        let ctx = Context::new(Pool::new(1).unwrap());
+        let ctx = context(1);
         let mesh = own_surface(&ctx, &particles.positions);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
         let mut tracker = Tracker::new(&ctx, params, &mesh, &particles).unwrap();

@@ -267,11 +267,11 @@ pub(in crate::surface) fn validate_step(from: &Particles, to: &Particles, dt: f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
+    use crate::surface::test_particles::context;
 
     #[test]
     fn positions_outside_of_the_particles_turn_with_them_and_lag_behind_by_the_mean() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let grid = (0..729).map(|n| [n / 81, n / 9 % 9, n % 9].map(|x| f64::from(x) - 4.0));
         let positions: Vec<DVec3> = grid.map(DVec3::from).collect();
         let turn = |position: &DVec3| position + DVec3::new(-position.z, 0.0, position.x) * 0.05;

@@ -65,13 +65,12 @@ pub fn covers(deep: &[(Coord, f32)], other: &[(Coord, f32)]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::{Context, Pool};
-    use crate::surface::test_particles::{numbered, own_surface, shell};
+    use crate::surface::test_particles::{context, numbered, own_surface, shell};
     use crate::surface::{Params, Particles};
 
     #[test]
     fn one_deep_detail_widens_the_band_around_it_alone_and_is_kept() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let positions = shell(DVec3::zeros(), 0.0, 6.2);
         let mut mesh = own_surface(&ctx, &positions);
         for vertex in [17, 18] {

@@ -249,13 +249,12 @@ impl Patch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
-    use crate::surface::test_particles::{own_surface, two_balls};
+    use crate::surface::test_particles::{context, own_surface, two_balls};
     use crate::surface::{Params, Tracker};
 
     #[test]
     fn the_old_surface_leads_to_the_bridge_that_comes() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let balls = |away: f64| two_balls(4.2, DVec3::new(away, 0.1, 0.0));
         let mut from = balls(6.5);
         let mesh = own_surface(&ctx, &from.positions);

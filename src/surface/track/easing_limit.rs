@@ -183,8 +183,7 @@ impl Bins {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
-    use crate::surface::test_particles::{own_surface, two_balls};
+    use crate::surface::test_particles::{context, own_surface, two_balls};
     use crate::surface::{Outlook, Params, Tracker};
 
     /// Two cubes with a gap of 1 between them.
@@ -204,7 +203,7 @@ mod tests {
 
     #[test]
     fn faces_that_would_pass_through_each_other_stop_short_and_others_do_not() {
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let (vertices, triangles) = cubes();
         let within = |by: f64| uncrossed(&ctx, &vertices, &triangles, towards(&vertices, by)).unwrap();
         assert_eq!(within(0.49), towards(&vertices, 0.49));
@@ -227,7 +226,7 @@ mod tests {
     #[test]
     fn a_mesh_that_is_shown_before_a_merge_meets_itself_nowhere_that_it_does_not_anyway() {
         const AHEAD: usize = 4;
-        let ctx = Context::new(Pool::new(2).unwrap());
+        let ctx = context(2);
         let balls = |frame: usize| two_balls(4.2, DVec3::new(6.5 - 0.2 * frame as f64, 0.1, 0.0));
         let mesh = own_surface(&ctx, &balls(0).positions);
         let params = Params { rebuild: true, ..Params::for_spacing(1.0) };

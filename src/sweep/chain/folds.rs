@@ -18,7 +18,7 @@ use crate::distance::region::{Region, extent};
 use crate::distance::winding::Lines;
 use crate::error::Result;
 use crate::geometry::DVec3;
-use crate::geometry::coords::between;
+use crate::geometry::coords::{around, between};
 use crate::sweep::moving_mesh::passages::{Change, Passage, Place, Poses, Step, Still, face, to_f64};
 use crate::sweep::moving_mesh::topology::{Simplex, Topology};
 use crate::sweep::window::Window;
@@ -152,10 +152,6 @@ fn folded_blocks(
     };
     let simplices = topology.simplices.par_iter().with_min_len(GRAIN);
     let faces: Vec<Face> = simplices.map(|simplex| face(simplex, level)).filter(wanted).collect();
-    let around = |block: [i32; 3]| {
-        let [low, high] = [-1, 1].map(|by| block.map(|position| position + by));
-        between(low, high)
-    };
     Ok(negative_blocks(&faces, window).into_iter().flat_map(around).collect())
 }
 

@@ -137,17 +137,13 @@ impl Matching {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::Pool;
     use crate::geometry::DVec3;
     use crate::geometry::coords::between;
+    use crate::surface::test_particles::context;
 
     const SOLVERS: [Solver; 2] = [Solver::Sor, Solver::Gradients];
     /// Extent of the grid of two balls from the origin on each axis (cells).
     const HALF: [i32; 3] = [26, 18, 18];
-
-    fn context(threads: usize) -> Context {
-        Context::new(Pool::new(threads).unwrap())
-    }
 
     fn matching(solver: Solver, tolerance: f64, reach: i32) -> Matching {
         Matching { solver, tolerance, reach, most: 5000, omega: None }
