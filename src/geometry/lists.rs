@@ -14,13 +14,13 @@ pub struct Lists<T> {
 
 impl<T: Copy + Default + Send + Sync> Lists<T> {
     /// Sorts items into `count` lists by the index given with each; the order within a list is preserved.
-    pub fn new(count: usize, parts: &[Vec<(u32, T)>]) -> Self {
+    pub fn new(count: usize, all: impl Iterator<Item = (u32, T)> + Clone) -> Self {
         let mut start = vec![0u32; count + 1];
-        parts.iter().flatten().for_each(|&(list, _)| start[list as usize + 1] += 1);
+        all.clone().for_each(|(list, _)| start[list as usize + 1] += 1);
         (0..count).for_each(|list| start[list + 1] += start[list]);
         let mut position = start.clone();
         let mut items = vec![T::default(); start[count] as usize];
-        for &(list, item) in parts.iter().flatten() {
+        for (list, item) in all {
             let slot = &mut position[list as usize];
             items[*slot as usize] = item;
             *slot += 1;
@@ -41,6 +41,11 @@ impl<T: Copy + Default + Send + Sync> Lists<T> {
     /// The items of all lists.
     pub fn items(&self) -> &[T] {
         &self.items
+    }
+
+    /// The items of all lists, without the lists.
+    pub fn into_items(self) -> Vec<T> {
+        self.items
     }
 
     /// The items of a list.
@@ -101,7 +106,7 @@ mod tests {
     #[test]
     fn lists_keep_the_order_of_their_items() {
         let parts = [vec![(2, 1), (0, 2), (2, 3)], vec![], vec![(2, 4), (199, 5)]];
-        let mut lists = Lists::new(200, &parts);
+        let mut lists = Lists::new(200, parts.iter().flatten().copied());
         assert_eq!(
             (lists.get(0), lists.get(1), lists.get(2), lists.get(199)),
             (&[2][..], &[][..], &[1, 3, 4][..], &[5][..])
