@@ -5,6 +5,7 @@
 
 pub mod grid;
 pub(in crate::shallow) mod per_column;
+pub(in crate::shallow) mod runs;
 pub(in crate::shallow) mod stacks;
 
 use std::ops::Range;
@@ -251,6 +252,11 @@ impl Columns {
     /// The strip at the same position of the previous row, or [`NONE`].
     pub fn north(&self, strip: usize) -> u32 {
         self.north[strip]
+    }
+
+    /// One more than the highest layer of a strip; 0 without strips.
+    pub(in crate::shallow) fn layers(&self) -> usize {
+        self.strips.iter().map(|strip| strip.layer as usize + 1).max().unwrap_or(0)
     }
 
     /// The strip at the same position of the next row, or [`NONE`].
