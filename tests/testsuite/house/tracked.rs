@@ -44,8 +44,8 @@ fn what_tools_write_is_ignored() {
         "python/build/lib/frazil/mesh.py",
         "python/frazil.egg-info/PKG-INFO",
         "dist/frazil.tar.gz",
-        "tests/ctest/build/CMakeCache.txt",
-        "tests/ctest_core/CMakeFiles/x",
+        "tests/ctest/full/build/CMakeCache.txt",
+        "tests/ctest/core/CMakeFiles/x",
         "examples/csharp/Spill.exe",
         "examples/c/press_snow.o",
     ];
