@@ -193,9 +193,7 @@ pub fn run(h: &mut Harness) {
     if h.wants("capi.state") {
         state(h);
     }
-    if h.wants("capi.border") {
-        border(h);
-    }
+    h.measure("capi.border_cost", border);
     programs(h);
 }
 
@@ -298,7 +296,7 @@ fn measure(h: &mut Harness, host: &Host, name: &str, note: &str) {
 }
 
 /// Steps of `small` through C over the same steps in Rust, in turn.
-fn border(h: &mut Harness) {
+fn border() -> (f64, String) {
     let ctx = context(2);
     let (layer, body) = scenes::small(&ctx, 2.0);
     let params = *layer.params();
@@ -338,7 +336,7 @@ fn border(h: &mut Harness) {
     }
     let (c, rust) = (median(through_c), median(in_rust));
     let note = format!("threads=2, {} frames in {c:.4} s through C, in {rust:.4} s in Rust", FRAMES - 1);
-    h.gate("capi.border_cost", c / rust, &note);
+    (c / rust, note)
 }
 
 /// What a program of tests/ctest says; none when it was not built. The C library keeps one heap for all of its
@@ -358,15 +356,6 @@ fn number_after(text: &str, word: &str) -> Option<f64> {
 /// Gates that are programs of their own, linked with the installed library.
 fn programs(h: &mut Harness) {
     let none = "not built: make gates does it";
-    if h.wants("capi.fake_host") {
-        let runs = ["fake_host", "fake_host_static", "fake_host_pkgconfig"].map(|program| said(program, &[]));
-        let all = runs.iter().all(|run| run.as_ref().is_some_and(|(worked, _)| *worked));
-        h.holds(
-            "capi.fake_host",
-            all,
-            "frames 1 2 3 9 4, two nodes, random cancels; shared, static, pkg-config",
-        );
-    }
     if h.wants("capi.load") {
         let (_, text) = said("load_cycles", &[]).unwrap_or_default();
         let threads = number_after(&text, "threads").unwrap_or(f64::INFINITY);
@@ -385,11 +374,6 @@ fn programs(h: &mut Harness) {
         let count = if ours.is_empty() { f64::INFINITY } else { others.len() as f64 };
         let note = format!("{} functions", ours.len());
         h.gate("capi.symbols", count, &note);
-    }
-    if h.wants("capi.unused") {
-        let bare = crate::common::header::bare_functions();
-        let note = if bare.is_empty() { String::new() } else { bare.join(" ") };
-        h.gate("capi.unused", bare.len() as f64, &note);
     }
     if h.wants("capi.misuse") {
         let (_, text) = said("misuse", &["100000", "20261121"]).unwrap_or_default();

@@ -8,9 +8,7 @@ use frazil::geometry::{DVec3, TriMesh};
 use frazil::io::{mesh, particles};
 
 use crate::common::bodies::Dice;
-use crate::harness::Harness;
 
-const NAME: &str = "reliability.empty_frames";
 /// Frames of a sequence, and patterns of them.
 const FRAMES: usize = 8;
 const PATTERNS: usize = 12;
@@ -30,10 +28,7 @@ struct Count {
     all: usize,
 }
 
-pub fn run(h: &mut Harness) {
-    if !h.wants(NAME) {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let folder = std::env::temp_dir().join(format!("frazil-empty-frames-{}", std::process::id()));
     let mut count = Count::default();
     for (n, pattern) in patterns().iter().enumerate() {
@@ -46,7 +41,7 @@ pub fn run(h: &mut Harness) {
     }
     let _ = std::fs::remove_dir_all(folder);
     let note = format!("of {} frames of {PATTERNS} patterns in 7 stages", count.all);
-    h.gate(NAME, count.lost as f64, &note);
+    (count.lost as f64, note)
 }
 
 /// Emitters, drains, what comes back, gaps, and any.

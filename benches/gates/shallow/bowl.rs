@@ -3,7 +3,7 @@
 
 use crate::common::liquids::context;
 use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
+use crate::plots::Plot;
 use crate::shallow::ground::{G, between, depth, dry, ground, pour, viscous};
 
 /// Radius of the puddle and depth in its middle (m).
@@ -57,10 +57,10 @@ pub fn run(h: &mut Harness) {
     h.gate("shallow.bowl_period", 100.0 * (own / period - 1.0).abs(), &note);
     let theory =
         (0..=600).map(|i| f64::from(i) / 100.0).map(|t| [t, 1e3 * first * (std::f64::consts::TAU * t).cos()]);
-    Plot::new(
+    Plot::linear(
         "Swing in a parabolic bowl (Thacker 1981)",
-        Axis::linear("time (periods of theory)"),
-        Axis::linear("centre of mass (mm)"),
+        "time (periods of theory)",
+        "centre of mass (mm)",
     )
     .line("theory", theory)
     .points("pipes", positions.iter().step_by(FRAMES / 10).map(|[time, x]| [time / period, 1e3 * x]))

@@ -3,7 +3,7 @@
 
 use crate::common::liquids::context;
 use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
+use crate::plots::Plot;
 use crate::shallow::ground::{G, between, depth, dry, ground, pour, run_until, viscous};
 
 /// Depths behind and before the dam (m).
@@ -37,15 +37,11 @@ pub fn run(h: &mut Harness) {
     h.gate("shallow.dam_depth", off(middle, stoker.depth), &note(off(middle, pipes.depth)));
     let line =
         |theory: &Break| theory.shape().map(|[speed, depth]| [speed * TIME, 1e3 * depth]).collect::<Vec<_>>();
-    Plot::new(
-        "A dam breaks over shallow water, after 0.6 s",
-        Axis::linear("from the dam (m)"),
-        Axis::linear("depth (mm)"),
-    )
-    .line("theory (Stoker 1957)", line(&stoker))
-    .line("theory without carried momentum", line(&pipes))
-    .points("pipes", own.iter().step_by(8).map(|[x, depth]| [*x, 1e3 * depth]))
-    .write("shallow_dam");
+    Plot::linear("A dam breaks over shallow water, after 0.6 s", "from the dam (m)", "depth (mm)")
+        .line("theory (Stoker 1957)", line(&stoker))
+        .line("theory without carried momentum", line(&pipes))
+        .points("pipes", own.iter().step_by(8).map(|[x, depth]| [*x, 1e3 * depth]))
+        .write("shallow_dam");
 }
 
 /// A dam that has broken: waves that run up into the deep water, a plateau, and a step that runs over the shallow water.

@@ -9,7 +9,7 @@ use frazil::shallow::Shallow;
 
 use crate::common::liquids::context;
 use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
+use crate::plots::Plot;
 use crate::shallow::ground::{G, between, dry, ground, pour, viscous};
 
 /// Cells along an edge of the basin: a wave.
@@ -50,16 +50,12 @@ pub fn run(h: &mut Harness) {
     };
     let periods = STEPS as f64 / (PERIOD * SAMPLE) as f64;
     let decay = |t: f64| (-3.0 * WATER / (DEEP * DEEP) * t * slowed.period).exp();
-    Plot::new(
-        "Energy of standing waves",
-        Axis::linear("time (periods)"),
-        Axis::linear("energy over its start"),
-    )
-    .line("theory, nu = 0", [[0.0, 1.0], [periods, 1.0]])
-    .line("theory, water", (0..=50).map(|i| periods * f64::from(i) / 50.0).map(|t| [t, decay(t)]))
-    .points("pipes, nu = 0", shown(&free))
-    .points("pipes, water", shown(&slowed))
-    .write("shallow_energy");
+    Plot::linear("Energy of standing waves", "time (periods)", "energy over its start")
+        .line("theory, nu = 0", [[0.0, 1.0], [periods, 1.0]])
+        .line("theory, water", (0..=50).map(|i| periods * f64::from(i) / 50.0).map(|t| [t, decay(t)]))
+        .points("pipes, nu = 0", shown(&free))
+        .points("pipes, water", shown(&slowed))
+        .write("shallow_energy");
 }
 
 /// Waves that have run.

@@ -4,7 +4,7 @@ use frazil::Context;
 
 use crate::common::liquids::context;
 use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
+use crate::plots::Plot;
 use crate::shallow::ground::{G, between, depth, dry, ground, pour, run_until, viscous};
 
 /// Blood (m2/s), as in the thesis.
@@ -81,7 +81,7 @@ fn plot(ctx: &Context, gentle: Vec<[f64; 2]>) {
     };
     let steep =
         DEPTHS.map(|thick| [thick * 1e3, film(ctx, [1.0, 0.0], thick, 1.0)[0] * theory(1.0, thick) * 1e3]);
-    Plot::new("Nusselt film of blood", Axis::log("depth (mm)"), Axis::log("mean velocity (mm/s)"))
+    Plot::log("Nusselt film of blood", "depth (mm)", "mean velocity (mm/s)")
         .line("theory, slope 0.1", curve(0.1))
         .line("theory, slope 1", curve(1.0))
         .points("pipes, slope 0.1", gentle)

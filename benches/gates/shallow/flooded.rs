@@ -11,7 +11,7 @@ use frazil::shallow::{Params, Shallow};
 
 use crate::common::shallow::context;
 use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
+use crate::plots::Plot;
 use crate::shallow::ground::{G, between, depth, viscous};
 
 /// Edge of a cell, height of the passage, and how high the legs stand (m).
@@ -39,9 +39,7 @@ pub fn run(h: &mut Harness) {
     if h.wants("shallow.flooded_period") {
         period(h);
     }
-    if h.wants("shallow.flooded_levels") {
-        levels(h);
-    }
+    h.measure("shallow.flooded_levels", levels);
 }
 
 impl Tube {
@@ -103,10 +101,10 @@ fn period(h: &mut Harness) {
     let apart = 0.001;
     let (mut worst, mut notes): (f64, Vec<String>) = (0.0, Vec::new());
     let theory = (0..=600).map(|i| f64::from(i) / 100.0).map(|t| [t, 1e3 * apart * libm::cos(TAU * t)]);
-    let mut plot = Plot::new(
+    let mut plot = Plot::linear(
         "Swing of two legs through a flooded passage",
-        Axis::linear("time (periods of theory)"),
-        Axis::linear("difference of levels (mm)"),
+        "time (periods of theory)",
+        "difference of levels (mm)",
     )
     .line("theory", theory);
     for (which, (name, tube)) in TUBES.into_iter().enumerate() {
@@ -135,7 +133,7 @@ fn period(h: &mut Harness) {
 }
 
 /// Where legs come to rest, against the level at which all liquid is there and the passage is full; over how far they were apart.
-fn levels(h: &mut Harness) {
+fn levels() -> (f64, String) {
     let ctx = context();
     let apart = 0.02;
     let (mut worst, mut notes): (f64, Vec<String>) = (0.0, Vec::new());
@@ -150,5 +148,5 @@ fn levels(h: &mut Harness) {
         notes.push(format!("{name}: {:+.1e}, {:+.1e}", off[0], off[1]));
     }
     let unit = between(-0.01, 0.3).unit / apart;
-    h.gate("shallow.flooded_levels", worst, &format!("{}; a unit is {unit:.1e}", notes.join("; ")));
+    (worst, format!("{}; a unit is {unit:.1e}", notes.join("; ")))
 }

@@ -22,16 +22,12 @@ const EVERY: u32 = 25;
 
 /// Both gates.
 pub fn run(h: &mut Harness) {
-    if h.wants("shallow.fall_path") {
-        path(h);
-    }
-    if h.wants("shallow.fall_volume") {
-        volume(h);
-    }
+    h.measure("shallow.fall_path", path);
+    h.measure("shallow.fall_volume", volume);
 }
 
 /// The furthest that a packet, or the middle of the first liquid that has landed, is from where ballistics has it (% of the height).
-fn path(h: &mut Harness) {
+fn path() -> (f64, String) {
     let ctx = context();
     let (mut worst, mut note): (f64, String) = (0.0, String::new());
     for (height, name, viscosity, rate) in [
@@ -54,7 +50,7 @@ fn path(h: &mut Harness) {
                 &format!("{name} {height} m {pace:?}: {count} places {flight:.1e}, landing {landing:.3}; ");
         }
     }
-    h.gate("shallow.fall_path", worst, &note);
+    (worst, note)
 }
 
 /// How far packets over a fall of a height (m), and the first liquid on the ground below, are off (% of it), and the count of positions that were compared.
@@ -113,7 +109,7 @@ fn middle_below(liquid: &Shallow, edge: f64) -> Option<f64> {
 }
 
 /// Units that are missing, or too many, in any frame of a busy scene with falls, in which a ball moves about.
-fn volume(h: &mut Harness) {
+fn volume() -> (f64, String) {
     let ctx = context();
     let mut plan = busy([93, 61]);
     let falls = Falls { height: 0.002, drop: 0.0, most: 500, ..Falls::default() };
@@ -157,5 +153,5 @@ fn volume(h: &mut Harness) {
         1e6 * all.lost,
         1e6 * all.held,
     );
-    h.gate("shallow.fall_volume", wrong as f64, &note);
+    (wrong as f64, note)
 }

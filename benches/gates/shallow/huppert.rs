@@ -5,7 +5,7 @@ use frazil::Context;
 
 use crate::common::liquids::context;
 use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
+use crate::plots::Plot;
 use crate::shallow::ground::{G, between, depth, dry, ground, power, run_until, viscous};
 
 /// Slope, and kinematic viscosity (m2/s).
@@ -34,21 +34,17 @@ pub fn run(h: &mut Harness) {
     h.gate("shallow.huppert_front", off(&fine), "cells of a quarter of the depth");
     h.gate("shallow.huppert_front_coarse", off(&coarse), "cells of four times the depth");
     let theory = (0..=40).map(|i| time_at(FIRST * 2f64.powf(f64::from(i) / 40.0)));
-    Plot::new("Viscous current down a slope (Huppert 1982)", Axis::log("time (s)"), Axis::log("front (m)"))
+    Plot::log("Viscous current down a slope (Huppert 1982)", "time (s)", "front (m)")
         .line("theory, power 1/3", theory.map(|time| [time, front_at(time)]))
         .points("pipes, cells of a quarter of the depth", fine.fronts.iter().copied())
         .points("pipes, cells of 4 depths", coarse.fronts.iter().copied())
         .write("shallow_huppert");
     let end = time_at(LAST);
     let shape = (0..=80).map(|i| LAST * f64::from(i) / 80.0).map(|x| [x, 1e3 * depth_at(x, end)]);
-    Plot::new(
-        "Viscous current down a slope: its depth",
-        Axis::linear("along the slope (m)"),
-        Axis::linear("depth (mm)"),
-    )
-    .line("theory", shape.chain([[LAST, 0.0]]))
-    .points("pipes, cells of 4 depths", coarse.shape)
-    .write("shallow_huppert_shape");
+    Plot::linear("Viscous current down a slope: its depth", "along the slope (m)", "depth (mm)")
+        .line("theory", shape.chain([[LAST, 0.0]]))
+        .points("pipes, cells of 4 depths", coarse.shape)
+        .write("shallow_huppert_shape");
 }
 
 /// Theory: the front at a time (s).

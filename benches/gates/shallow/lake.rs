@@ -10,7 +10,7 @@ use frazil::shallow::{Params, Shallow};
 
 use crate::common::liquids::context;
 use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
+use crate::plots::Plot;
 use crate::shallow::ground::{between, dry, ground, pour, run_until, viscous};
 
 /// Water (m2/s).
@@ -58,7 +58,7 @@ fn disturbed(h: &mut Harness, ctx: &Context) {
     let speed = deep[deep.len() - 1][1];
     let note = format!("{speed:.1e}; films on the islands {:.1e}", films[films.len() - 1][1]);
     h.gate("shallow.lake_disturbed", speed, &note);
-    Plot::new("A disturbed lake", Axis::log("time (s)"), Axis::log("greatest speed (m/s)"))
+    Plot::log("A disturbed lake", "time (s)", "greatest speed (m/s)")
         .line("films, dx / (2 t)", [[1.0, 0.5 * CELL], [60.0, 0.5 * CELL / 60.0]])
         .line("what must be kept after 60 s", [[1.0, 1e-6], [60.0, 1e-6]])
         .points("columns over 1 mm", deep)

@@ -5,7 +5,6 @@ use frazil::shallow::material::Liquid;
 
 use crate::common::bodies::Dice;
 use crate::common::shallow::{Turn, busy, context};
-use crate::harness::Harness;
 
 /// Steps of the run.
 const STEPS: u32 = 100_000;
@@ -13,10 +12,7 @@ const STEPS: u32 = 100_000;
 const EVERY: u32 = 25;
 
 /// Frames after which units are missing, or too many.
-pub fn run(h: &mut Harness) {
-    if !h.wants("shallow.mass") {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let ctx = context();
     let plan = busy([93, 61]);
     let mut liquid = plan.make(&ctx, Turn::NONE);
@@ -38,7 +34,7 @@ pub fn run(h: &mut Harness) {
          {absorbed:.1}, lost {lost:.1}, inside {inside:.1}",
         plan.links()
     );
-    h.gate("shallow.mass", f64::from(wrong), &note);
+    (f64::from(wrong), note)
 }
 
 /// Something that a trainer does between frames.

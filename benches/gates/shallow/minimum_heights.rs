@@ -25,12 +25,8 @@ pub fn run(h: &mut Harness) {
     if h.wants("shallow.lift_uncovered") || h.wants("shallow.lift_discarded") {
         covered(h);
     }
-    if h.wants("shallow.surface_rim") {
-        rim(h);
-    }
-    if h.wants("shallow.surface_jump") {
-        jump(h);
-    }
+    h.measure("shallow.surface_rim", rim);
+    h.measure("shallow.surface_jump", jump);
 }
 
 /// A surface: heights and columns of its vertices, positions in cells from the centre of cell (0, 0), and triangles.
@@ -317,7 +313,7 @@ impl Rims {
 }
 
 /// Edges of patches of liquid on open ground; under slabs and at cliffs of two cells and more, where they hang over, they are counted.
-fn rim(h: &mut Harness) {
+fn rim() -> (f64, String) {
     let mut lifted: [Rims; 3] = Default::default();
     let mut plain = Rims::default();
     for seed in 0..SEEDS {
@@ -346,11 +342,11 @@ fn rim(h: &mut Harness) {
         cliff.samples,
         cliff.worst
     );
-    h.gate("shallow.surface_rim", open.worst, &note);
+    (open.worst, note)
 }
 
 /// Blood that runs over rough ground, and dries there.
-fn jump(h: &mut Harness) {
+fn jump() -> (f64, String) {
     let ctx = context();
     let (mut worst, mut flips) = ([0.0f64; 2], 0);
     let mut frames = Vec::new();
@@ -400,7 +396,7 @@ fn jump(h: &mut Harness) {
         at(0.99),
         at(1.0)
     );
-    h.gate("shallow.surface_jump", worst[0], &note);
+    (worst[0], note)
 }
 
 /// The solids of columns.

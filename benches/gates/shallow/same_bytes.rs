@@ -12,6 +12,7 @@ use frazil::{Context, Pool};
 use crate::common::bodies::Dice;
 use crate::common::shallow::{Plan, Turn, busy, context, hash, turnable};
 use crate::harness::Harness;
+use crate::process::is_same_at_levels;
 
 /// Random scenes that are turned.
 const SCENES: u64 = 60;
@@ -38,19 +39,13 @@ pub fn run(h: &mut Harness) {
     }
     if h.wants("shallow.same_cpu") {
         let note = format!("FRAZIL_CPU baseline, avx2, avx512; this one has {:?}", cpu_level());
-        h.holds("shallow.same_cpu", is_same_at_levels(HASH), &note);
+        h.holds("shallow.same_cpu", is_same_at_levels("hash-of-shallow"), &note);
     }
     if h.wants("shallow.surface_same") {
         let hashes = [0, 1, 2].map(|threads| surfaces(&Context::new(Pool::new(threads).expect("threads"))));
-        let is_same = hashes.iter().all(|hash| *hash == hashes[0]) && is_same_at_levels(SURFACES);
+        let is_same = hashes.iter().all(|hash| *hash == hashes[0]) && is_same_at_levels("hash-of-surfaces");
         h.holds("shallow.surface_same", is_same, "0, 1 and 2 threads; FRAZIL_CPU baseline, avx2, avx512");
     }
-}
-
-/// Whether processes with all sets of instructions print the same.
-fn is_same_at_levels(argument: &str) -> bool {
-    let hashes = ["baseline", "avx2", "avx512"].map(|level| hash_at(argument, level));
-    hashes.iter().all(|hash| hash.len() == 17 && *hash == hashes[0])
 }
 
 /// Whether scenes that are turned do the same, cell by cell, layer by layer, in each frame.
@@ -199,23 +194,12 @@ impl Drawn {
     }
 }
 
-/// Arguments of runs that only print the hash of shallow's scenes, and of their surfaces.
-pub const HASH: &str = "hash-of-shallow";
-pub const SURFACES: &str = "hash-of-surfaces";
-
-/// Such a run.
+/// The run that prints the hash of scenes.
 pub fn print_hash() {
     println!("{:016x}", all(&context()));
 }
 
-/// The other one.
+/// The run that prints the hash of their surfaces.
 pub fn print_surfaces() {
     println!("{:016x}", surfaces(&context()));
-}
-
-/// The hash that a process with one set of instructions prints.
-fn hash_at(argument: &str, level: &str) -> Vec<u8> {
-    let program = std::env::current_exe().expect("this program's path");
-    let output = std::process::Command::new(program).arg(argument).env("FRAZIL_CPU", level).output();
-    output.expect("a process for shallow's scenes").stdout
 }

@@ -5,7 +5,7 @@ use frazil::shallow::Shallow;
 
 use crate::common::liquids::context;
 use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
+use crate::plots::Plot;
 use crate::shallow::ground::{G, between, depth, dry, ground, pour, power, run_until, viscous};
 
 const CELL: f64 = 1.0e-3;
@@ -70,28 +70,20 @@ pub fn run(h: &mut Harness) {
     let theory = (0..=40)
         .map(|i| FIRST * (LAST / FIRST).powf(f64::from(i) / 40.0) * CELL)
         .map(|r| [time_at(r), 1e3 * r]);
-    Plot::new(
-        "Viscous puddle on level ground (Huppert 1982)",
-        Axis::log("time (s)"),
-        Axis::log("radius (mm)"),
-    )
-    .line("theory, power 1/8", theory)
-    .points("pipes", radii.iter().map(|[time, radius]| [*time, 1e3 * radius]))
-    .write("shallow_spread");
+    Plot::log("Viscous puddle on level ground (Huppert 1982)", "time (s)", "radius (mm)")
+        .line("theory, power 1/8", theory)
+        .points("pipes", radii.iter().map(|[time, radius]| [*time, 1e3 * radius]))
+        .write("shallow_spread");
     let end = radii[radii.len() - 1][0];
     let shape = (0..=100)
         .map(|i| f64::from(i) / 100.0)
         .map(|s| [1e3 * s * LAST * CELL, 1e3 * depth_at(s * LAST * CELL, end)]);
     let own = (0..count)
         .map(|x| [1e3 * (x as f64 + 0.5 - 0.5 * count as f64) * CELL, 1e3 * depth(&shallow, [x, count / 2])]);
-    Plot::new(
-        "Viscous puddle on level ground: its depth",
-        Axis::linear("from the middle (mm)"),
-        Axis::linear("depth (mm)"),
-    )
-    .line("theory", shape)
-    .points("pipes", own.filter(|[x, _]| *x > -1e-9))
-    .write("shallow_spread_shape");
+    Plot::linear("Viscous puddle on level ground: its depth", "from the middle (mm)", "depth (mm)")
+        .line("theory", shape)
+        .points("pipes", own.filter(|[x, _]| *x > -1e-9))
+        .write("shallow_spread_shape");
 }
 
 /// 0.894: (2^10 / (3^4 pi^3))^(1/8).

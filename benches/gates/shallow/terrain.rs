@@ -27,9 +27,7 @@ const CASTS: usize = 41;
 
 /// All of them.
 pub fn run(h: &mut Harness) {
-    if h.wants("shallow.terrain_wrong") {
-        against_windings(h);
-    }
+    h.measure("shallow.terrain_wrong", against_windings);
     let middle = (EDGE - BOX) / 2..(EDGE + BOX) / 2;
     let all = 0..EDGE;
     let terrains = terrains();
@@ -57,7 +55,7 @@ fn time(h: &mut Harness, name: &str, cells: &Range<usize>, terrains: &[&(&str, T
 }
 
 /// Lines through random solids.
-fn against_windings(h: &mut Harness) {
+fn against_windings() -> (f64, String) {
     let (mut differ, mut lines, mut layers, mut ties) = (0, 0, [0; 6], 0);
     for seed in 0..SOLIDS {
         let mut dice = Dice(100_000 + seed);
@@ -80,7 +78,7 @@ fn against_windings(h: &mut Harness) {
     let note = format!(
         "{SOLIDS} scenes of up to 6 solids, {lines} lines, {ties} through a vertex; with 0, 1, ... layers, and 5 or more: {layers:?}"
     );
-    h.gate("shallow.terrain_wrong", f64::from(u32::try_from(differ).expect("few lines")), &note);
+    (f64::from(u32::try_from(differ).expect("few lines")), note)
 }
 
 /// Terrains of 50,000 triangles over the whole domain.

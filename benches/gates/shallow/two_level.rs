@@ -17,9 +17,7 @@ const FRAME: f64 = 1.0 / 60.0;
 
 /// Mass and cost.
 pub fn run(h: &mut Harness) {
-    if h.wants("shallow.detail_mass") {
-        mass(h);
-    }
+    h.measure("shallow.detail_mass", mass);
     // Strips of 16 cells begin at the near cells' sides.
     for (name, edge, near) in [
         ("shallow.detail_cost", 1000, [240..752, 256..744]),
@@ -32,7 +30,7 @@ pub fn run(h: &mut Harness) {
 }
 
 /// Most units that were missing after a frame, or too many.
-fn mass(h: &mut Harness) {
+fn mass() -> (f64, String) {
     let ctx = context();
     let (cell, size) = (0.001, [60, 44]);
     let solids = floors(size, cell, [-0.02, 0.1], 2, |at @ [x, z], floor| {
@@ -74,7 +72,7 @@ fn mass(h: &mut Harness) {
         "{steps} steps, {moves} moves; ml poured {poured:.1}, sourced {sourced:.1}, drained {drained:.1}, absorbed \
          {absorbed:.1}, lost {lost:.1}, inside {inside:.1}"
     );
-    h.gate("shallow.detail_mass", worst as f64, &note);
+    (worst as f64, note)
 }
 
 /// The time of a frame over that of all cells being fine, in turns: on a domain of so many cells along an edge, of which a quarter is near.

@@ -11,7 +11,7 @@ use frazil::shallow::{Params, Shallow};
 
 use crate::common::shallow::{context, covered, ground, waves};
 use crate::harness::Harness;
-use crate::plots::chart::{Axis, Plot};
+use crate::plots::Plot;
 use crate::shallow::ground::{G, between, viscous};
 use crate::shallow::speed::Frames;
 
@@ -200,10 +200,10 @@ fn settles(h: &mut Harness, ctx: &Context) {
 }
 
 fn plot(ctx: &Context) {
-    let mut plot = Plot::new(
+    let mut plot = Plot::linear(
         "Passages of 8 x 8 cells: velocity over the height",
-        Axis::linear("from the middle (mm)"),
-        Axis::linear("velocity (mm/s)"),
+        "from the middle (mm)",
+        "velocity (mm/s)",
     );
     for (is_closed, name) in [(true, "a closed duct"), (false, "an open channel")] {
         let own = passage(1.0, is_closed, Friction::Walls);

@@ -9,9 +9,9 @@ use frazil::sweep::Body;
 
 use crate::common::character::data;
 use crate::harness::Harness;
+use crate::process::kilobytes;
 use crate::scenes::context;
 use crate::snow::grains::FRAME;
-use crate::snow::grains::memory::kilobytes;
 
 /// Radius (m): twice that of examples/scenes/grains_walk.toml.
 const RADIUS: f64 = 0.005;
@@ -75,7 +75,7 @@ fn seconds(man: &std::path::Path, rests: bool, settle: i32, walk: i32) -> [f64; 
         grains.step(&ctx, &around, times, frame).expect("a step");
         taken += if frame > 0 { start.elapsed().as_secs_f64() } else { 0.0 };
     }
-    [grains.ids().len() as f64, taken / f64::from(walk), kilobytes("VmHWM:")]
+    [grains.ids().len() as f64, taken / f64::from(walk), kilobytes("self", "VmHWM:")]
 }
 
 /// Hexagonal layers of grains, alternately shifted, spaced as in a close packing.

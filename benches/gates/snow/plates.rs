@@ -5,18 +5,13 @@ use frazil::snow::base_layer::BaseLayer;
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 
 use crate::common::shapes::cuboid;
-use crate::harness::Harness;
 use crate::scenes::{EXACT, body, context};
 
 /// Edge of a cell, and depth of the snow (m): those of a scene of a few boots.
 const CELL: f64 = 0.01;
 const DEPTH: f64 = 0.15;
 
-pub fn run(h: &mut Harness) {
-    let name = "snow.base.plates";
-    if !h.wants(name) {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let ctx = context(2);
     let mut seed = 3u64;
     let mut next = || {
@@ -49,5 +44,5 @@ pub fn run(h: &mut Harness) {
             which = format!("{off:+.2} % of plate {plate} of {:.1} cells ({turned}, {down})", size[0] / CELL);
         }
     }
-    h.gate(name, worst, &format!("{which}; mean {:+.2} %", sum / 100.0));
+    (worst, format!("{which}; mean {:+.2} %", sum / 100.0))
 }

@@ -2,7 +2,7 @@
 //! over each shot, by when the reports of a pass were written.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, SystemTime};
 
 use frazil::io::mesh;
@@ -10,6 +10,7 @@ use frazil::io::mesh;
 use crate::common::character::data;
 use crate::common::sleigh::sleigh;
 use crate::harness::Harness;
+use crate::process::{frazil, json, kilobytes};
 
 /// The gate of the greatest memory of all stages of the walk.
 const PEAK: &str = "snow.shot.peak_3_11";
@@ -164,21 +165,18 @@ impl Scene {
     /// Makes a stage; its greatest memory (GB).
     fn run(&self, object: &Path, out: &Path, stage: &str) -> f64 {
         let scene = format!("{}/examples/scenes/{}.toml", env!("CARGO_MANIFEST_DIR"), self.file);
-        let mut run = Command::new(env!("CARGO_BIN_EXE_frazil"));
-        run.arg("snow").arg(scene).arg("-o").arg(out).args(["-q", "--threads", "2", "--stage", stage]);
+        let mut run = frazil(["snow", &scene, "-q", "--threads", "2", "--stage", stage, "-o"]);
+        run.arg(out);
         run.args(["--set", &format!("object.1.file={}", object.display())]);
         run.args(["--set", &format!("grains.compression={}", self.compression)]);
         if stage == "mist" {
             run.args(["--set", "mist.falling=false", "--set", &format!("mist.cell={}", self.mist_cell)]);
         }
         let mut child = run.stderr(Stdio::null()).spawn().expect("frazil");
-        let status = format!("/proc/{}/status", child.id());
+        let process = child.id().to_string();
         let mut peak = 0.0f64;
         loop {
-            let text = std::fs::read_to_string(&status).unwrap_or_default();
-            let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-            let kilobytes = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
-            peak = peak.max(kilobytes.unwrap_or(0.0) * 1024.0 / 1e9);
+            peak = peak.max(kilobytes(&process, "VmHWM:") * 1024.0 / 1e9);
             if let Some(status) = child.try_wait().expect("a child") {
                 assert!(status.success(), "stage {stage}");
                 return peak;
@@ -218,9 +216,7 @@ impl Pass {
     /// What a pass of grains did; `thesis` is its time (s) there.
     fn note(&self, out: &Path, thesis: f64) -> String {
         let number = |frame: usize, name: &str| {
-            let text = std::fs::read(record(out, self.stage, frame)).expect("a report");
-            let report: serde_json::Value = serde_json::from_slice(&text).expect("a report");
-            report[name].as_f64().expect("a number")
+            json(&record(out, self.stage, frame))[name].as_f64().expect("a number")
         };
         let last = self.ends.len();
         let awake: f64 = (2..=last).map(|frame| number(frame, "grains") - number(frame, "resting")).sum();

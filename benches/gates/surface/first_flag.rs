@@ -7,7 +7,6 @@ use frazil::surface::{Implicit, Isosurface, Params, Tracker};
 
 use crate::common::liquids::{context, numbered};
 use crate::common::made_sets::{Set, sets};
-use crate::harness::Harness;
 use crate::surface::spot::parts;
 
 /// Initial distance between particles (m), and time between frames (s).
@@ -16,11 +15,7 @@ const FRAME: f64 = 1.0 / 24.0;
 /// Most frames of a set.
 const FRAMES: usize = 60;
 
-pub fn run(h: &mut Harness) {
-    let name = "surface.early";
-    if !h.wants(name) {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let ctx = context(2);
     let mut lags = Vec::new();
     for set in sets() {
@@ -35,7 +30,7 @@ pub fn run(h: &mut Harness) {
         });
     }
     let worst = lags.iter().copied().fold(0.0, f64::max);
-    h.gate(name, worst, &format!("balls, dumbbell, sheet, bubble: {lags:?}"));
+    (worst, format!("balls, dumbbell, sheet, bubble: {lags:?}"))
 }
 
 fn surface(ctx: &Context, positions: &[DVec3]) -> TriMesh {

@@ -16,9 +16,9 @@ const FRAME: f64 = 1.0 / 24.0;
 pub fn run(h: &mut Harness) {
     known_motions(h);
     still(h);
-    far(h);
+    h.measure("surface.far", far);
     pool(h);
-    half_space(h);
+    h.measure("surface.half_space", half_space);
     speed(h);
 }
 
@@ -103,11 +103,7 @@ fn still(h: &mut Harness) {
 }
 
 /// The same liquid 1 km from the origin, its particles in 32 bits as files hold them.
-fn far(h: &mut Harness) {
-    let name = "surface.far";
-    if !h.wants(name) {
-        return;
-    }
+fn far() -> (f64, &'static str) {
     let ctx = context(2);
     // Spacing 0.1 m; a whole number of cells away.
     let near = ball(8.0, 30, 0.25);
@@ -132,7 +128,7 @@ fn far(h: &mut Harness) {
         tracker.vertices().iter().map(|vertex| vertex - by).collect::<Vec<_>>()
     };
     let off = run(DVec3::zeros()).iter().zip(run(by)).map(|(a, b)| (a - b).norm()).sum::<f64>();
-    h.gate(name, off / near.mesh.positions.len() as f64 / 0.1, "mean after 10 frames");
+    (off / near.mesh.positions.len() as f64 / 0.1, "mean after 10 frames")
 }
 
 /// A pool at rest whose particles tremble by up to 0.02 spacings: how far vertices move from frame to frame.
@@ -170,18 +166,14 @@ fn pool(h: &mut Harness) {
 }
 
 /// Where the surface of a half-space lies above its outermost particles.
-fn half_space(h: &mut Harness) {
-    let name = "surface.half_space";
-    if !h.wants(name) {
-        return;
-    }
+fn half_space() -> (f64, &'static str) {
     let ctx = context(2);
     let positions = filled(1.0, 0.0, 12.0, |position| position.y < 0.0);
     let phi = Implicit::new(&ctx, &positions, 1.0, 0.5).expect("phi");
     let mesh = Isosurface::new(&phi).mesh(&phi);
     let middle = mesh.positions.iter().filter(|p| p.x.abs() < 4.0 && p.z.abs() < 4.0 && p.y > -5.0);
     let most = middle.map(|p| f64::from((p.y + 0.5 - 0.48).abs())).fold(0.0, f64::max);
-    h.gate(name, most, "from 0.48 spacings above the outermost centres");
+    (most, "from 0.48 spacings above the outermost centres")
 }
 
 /// Times of the phases, on one thread, with as many particles and triangles as the thesis' dragon and its falling objects.

@@ -9,16 +9,12 @@ use crate::common::liquids::{ball, context, plain_phi, two_clouds, write_cache};
 use crate::harness::Harness;
 
 pub fn run(h: &mut Harness) {
-    sums(h);
+    h.measure("surface.phi_sum", sums);
     million(h);
 }
 
 /// The function at the nodes of two clouds, against sums over all particles in 64 bits.
-fn sums(h: &mut Harness) {
-    let name = "surface.phi_sum";
-    if !h.wants(name) {
-        return;
-    }
+fn sums() -> (f64, String) {
     let (ctx, spacing) = (context(2), 0.1);
     let positions = two_clouds(spacing);
     let phi = Implicit::new(&ctx, &positions, spacing, 0.5 * spacing).expect("a surface");
@@ -35,7 +31,7 @@ fn sums(h: &mut Harness) {
             }
         }
     }
-    h.gate(name, most, &format!("{count} nodes of two clouds with a gap"));
+    (most, format!("{count} nodes of two clouds with a gap"))
 }
 
 /// One step by the command, on one thread: what advection, surface, distances and projection take, and the greatest memory.

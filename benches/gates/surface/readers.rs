@@ -14,12 +14,11 @@ use rayon::prelude::*;
 
 use crate::common::caches::{IDS, POSITIONS, VELOCITIES, samples};
 use crate::common::{character, clients};
-use crate::files::damage;
 use crate::harness::Harness;
+use crate::reliability::damage;
 use crate::scenes::context;
 
 const SAME: &str = "surface.readers_same";
-const CRASHES: &str = "surface.readers_crashes";
 /// Files of other programs, below `particles` of the outside data.
 const OUTSIDE: [&str; 9] = [
     "bunny_frame_14_7705_particles.vtk",
@@ -51,9 +50,7 @@ pub fn run(h: &mut Harness) {
     if h.wants(SAME) {
         same(h);
     }
-    if h.wants(CRASHES) {
-        crashes(h);
-    }
+    h.measure("surface.readers_crashes", crashes);
 }
 
 /// A particle: identity and position (m).
@@ -143,7 +140,7 @@ fn are_same(path: &Path, ours: &[Particle], theirs: &[Particle]) -> bool {
     !ours.is_empty() && ours.len() == theirs.len() && ours.iter().zip(theirs).all(is_same)
 }
 
-fn crashes(h: &mut Harness) {
+fn crashes() -> (f64, String) {
     let (mut accepted, mut failed) = (Vec::new(), Vec::new());
     let one = |ending: &&'static str| {
         let tried = damage::tried(&format!("{KIND}{ending}"), INPUTS);
@@ -160,7 +157,7 @@ fn crashes(h: &mut Harness) {
         failed.extend(tried.failed.iter().map(|which| format!(".{ending} {which}")));
     }
     let note = format!("{INPUTS} inputs of each, accepted: {} {}", accepted.join(", "), failed.join(", "));
-    h.gate(CRASHES, failed.len() as f64, note.trim());
+    (failed.len() as f64, note)
 }
 
 /// Small intact files with an extension.

@@ -100,7 +100,7 @@ pub fn run(h: &mut Harness) {
             h.gate(name, seconds, &format!("{note} thesis={thesis} s"));
         }
     }
-    fine(h);
+    h.measure("surface.match_fine", fine);
 }
 
 /// A mesh with the spacing of the scenes that is rebuilt.
@@ -110,11 +110,7 @@ pub fn params() -> Params {
 
 /// Matching alone, of the thesis' gazelle on cells of r / 4 (Table 2.1): what is flagged, and the signs of the whole grid, are counted
 /// too.
-fn fine(h: &mut Harness) {
-    let name = "surface.match_fine";
-    if !h.wants(name) {
-        return;
-    }
+fn fine() -> (f64, String) {
     let ctx = context(1);
     let scene = Scene { steps: FINE_FRAMES, ..gazelle(&ctx) };
     let steps = scene.follow(&ctx, Params { cell: FINE, ..params() });
@@ -122,7 +118,7 @@ fn fine(h: &mut Harness) {
     let (whole, note) = scene.told(&steps);
     let note =
         format!("flag and match; cells of {FINE} r, whole frames {whole:.2} s; {note} thesis=155.79 s");
-    h.gate(name, seconds, &note);
+    (seconds, note)
 }
 
 /// The median of what some steps took; NaN without any.

@@ -20,9 +20,9 @@ const CELL: f64 = 0.01;
 const LOWEST: f64 = -0.1;
 
 pub fn run(h: &mut Harness) {
-    ledger(h);
-    spread(h);
-    speed(h);
+    h.measure("snow.grains.ledger", ledger);
+    h.measure("snow.grains.birth_spread", spread);
+    h.measure("snow.grains.birth_speed", speed);
 }
 
 /// Snow 0.15 m deep.
@@ -83,11 +83,7 @@ pub fn ploughed_snow(ctx: &Context, frames: i32) -> (BaseLayer, Grains) {
 }
 
 /// The balance of each frame: grains paid for by snow, owed before, owed after and born.
-fn ledger(h: &mut Harness) {
-    let name = "snow.grains.ledger";
-    if !h.wants(name) {
-        return;
-    }
+fn ledger() -> (f64, &'static str) {
     let ctx = context(2);
     let params = Params { compression: 0.5, ..Params::for_cell(CELL) };
     let paid = |volume: f64| {
@@ -118,15 +114,11 @@ fn ledger(h: &mut Harness) {
     assert!(dropped > 0, "the experiment drops none");
     // The rest is rounding of sums.
     let worst = if worst < 1.0e-6 { 0.0 } else { worst };
-    h.gate(name, worst + off as f64, "");
+    (worst + off as f64, "")
 }
 
 /// Count of grains of the same print, made in few and in many frames.
-fn spread(h: &mut Harness) {
-    let name = "snow.grains.birth_spread";
-    if !h.wants(name) {
-        return;
-    }
+fn spread() -> (f64, &'static str) {
     let ctx = context(2);
     let params = Params { compression: 0.5, ..Params::for_cell(CELL) };
     let body =
@@ -146,15 +138,11 @@ fn spread(h: &mut Harness) {
     });
     let most = counts.iter().copied().fold(f64::MIN, f64::max);
     let least = counts.iter().copied().fold(f64::MAX, f64::min);
-    h.gate(name, (most - least) / (counts.iter().sum::<f64>() / 3.0) * 100.0, "");
+    ((most - least) / (counts.iter().sum::<f64>() / 3.0) * 100.0, "")
 }
 
 /// Speed of grains a frame after birth, pushed only by each other and the snow around them.
-fn speed(h: &mut Harness) {
-    let name = "snow.grains.birth_speed";
-    if !h.wants(name) {
-        return;
-    }
+fn speed() -> (f64, String) {
     let ctx = context(2);
     let params = Params { compression: 0.0, gravity: 0.0, ..Params::for_cell(CELL) };
     let (mut base, body) = (snow(&ctx), plough());
@@ -185,5 +173,5 @@ fn speed(h: &mut Harness) {
     }
     // All removed snow at once.
     add(speed([&whole, base.surface()], 99));
-    h.gate(name, fastest, &format!("{born} births"));
+    (fastest, format!("{born} births"))
 }

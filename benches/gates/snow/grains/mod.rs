@@ -42,11 +42,11 @@ pub fn run(h: &mut Harness) {
     turned_gravity::run(h);
     column_collapse::run(h);
     collapse::run(h);
-    behind_ground::run(h);
+    h.measure("snow.grains.behind_ground", behind_ground::measure);
     planes::run(h);
     materials::run(h);
     collisions::run(h);
-    crowd::run(h);
+    h.measure("snow.grains.crowd", crowd::measure);
     grains_alone::run(h);
     births::run(h);
     rest::run(h);
@@ -54,7 +54,7 @@ pub fn run(h: &mut Harness) {
     passes::run(h);
     readers::run(h);
     cancel::run(h);
-    rate::run(h);
+    h.measure("snow.grains.speed", rate::measure);
     table_3_1::run(h);
     memory::run(h);
 }

@@ -9,7 +9,6 @@ use frazil::snow::mist::{Around, Mist, Params, Source, Start, Surroundings};
 use frazil::sweep::Body;
 
 use crate::common::shapes::cuboid;
-use crate::harness::Harness;
 use crate::scenes::{EXACT, body, context};
 use crate::snow::mist::open;
 
@@ -19,10 +18,6 @@ const CELL: f64 = 0.0133;
 const CHECKS: [f64; 4] = [1.0 / 12.0, 1.0 / 6.0, 1.0 / 3.0, 2.0 / 3.0];
 /// Gravity (m/s2), and the velocity that grains keep of a second's in the air.
 const GRAVITY: f64 = -9.81;
-
-pub fn run(h: &mut Harness) {
-    frame_rate(h);
-}
 
 /// A grain that lies still until it is thrown, and then flies.
 #[derive(Clone, Copy)]
@@ -184,11 +179,8 @@ fn in_blocks(mist: &Mist) -> std::collections::BTreeMap<[i32; 3], [f64; 4]> {
     out
 }
 
-fn frame_rate(h: &mut Harness) {
-    let name = "snow.mist.frame_rate";
-    if !h.wants(name) {
-        return;
-    }
+/// How far mist of fewer frames a second is from that of 96.
+pub fn measure() -> (f64, String) {
     let ctx = context(2);
     let (mut worst, mut note) = (0.0f64, String::new());
     for (scene, flights, plough) in
@@ -211,5 +203,5 @@ fn frame_rate(h: &mut Harness) {
             }
         }
     }
-    h.gate(name, worst, &note);
+    (worst, note)
 }

@@ -9,6 +9,7 @@ use std::time::SystemTime;
 use crate::common::character::{self, data};
 use crate::common::clients;
 use crate::harness::{Harness, timed};
+use crate::process::works;
 use crate::snow::grains::passes::{kill, pass, walk};
 
 /// Frames of the pass, and its cell (m).
@@ -94,10 +95,6 @@ fn misty(scene: &Path, out: &Path, threads: usize) -> Command {
     let mut run = pass(scene, out, threads);
     run.args(["--set", &format!("mist.from_speed={FROM_SPEED}")]);
     run
-}
-
-fn works(run: &mut Command) {
-    assert!(run.status().expect("frazil").success());
 }
 
 /// When the files that a pass is for were written, but for what it says of the run as a whole.
