@@ -49,9 +49,9 @@ fn main() {
     snow::shot::run(&mut h);
     snow::volumes::run(&mut h);
     capi::calls::run(&mut h);
-    capi::cancel::run(&mut h);
+    h.measure_all(["reliability.cancel_reset", "reliability.cancel_reset_changed"], capi::cancel::measure);
     reliability::step_calls::run(&mut h);
-    snow::damaged_folder::run(&mut h);
+    h.measure_all(["reliability.flip_wrong", "reliability.flip_unnamed"], snow::damaged_folder::measure);
     snow::far::run(&mut h);
     sweep::band::run(&mut h);
     sweep::spin::run(&mut h);
@@ -66,7 +66,7 @@ fn main() {
     surface::splashsurf::run(&mut h);
     surface::cancel::run(&mut h);
     surface::repair::run(&mut h);
-    reliability::soup::run(&mut h);
+    h.measure_all(["reliability.soup_silent", "reliability.soup_warned"], reliability::soup::measure);
     surface::rebuilt::run(&mut h);
     surface::rebuilt_topology::run(&mut h);
     h.measure("surface.textures", surface::textures::measure);

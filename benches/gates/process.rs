@@ -12,13 +12,17 @@ pub fn frazil<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Comman
     command
 }
 
+/// A program whose output is thrown away.
+pub fn quiet(command: &mut Command) -> &mut Command {
+    command.stdout(Stdio::null()).stderr(Stdio::null())
+}
+
 /// Runs a program to its end, quietly.
 ///
 /// # Panics
 /// When it fails.
 pub fn works(command: &mut Command) {
-    let status = command.stdout(Stdio::null()).stderr(Stdio::null()).status();
-    assert!(status.expect("a program").success(), "{command:?}");
+    assert!(quiet(command).status().expect("a program").success(), "{command:?}");
 }
 
 /// A report, or another file of JSON.
@@ -27,6 +31,11 @@ pub fn works(command: &mut Command) {
 /// When it cannot be read.
 pub fn json(path: &Path) -> serde_json::Value {
     serde_json::from_slice(&std::fs::read(path).expect("a report")).expect("JSON")
+}
+
+/// What a program prints; nothing where it cannot be started.
+pub fn said(command: &mut Command) -> String {
+    command.output().map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default()
 }
 
 /// A run of this program that does what `main` does for a word.

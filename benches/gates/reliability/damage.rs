@@ -61,22 +61,10 @@ impl Dice {
 
 /// A changed copy of a file.
 fn mutated(bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
-    const WORDS: [&str; 14] = [
-        "0",
-        "-1",
-        "1",
-        "2",
-        "255",
-        "65536",
-        "2147483648",
-        "4294967295",
-        "18446744073709551615",
-        "1e999",
-        "nan",
-        "-0.0",
-        "\"\"",
-        "null",
-    ];
+    let words: Vec<&str> =
+        "0 -1 1 2 255 65536 2147483648 4294967295 18446744073709551615 1e999 nan -0.0 \"\" null"
+            .split(' ')
+            .collect();
     let mut out = bytes.to_vec();
     for _ in 0..1 + dice.below(6) {
         let length = out.len();
@@ -96,7 +84,7 @@ fn mutated(bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
                 let Some(begin) = out[at..].iter().position(is_digit).map(|step| at + step) else { continue };
                 let end =
                     out[begin..].iter().position(|byte| !is_digit(byte)).map_or(length, |step| begin + step);
-                out.splice(begin..end, WORDS[dice.below(WORDS.len())].bytes());
+                out.splice(begin..end, words[dice.below(words.len())].bytes());
             }
             5 => {
                 let end = (at + 1 + dice.below(64)).min(length);

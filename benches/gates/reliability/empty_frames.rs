@@ -1,13 +1,13 @@
 //! Frames of sequences that are empty or missing: every frame that can be made is made, and is empty where its input is.
 
 use std::path::Path;
-use std::process::Command;
 
 use frazil::geometry::points::{Column, Points, Values};
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::io::{mesh, particles};
 
 use crate::common::bodies::Dice;
+use crate::process::{self, quiet};
 
 /// Frames of a sequence, and patterns of them.
 const FRAMES: usize = 8;
@@ -85,9 +85,7 @@ fn write(folder: &Path, number: usize, frame: Frame) {
 
 /// Whether the command worked.
 fn frazil(folder: &Path, arguments: &str) -> bool {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_frazil"));
-    let output = command.current_dir(folder).args(arguments.split(' ')).output().expect("frazil");
-    output.status.success()
+    quiet(process::frazil(arguments.split(' ')).current_dir(folder)).status().expect("frazil").success()
 }
 
 /// Stages in which each frame is made by itself.

@@ -13,17 +13,14 @@ const CELL: f64 = 0.005;
 
 /// All of them.
 pub fn run(h: &mut Harness) {
-    exact(h);
+    h.measure_all(["snow.base.exact_base", "snow.base.exact_removed"], exact);
     h.measure("snow.base.left", left);
     volume(h);
     h.measure("snow.base.islands", islands);
 }
 
 /// Snow and removed snow against max(phi, -s) and max(phi, s) of exact distances: a ball that turns, half sunk.
-fn exact(h: &mut Harness) {
-    if !h.wants("snow.base.exact") {
-        return;
-    }
+fn exact() -> [(f64, &'static str); 2] {
     let ctx = context(2);
     let at = [DVec3::new(-0.2, 0.3, 0.0), DVec3::new(0.2, 0.3, 0.0)];
     let turn = [DVec3::zeros(), DVec3::new(0.1, 0.2, 0.2)];
@@ -43,8 +40,7 @@ fn exact(h: &mut Harness) {
     };
     let snow = worst(base.surface(), &|phi, s| phi.max(-s));
     let removed = worst(base.removed(), &|phi, s| phi.max(s));
-    h.gate("snow.base.exact_base", snow, "");
-    h.gate("snow.base.exact_removed", removed, "");
+    [(snow, ""), (removed, "")]
 }
 
 /// Snow left deeper than half a cell inside the poses of a box that moves and turns.

@@ -4,12 +4,12 @@ use std::time::Instant;
 
 use frazil::Context;
 use frazil::geometry::DVec3;
-use frazil::surface::{Implicit, Isosurface, Params, Particles, StepReport, Tracker};
+use frazil::surface::{Params, Particles, StepReport, Tracker};
 
 use crate::common::liquids::{
-    Ball, Errors, Random, ball, context, filled, follow, numbered, once_around, turned,
+    Ball, Errors, Random, ball, context, filled, follow, numbered, once_around, own_surface, turned,
 };
-use crate::harness::Harness;
+use crate::harness::{Harness, median};
 
 const FRAME: f64 = 1.0 / 24.0;
 
@@ -17,7 +17,7 @@ pub fn run(h: &mut Harness) {
     known_motions(h);
     still(h);
     h.measure("surface.far", far);
-    pool(h);
+    h.measure_all(["surface.pool_mean", "surface.pool_p95"], pool);
     h.measure("surface.half_space", half_space);
     speed(h);
 }
@@ -132,11 +132,7 @@ fn far() -> (f64, &'static str) {
 }
 
 /// A pool at rest whose particles tremble by up to 0.02 spacings: how far vertices move from frame to frame.
-fn pool(h: &mut Harness) {
-    let names = ["surface.pool_mean", "surface.pool_p95"];
-    if !names.iter().any(|name| h.wants(name)) {
-        return;
-    }
+fn pool() -> [(f64, &'static str); 2] {
     let ctx = context(2);
     let ball = ball(8.0, 30, 0.25);
     let mut random = Random(5);
@@ -161,16 +157,14 @@ fn pool(h: &mut Harness) {
         from = to;
     }
     ways.sort_unstable_by(f64::total_cmp);
-    h.gate(names[0], ways.iter().sum::<f64>() / ways.len() as f64, "20 frames");
-    h.gate(names[1], ways[ways.len() * 95 / 100], "20 frames");
+    [(ways.iter().sum::<f64>() / ways.len() as f64, "20 frames"), (ways[ways.len() * 95 / 100], "20 frames")]
 }
 
 /// Where the surface of a half-space lies above its outermost particles.
 fn half_space() -> (f64, &'static str) {
     let ctx = context(2);
     let positions = filled(1.0, 0.0, 12.0, |position| position.y < 0.0);
-    let phi = Implicit::new(&ctx, &positions, 1.0, 0.5).expect("phi");
-    let mesh = Isosurface::new(&phi).mesh(&phi);
+    let mesh = own_surface(&ctx, &positions, 1.0);
     let middle = mesh.positions.iter().filter(|p| p.x.abs() < 4.0 && p.z.abs() < 4.0 && p.y > -5.0);
     let most = middle.map(|p| f64::from((p.y + 0.5 - 0.48).abs())).fold(0.0, f64::max);
     (most, "from 0.48 spacings above the outermost centres")
@@ -186,7 +180,7 @@ fn speed(h: &mut Harness) {
         for ((name, phase), thesis) in names.iter().zip(phases).zip([1.17, 3.01, 1.39, 1.24]) {
             if h.wants(name) {
                 let note = format!("threads=1 cpu={cpu:?} thesis={thesis} s");
-                h.gate(name, median(reports.iter().map(|(_, report)| time(report, phase))), &note);
+                h.gate(name, median(reports.iter().map(|(_, report)| time(report, phase)).collect()), &note);
             }
         }
     }
@@ -194,12 +188,12 @@ fn speed(h: &mut Harness) {
         let reports = steps(&context(1), &ball(39.5, 176, 0.25));
         let each = |(_, report): &(f64, StepReport)| phases.iter().map(|phase| time(report, phase)).sum();
         let note = format!("threads=1 cpu={cpu:?} thesis=48 s without meshing");
-        h.gate("surface.time_260k", median(reports.iter().map(each)), &note);
+        h.gate("surface.time_260k", median(reports.iter().map(each).collect()), &note);
     }
     if h.wants("surface.threads") {
         let ball = ball(39.5, 176, 0.25);
-        let [one, two] =
-            [1, 2].map(|threads| median(steps(&context(threads), &ball).iter().map(|(time, _)| *time)));
+        let [one, two] = [1, 2]
+            .map(|threads| median(steps(&context(threads), &ball).iter().map(|(time, _)| *time).collect()));
         h.gate("surface.threads", one / two, &format!("{one:.2} s and {two:.2} s"));
     }
 }
@@ -227,10 +221,4 @@ pub fn steps_with(ctx: &Context, ball: &Ball, params: Params, count: usize) -> V
 /// Seconds of a phase of a step.
 pub fn time(report: &StepReport, phase: &str) -> f64 {
     report.phases.iter().find(|time| time.name == phase).map_or(0.0, |time| time.time.as_secs_f64())
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values[values.len() / 2]
 }

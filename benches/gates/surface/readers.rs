@@ -1,7 +1,6 @@
 //! Gates of particle caches: other programs find the same particles in them, and damaged ones do no harm.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 
 use frazil::geometry::DVec3;
 use frazil::geometry::points::{Column, Points, Values};
@@ -15,6 +14,7 @@ use rayon::prelude::*;
 use crate::common::caches::{IDS, POSITIONS, VELOCITIES, samples};
 use crate::common::{character, clients};
 use crate::harness::Harness;
+use crate::process::{frazil, works};
 use crate::reliability::damage;
 use crate::scenes::context;
 
@@ -96,12 +96,12 @@ fn same(h: &mut Harness) {
 
 /// A file of particles as another that the command writes.
 fn converted(input: &Path, output: PathBuf) -> PathBuf {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_frazil"));
-    command.arg("convert").arg(input).arg(&output).arg("-q").stderr(Stdio::null());
+    let mut command = frazil(["convert", "-q"]);
+    command.arg(input).arg(&output);
     if extension(&output) == "vdb" {
         command.args(["--voxel", VOXEL]);
     }
-    assert!(command.status().expect("frazil").success(), "{command:?}");
+    works(&mut command);
     output
 }
 

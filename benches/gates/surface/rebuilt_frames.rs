@@ -9,9 +9,9 @@ use std::time::Instant;
 
 use frazil::Context;
 use frazil::geometry::{DVec3, TriMesh};
-use frazil::surface::{Implicit, Isosurface, Params, Particles, StepReport, Tracker};
+use frazil::surface::{Params, Particles, StepReport, Tracker};
 
-use crate::common::liquids::{context, filled, numbered};
+use crate::common::liquids::{context, filled, numbered, surface_on};
 use crate::harness::{Harness, median};
 use crate::surface::known_motion::time;
 use crate::surface::rebuilt_sequences::CELL;
@@ -181,10 +181,7 @@ impl Scene {
 
 /// The surface of particles at positions (m) as a mesh of about so many triangles, with detail of its own.
 fn detailed(ctx: &Context, positions: &[DVec3], triangles: usize) -> TriMesh {
-    let on = |cell: f64| {
-        let phi = Implicit::new(ctx, positions, SPACING, cell * SPACING).expect("a surface");
-        Isosurface::new(&phi).mesh(&phi)
-    };
+    let on = |cell: f64| surface_on(ctx, positions, SPACING, cell);
     // A surface has so many triangles as its area has faces of cells, nearly.
     let share = (on(CELL).triangles.len() as f64 / triangles as f64).sqrt();
     let mut mesh = on((CELL * share).clamp(0.15, 1.0));

@@ -3,7 +3,6 @@
 use frazil::Context;
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
-use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params as BaseParams};
 use frazil::snow::grains::{Base, Grains, Object, PACKING, Params, StepReport, Surroundings};
 use frazil::sweep::Body;
@@ -11,8 +10,8 @@ use frazil::vdb::FloatGrid;
 
 use crate::common::shapes::sphere;
 use crate::harness::Harness;
-use crate::scenes::context;
-use crate::snow::grains::FRAME;
+use crate::scenes::{context, layer};
+use crate::snow::grains::{FRAME, ON_A_FLOOR};
 
 /// Edge of a cell of the layer (m).
 const CELL: f64 = 0.01;
@@ -27,9 +26,7 @@ pub fn run(h: &mut Harness) {
 
 /// Snow 0.15 m deep.
 fn snow(ctx: &Context) -> BaseLayer {
-    let ground = Ground::Plane { height: 0.0, area: [-0.3, -0.25, 0.3, 0.25] };
-    let snow = layer(ctx, &ground, &[], &Cover::Depth(0.15), CELL, 3.0).expect("snow");
-    BaseLayer::new(ctx, snow, BaseParams::for_cell(CELL)).expect("a layer")
+    layer(ctx, 0.0, [-0.3, -0.25, 0.3, 0.25], 0.15, CELL, BaseParams::for_cell(CELL))
 }
 
 /// A body that passes positions (m) at times (s).
@@ -58,10 +55,9 @@ fn step(
     let around = Surroundings {
         base: Base::Changed(base.surface(), base.before()),
         objects: &[Object::new(body, 0.3)],
-        statics: &[],
-        ground: &[],
         floor: None,
         lowest: LOWEST,
+        ..ON_A_FLOOR
     };
     (lost.removed_volume, grains.step(ctx, &around, [from, to], frame).expect("a step"))
 }
@@ -148,14 +144,7 @@ fn speed() -> (f64, String) {
     let (mut base, body) = (snow(&ctx), plough());
     let whole = base.surface().deep_copy().expect("a copy");
     let speed = |layers: [&FloatGrid; 2], frame: i32| {
-        let around = Surroundings {
-            base: Base::Whole(layers),
-            objects: &[],
-            statics: &[],
-            ground: &[],
-            floor: None,
-            lowest: LOWEST,
-        };
+        let around = Surroundings { base: Base::Whole(layers), floor: None, lowest: LOWEST, ..ON_A_FLOOR };
         let mut grains = Grains::new(params).expect("grains");
         let report = grains.step(&ctx, &around, [0.0, FRAME], frame).expect("a step");
         if report.fastest > 0.0 {

@@ -6,6 +6,7 @@ use frazil::io::mesh;
 use frazil::vdb::points;
 
 use crate::common::shapes::cuboid;
+use crate::process::works;
 use crate::snow::grains::passes::pass;
 
 /// Largest count of grains in a cube of two diameters, in any frame: a random packing fits ten.
@@ -22,7 +23,7 @@ pub fn measure() -> (f64, String) {
     );
     std::fs::write(&scene, text).expect("a scene");
     let out = folder.path().join("out");
-    assert!(pass(&scene, &out, 2).status().expect("frazil").success());
+    works(&mut pass(&scene, &out, 2));
     let (mut most, mut grains) = (0, 0);
     for frame in 2..=12 {
         let points = points::read(&out.join(format!("grains/grains.{frame:04}.vdb")), None).expect("points");

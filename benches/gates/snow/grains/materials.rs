@@ -6,13 +6,13 @@ use frazil::motion::Motion;
 use frazil::snow::grain_cohesion::of_wall;
 use frazil::snow::grain_friction::of_repose;
 use frazil::snow::grains::heap::{Colliders, Floor, Pose, Shell};
-use frazil::snow::grains::{Base, Grains, Object, Params, Surroundings};
+use frazil::snow::grains::{Grains, Object, Params, Surroundings};
 use frazil::sweep::Body;
 
 use crate::common::shapes::cuboid;
 use crate::harness::Harness;
 use crate::scenes::context;
-use crate::snow::grains::{Experiment, FRAME, walls};
+use crate::snow::grains::{Experiment, FRAME, ON_A_FLOOR, walls};
 
 /// Diameter of the grains (m).
 const D: f64 = 0.005;
@@ -20,7 +20,7 @@ const D: f64 = 0.005;
 pub fn run(h: &mut Harness) {
     h.measure("snow.grains.wall", cohesion);
     h.measure("snow.grains.restitution", restitution);
-    stick(h);
+    h.measure_all(["snow.grains.stick_stops", "snow.grains.stick_shakes"], stick);
 }
 
 /// Seeds of the heaps that walls are made of.
@@ -164,10 +164,7 @@ impl Motion for Plate {
 }
 
 /// Share (%) of the grains below a plate that still hang there after it has moved and stopped, and after it has shaken.
-fn stick(h: &mut Harness) {
-    if !h.wants("snow.grains.stick_stops") && !h.wants("snow.grains.stick_shakes") {
-        return;
-    }
+fn stick() -> [(f64, &'static str); 2] {
     let ctx: Context = context(2);
     let mesh = cuboid([0.2, 0.02, 0.2]);
     let positions = mesh.positions.iter().map(|position| position.cast::<f64>()).collect();
@@ -181,14 +178,7 @@ fn stick(h: &mut Harness) {
         .collect();
     grains.emit(&sites, &[], 0).expect("grains");
     let objects = [Object { stick: 5.0, ..Object::new(&body, 0.5) }];
-    let around = Surroundings {
-        base: Base::Missing,
-        objects: &objects,
-        statics: &[],
-        ground: &[],
-        floor: None,
-        lowest: -100.0,
-    };
+    let around = Surroundings { objects: &objects, floor: None, lowest: -100.0, ..ON_A_FLOOR };
     let mut hanging = |frames: std::ops::Range<i32>| {
         let last = f64::from(frames.end) * FRAME;
         for frame in frames {
@@ -203,8 +193,10 @@ fn stick(h: &mut Harness) {
         near as f64 * 100.0 / sites.len() as f64
     };
     let (stopped, shaken) = (hanging(0..36), hanging(36..60));
-    h.gate("snow.grains.stick_stops", stopped, "share of 400 grains below a plate, by five weights");
-    h.gate("snow.grains.stick_shakes", shaken, "after 24 frames by up to fifty weights");
+    [
+        (stopped, "share of 400 grains below a plate, by five weights"),
+        (shaken, "after 24 frames by up to fifty weights"),
+    ]
 }
 
 fn body_bottom(body: &Body) -> f64 {

@@ -1,12 +1,12 @@
 //! Gate of the memory of grains in a step, measured in a process of its own.
 
 use frazil::geometry::DVec3;
-use frazil::snow::grains::{Base, Grains, Params, Surroundings, memory};
+use frazil::snow::grains::{Grains, Params, memory};
 
 use crate::harness::Harness;
 use crate::process::{kilobytes, number_of, own, printed};
 use crate::scenes::context;
-use crate::snow::grains::{FRAME, Random};
+use crate::snow::grains::{FRAME, ON_A_FLOOR, Random};
 
 /// Count of grains along each axis of a box of them that settles.
 const SIDES: [u32; 3] = [90, 32, 90];
@@ -42,16 +42,8 @@ pub fn print_memory() {
     let each = |kilobytes: f64| kilobytes * 1024.0 / count as f64;
     grains.emit(&positions, &[], 0).expect("grains");
     println!("# grains that were added: {:.0} bytes each", each(kilobytes("self", "VmRSS:") - before));
-    let around = Surroundings {
-        base: Base::Missing,
-        objects: &[],
-        statics: &[],
-        ground: &[],
-        floor: Some(0.0),
-        lowest: -1.0,
-    };
     for frame in 0..SETTLE {
-        grains.step(&ctx, &around, [0.0, FRAME], frame as i32).expect("a step");
+        grains.step(&ctx, &ON_A_FLOOR, [0.0, FRAME], frame as i32).expect("a step");
     }
     // Returns memory that earlier steps freed to the system, so that only what is in use counts.
     let resident = || {
@@ -67,7 +59,7 @@ pub fn print_memory() {
     resident();
     // From here on the peak is that of one step.
     let is_reset = std::fs::write("/proc/self/clear_refs", "5").is_ok();
-    grains.step(&ctx, &around, [0.0, FRAME], SETTLE as i32).expect("a step");
+    grains.step(&ctx, &ON_A_FLOOR, [0.0, FRAME], SETTLE as i32).expect("a step");
     let peak = kilobytes("self", "VmHWM:") - before;
     println!("# a step adds (that copy, blocks, anchors, pairs in batches): {:.0}", each(peak - between));
     println!("# after it, before freed memory goes back: {:.0}", each(kilobytes("self", "VmRSS:") - before));

@@ -1,6 +1,7 @@
 //! Gates of mist beside solids that move: what flows through them, and pockets that they seal off.
 
-use frazil::flow::{Coord, Faces, Flow, Solids, Tiles};
+use frazil::flow::tiles::shifted;
+use frazil::flow::{Coord, Flow, Solids, Tiles};
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::motion::{Key, Keys, Rigid};
 use frazil::snow::mist::{Around, Mist, Params, Surroundings};
@@ -9,6 +10,7 @@ use frazil::sweep::Body;
 use crate::common::shapes::cuboid;
 use crate::harness::Harness;
 use crate::scenes::context;
+use crate::snow::mist::walled;
 
 /// Length of a frame (s), and edge of a cell (m).
 const FRAME: f64 = 1.0 / 24.0;
@@ -107,20 +109,9 @@ fn lidded(tiles: &Tiles, wider: f32, lid: f32) -> Solids {
         let middle = cell.map(|x| (x as f32 + 0.5) * wider);
         middle.iter().all(|x| (2.0..14.0).contains(x)) && middle[1] < lid
     };
-    let faces = |coord: &Coord| {
-        let mut faces = Faces::open();
-        for cell in 0..512usize {
-            let at = [cell >> 6, cell >> 3 & 7, cell & 7];
-            let at = [0, 1, 2].map(|axis| coord[axis] * 8 + at[axis] as i32);
-            for axis in 0..3 {
-                let below = frazil::flow::tiles::shifted(at, axis, -1);
-                faces.open[axis][cell] = f32::from(u8::from(is_inside(at) && is_inside(below)));
-                if axis == 1 && is_inside(below) && !is_inside(at) && at[1] as f32 * wider > 2.0 {
-                    faces.speed[axis][cell] = -0.5;
-                }
-            }
-        }
-        faces
-    };
-    Solids::new(tiles, (0..).zip(tiles.coords()).map(|(slot, coord)| (slot, faces(coord))).collect())
+    walled(tiles, is_inside, |at, axis| {
+        let is_lid =
+            axis == 1 && is_inside(shifted(at, 1, -1)) && !is_inside(at) && at[1] as f32 * wider > 2.0;
+        if is_lid { -0.5 } else { 0.0 }
+    })
 }
