@@ -78,15 +78,18 @@ fn main() {
     shallow::film::run(&mut h);
     h.measure("shallow.delivery", shallow::delivery::measure);
     h.measure("shallow.orifice", shallow::orifice::measure);
-    shallow::huppert::run(&mut h);
+    let names = ["exponent", "exponent_coarse", "front", "front_coarse"]
+        .map(|name| format!("shallow.huppert_{name}"));
+    h.measure_all(names.each_ref().map(String::as_str), shallow::huppert::measure);
     shallow::incline::run(&mut h);
     shallow::walls::run(&mut h);
-    shallow::spread::run(&mut h);
-    shallow::bowl::run(&mut h);
-    shallow::energy::run(&mut h);
+    h.measure_all(["shallow.spread_exponent", "shallow.spread_round"], shallow::spread::measure);
+    h.measure("shallow.bowl_period", shallow::bowl::measure);
+    let names = ["shallow.energy_start", "shallow.energy_high", "shallow.energy_viscous"];
+    h.measure_all(names, shallow::energy::measure);
     shallow::lake::run(&mut h);
     shallow::minimum_heights::run(&mut h);
-    shallow::dam::run(&mut h);
+    h.measure_all(["shallow.dam_front", "shallow.dam_depth"], shallow::dam::measure);
     h.measure("shallow.mass", shallow::mass::measure);
     shallow::free_fall::run(&mut h);
     h.measure("shallow.depth_range", shallow::range::measure);

@@ -6,7 +6,7 @@ use frazil::shallow::pipes::Border;
 
 use crate::common::liquids::context;
 use crate::plots::Plot;
-use crate::shallow::ground::{G, between, depth, dry, ground, run_until, viscous};
+use crate::shallow::ground::{G, between, depth, dry, ground, ratios, run_until, viscous};
 
 /// Blood (m2/s), as in the thesis.
 const BLOOD: f64 = 4.0e-6;
@@ -28,9 +28,7 @@ pub fn measure() -> (f64, String) {
         worst = worst.max((share - 1.0).abs());
         points.push([thick * 1e3, share * 1e6 * G * thick.powi(3) / (3.0 * BLOOD)]);
     }
-    let curve = (0..=40)
-        .map(|i| 1e-6 * 1e3f64.powf(f64::from(i) / 40.0))
-        .map(|d| [d * 1e3, 1e6 * G * d.powi(3) / (3.0 * BLOOD)]);
+    let curve = ratios(1e-6, 1e-3, 40).map(|d| [d * 1e3, 1e6 * G * d.powi(3) / (3.0 * BLOOD)]);
     Plot::log("Blood that a film delivers", "depth (mm)", "ml/s for a metre of width, times (1 + S2)2 / S")
         .line("theory, g H3 / (3 nu)", curve)
         .points("pipes, over an open border", points)

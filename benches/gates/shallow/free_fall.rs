@@ -11,7 +11,7 @@ use frazil::shallow::{Params, Shallow};
 use crate::common::bodies::Dice;
 use crate::common::shallow::{Turn, busy, context, ground, source};
 use crate::harness::Harness;
-use crate::shallow::ground::G;
+use crate::shallow::ground::{G, change};
 
 /// Edge of a cell (m).
 const CELL: f64 = 0.002;
@@ -120,15 +120,7 @@ fn volume() -> (f64, String) {
     let (mut most, mut flown, mut full) = (0, 0, 0);
     while steps < STEPS {
         if frame % EVERY == 0 {
-            for _ in 0..200 {
-                let column = dice.below(liquid.columns().len());
-                if liquid.columns().is_column(column) {
-                    liquid.pour(column, dice.between(-2e-3, 1e-3));
-                }
-            }
-            let mut params = liquid.params().clone();
-            params.gravity = [dice.between(-3.0, 3.0), -9.81, dice.between(-3.0, 3.0)];
-            liquid.set_params(params).expect("parameters");
+            change(&mut liquid, &mut dice);
         }
         if frame % 3 == 0 {
             let centre =

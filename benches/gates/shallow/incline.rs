@@ -2,12 +2,12 @@
 //! (1982); and what other models of friction do to a film: Mould and Yang's drag (1997), which knows no depth, and explicit viscosity.
 
 use frazil::Context;
+use frazil::shallow::Params;
 use frazil::shallow::params::Friction;
-use frazil::shallow::{Params, Shallow};
 
 use crate::common::shallow::context;
 use crate::harness::Harness;
-use crate::shallow::ground::{G, between, depth, dry, ground, run_until, viscous};
+use crate::shallow::ground::{G, between, dry, front, ground, ratios, run_until, viscous};
 
 /// The incline's slope, and viscosities (m2/s).
 const SLOPE: f64 = 0.35;
@@ -18,8 +18,8 @@ const FIRST: f64 = 0.1;
 const LAST: f64 = 0.2;
 /// Rows of cells: walls do not reach the middle.
 const WIDE: usize = 81;
-/// Positions of the front that are measured.
-const COUNT: usize = 7;
+/// From one position of the front that is measured to the last.
+const STEPS: u32 = 6;
 
 /// All gates.
 pub fn run(h: &mut Harness) {
@@ -62,21 +62,13 @@ fn front_off(ctx: &Context, viscosity: f64, friction: Friction) -> f64 {
         let column = liquid.columns().column(cell_at, 0).expect("ground everywhere");
         liquid.pour(column, AREA / (first * cell));
     }
-    let off = |i: usize| {
-        let position = FIRST * (LAST / FIRST).powf(i as f64 / (COUNT - 1) as f64);
+    let off = |position: f64| {
         let time = time_at(position, viscosity);
         run_until(&mut liquid, ctx, time, time_at(LAST, viscosity) / 200.0);
-        100.0 * (front(&liquid, position) / position - 1.0).abs()
+        // Half of the depth of theory behind the front.
+        100.0 * (front(&liquid, WIDE / 2, 0.75 * AREA / position) / position - 1.0).abs()
     };
-    (0..COUNT).map(off).fold(0.0, f64::max)
-}
-
-/// Where the depth in the middle falls through half of that of theory behind a front (m).
-fn front(liquid: &Shallow, theory: f64) -> f64 {
-    let (half, cell) = (0.75 * AREA / theory, liquid.columns().grid.cell);
-    let at = |x: usize| depth(liquid, [x, WIDE / 2]);
-    let last = (0..liquid.columns().grid.size[0]).rev().find(|&x| at(x) > half).expect("a current");
-    (last as f64 + 0.5 + (at(last) - half) / (at(last) - at(last + 1))) * cell
+    ratios(FIRST, LAST, STEPS).map(off).fold(0.0, f64::max)
 }
 
 /// Nusselt's film on the incline (m/s).

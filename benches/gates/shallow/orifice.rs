@@ -4,7 +4,7 @@ use frazil::shallow::sources::{FlowPoint, Kind};
 
 use crate::common::liquids::context;
 use crate::plots::Plot;
-use crate::shallow::ground::{G, between, dry, ground, pour, viscous};
+use crate::shallow::ground::{G, between, dry, even, ground, pour, viscous};
 
 /// Edge of the basin (cells), and of a cell (m).
 const EDGE: usize = 50;
@@ -51,7 +51,7 @@ pub fn measure() -> (f64, String) {
         before = after;
     }
     let note = format!("40 to 5 mm of water in {:.1} s; {} rates", basin.time(), points.len());
-    let curve = (0..=40).map(|i| LEVELS[1] + (LEVELS[0] - LEVELS[1]) * f64::from(i) / 40.0);
+    let curve = even(LEVELS[1], LEVELS[0], 40);
     Plot::linear("A basin runs empty through a hole", "depth (mm)", "ml/s")
         .line("theory, Cd a (2 g H)^1/2", curve.map(|depth| [1e3 * depth, 1e6 * law(depth)]))
         .points("an orifice", points)
