@@ -22,9 +22,7 @@ const FADE: f64 = 0.02;
 
 /// All of them.
 pub fn run(h: &mut Harness) {
-    if h.wants("shallow.lift_uncovered") || h.wants("shallow.lift_discarded") {
-        covered(h);
-    }
+    h.measure_all(["shallow.lift_uncovered", "shallow.lift_discarded"], covered);
     h.measure("shallow.surface_rim", rim);
     h.measure("shallow.surface_jump", jump);
 }
@@ -229,7 +227,7 @@ impl Above {
 }
 
 /// Films of many depths on many grounds.
-fn covered(h: &mut Harness) {
+fn covered() -> [(f64, String); 2] {
     let (mut lifted, mut plain) = (Above::default(), Above::default());
     let mut sum = Fitted::default();
     let mut most = 0.0f64;
@@ -253,17 +251,12 @@ fn covered(h: &mut Harness) {
          least depth of 0.05 cells only {}, by {:.3} cells",
         lifted.looked, lifted.deep, lifted.highest, plain.film, plain.highest
     );
-    if h.wants("shallow.lift_uncovered") {
-        h.gate("shallow.lift_uncovered", lifted.film as f64, &note);
-    }
-    if h.wants("shallow.lift_discarded") {
-        let Fitted { upward, discarded, capped } = sum;
-        let share = 100.0 * (discarded + capped) as f64 / upward as f64;
-        let note = format!(
-            "{discarded} of {upward} that face up, and {capped} under low ceilings; the greatest lift is {most:.2} cells"
-        );
-        h.gate("shallow.lift_discarded", share, &note);
-    }
+    let Fitted { upward, discarded, capped } = sum;
+    let share = 100.0 * (discarded + capped) as f64 / upward as f64;
+    let of_lifts = format!(
+        "{discarded} of {upward} that face up, and {capped} under low ceilings; the greatest lift is {most:.2} cells"
+    );
+    [(lifted.film as f64, note), (share, of_lifts)]
 }
 
 /// How far rims are over the ground.

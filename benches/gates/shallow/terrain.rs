@@ -33,16 +33,13 @@ pub fn run(h: &mut Harness) {
     let terrains = terrains();
     let [sheet, sphere, spheres] = terrains.each_ref();
     // Each vertical line meets a sheet or a closed surface once or twice, and the many spheres some seven times.
-    time(h, "shallow.terrain_all", &all, &[sheet, sphere]);
-    time(h, "shallow.terrain_overlapping", &all, &[spheres]);
-    time(h, "shallow.terrain_box", &middle, &[sheet, sphere, spheres]);
+    h.measure("shallow.terrain_all", || time(&all, &[sheet, sphere]));
+    h.measure("shallow.terrain_overlapping", || time(&all, &[spheres]));
+    h.measure("shallow.terrain_box", || time(&middle, &[sheet, sphere, spheres]));
 }
 
 /// Times casts of the triangles of terrains through a box of cells: the slowest of them.
-fn time(h: &mut Harness, name: &str, cells: &Range<usize>, terrains: &[&(&str, TriMesh)]) {
-    if !h.wants(name) {
-        return;
-    }
+fn time(cells: &Range<usize>, terrains: &[&(&str, TriMesh)]) -> (f64, String) {
     let (mut worst, mut note) = (0.0, format!("{:?}", cpu_level()));
     for (which, mesh) in terrains {
         let (cast, moved) = timed(mesh, [cells.clone(), cells.clone()]);
@@ -51,7 +48,7 @@ fn time(h: &mut Harness, name: &str, cells: &Range<usize>, terrains: &[&(&str, T
         note +=
             &format!(" {which}, {count} triangles: {cast:.3} ms, {moved:.3} ms for liquid to move along;");
     }
-    h.gate(name, worst, note.trim_end_matches(';'));
+    (worst, note.trim_end_matches(';').to_string())
 }
 
 /// Lines through random solids.
