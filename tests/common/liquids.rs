@@ -17,7 +17,12 @@ pub fn context(threads: usize) -> Context {
 
 /// The surface of particles at these positions (m) with cells of half a spacing (m), as the tracker has it.
 pub fn own_surface(ctx: &Context, positions: &[DVec3], spacing: f64) -> TriMesh {
-    let phi = Implicit::new(ctx, positions, spacing, 0.5 * spacing).expect("a surface");
+    surface_on(ctx, positions, spacing, 0.5)
+}
+
+/// The surface of particles at these positions (m) on cells of an edge (spacings).
+pub fn surface_on(ctx: &Context, positions: &[DVec3], spacing: f64, cell: f64) -> TriMesh {
+    let phi = Implicit::new(ctx, positions, spacing, cell * spacing).expect("a surface");
     Isosurface::new(&phi).mesh(&phi)
 }
 

@@ -14,7 +14,7 @@ use crate::program::Folder;
 #[test]
 fn optional_fields_may_be_left_out() {
     let folder = Folder::empty();
-    for seed in 0..4 {
+    for seed in 0..12 {
         let whole = complete(seed);
         let expected = geometry(&whole.write(&folder)).unwrap();
         assert!(expected.1[0] != expected.1[3], "it moves");

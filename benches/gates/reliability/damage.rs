@@ -1,7 +1,7 @@
 //! Gates of damaged files: mutated ones, cut ones, and what the process costs that decodes foreign .vdb files.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -14,11 +14,10 @@ use frazil::vdb::{MetaValue, file, level_set};
 
 use crate::common::{character, hero, shapes};
 use crate::harness::{Harness, median, timed};
+use crate::process::own;
 use crate::scenes::{self, context};
 use crate::surface::readers;
 
-/// Argument of a run that only reads mutated files: kind, first and last.
-pub const FUZZ: &str = "--read-mutated";
 /// Inputs that are tried of each kind in this process, and of .vdb files.
 const INPUTS: usize = 10_000;
 const VDB_INPUTS: usize = 2_000;
@@ -40,12 +39,8 @@ pub fn run(h: &mut Harness) {
             fuzz(h, &name, kind);
         }
     }
-    if h.wants("reliability.cut") {
-        cut(h);
-    }
-    if h.wants("reliability.child_cost") {
-        child_cost(h);
-    }
+    h.measure("reliability.cut", cut);
+    h.measure("reliability.child_cost", child_cost);
 }
 
 /// Numbers that look random and are always the same (xorshift).
@@ -66,22 +61,10 @@ impl Dice {
 
 /// A changed copy of a file.
 fn mutated(bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
-    const WORDS: [&str; 14] = [
-        "0",
-        "-1",
-        "1",
-        "2",
-        "255",
-        "65536",
-        "2147483648",
-        "4294967295",
-        "18446744073709551615",
-        "1e999",
-        "nan",
-        "-0.0",
-        "\"\"",
-        "null",
-    ];
+    let words: Vec<&str> =
+        "0 -1 1 2 255 65536 2147483648 4294967295 18446744073709551615 1e999 nan -0.0 \"\" null"
+            .split(' ')
+            .collect();
     let mut out = bytes.to_vec();
     for _ in 0..1 + dice.below(6) {
         let length = out.len();
@@ -101,7 +84,7 @@ fn mutated(bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
                 let Some(begin) = out[at..].iter().position(is_digit).map(|step| at + step) else { continue };
                 let end =
                     out[begin..].iter().position(|byte| !is_digit(byte)).map_or(length, |step| begin + step);
-                out.splice(begin..end, WORDS[dice.below(WORDS.len())].bytes());
+                out.splice(begin..end, words[dice.below(words.len())].bytes());
             }
             5 => {
                 let end = (at + 1 + dice.below(64)).min(length);
@@ -226,7 +209,7 @@ pub fn decoder(memory: u64) -> Guard {
     Guard { program: env!("CARGO_BIN_EXE_frazil").into(), memory, threads: 2, cancel: Arc::default() }
 }
 
-/// Reads mutated files, and prints how many were accepted; the run ends when one takes too long or too much memory.
+/// The run that reads mutated files - their kind, the first and the last one are its next arguments -, and prints how many were accepted; the run ends when one takes too long or too much memory.
 pub fn read_mutated() {
     let arguments: Vec<String> = std::env::args().skip(2).collect();
     let [kind, first, last] = arguments.as_slice() else { return };
@@ -288,8 +271,8 @@ pub fn tried(kind: &str, count: usize) -> Tried {
     let mut first = 0;
     while first < count {
         let last = (first + BATCH).min(count);
-        let child = Command::new(std::env::current_exe().expect("this program"))
-            .args([FUZZ, kind, &first.to_string(), &last.to_string()])
+        let child = own("read-mutated")
+            .args([kind, &first.to_string(), &last.to_string()])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -339,7 +322,7 @@ fn sized(folder: &Path) -> Vec<(String, Vec<u8>)> {
     out
 }
 
-fn cut(h: &mut Harness) {
+fn cut() -> (f64, String) {
     let folder = std::env::temp_dir().join(format!("frazil-cut-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder");
     let guard = decoder(MOST_MEMORY);
@@ -363,10 +346,10 @@ fn cut(h: &mut Harness) {
     }
     let _ = std::fs::remove_dir_all(&folder);
     let note = format!("{cuts} cuts of {} files", files.len());
-    h.gate("reliability.cut", accepted as f64, &note);
+    (accepted as f64, note)
 }
 
-fn child_cost(h: &mut Harness) {
+fn child_cost() -> (f64, String) {
     let ctx = context(2);
     let layer = scenes::snow(&ctx, 3.1, 0.005, scenes::EXACT);
     let mut surface = layer.surface().deep_copy().expect("a copy");
@@ -393,5 +376,5 @@ fn child_cost(h: &mut Harness) {
     let (direct, child) = (median(direct), median(child));
     let note =
         format!("{megabytes:.1} MB, {} leaves, {direct:.3} s and {child:.3} s{note}", surface.leaf_count());
-    h.gate("reliability.child_cost", child / direct, &note);
+    (child / direct, note)
 }
