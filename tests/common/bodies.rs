@@ -28,6 +28,11 @@ impl Dice {
         (self.draw() % end.max(1) as u64) as usize
     }
 
+    /// One of a list.
+    pub fn one<'a, T: ?Sized>(&mut self, of: &[&'a T]) -> &'a T {
+        of[self.below(of.len())]
+    }
+
     /// Whether something happens that does once in so many times.
     pub fn one_in(&mut self, times: usize) -> bool {
         self.below(times) == 0

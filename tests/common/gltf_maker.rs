@@ -22,6 +22,14 @@ impl Maker {
         Self { json, bytes: Vec::new() }
     }
 
+    /// The triangle of [`Maker::triangle`] at node 0.
+    pub fn with_triangle() -> Self {
+        let mut maker = Self::new();
+        let mesh = maker.triangle();
+        maker.push("nodes", json!({ "mesh": mesh }));
+        maker
+    }
+
     /// Adds an accessor with a buffer view of its own; `kind` is its component type.
     pub fn accessor(&mut self, kind: u32, shape: &str, count: usize, bytes: &[u8]) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);

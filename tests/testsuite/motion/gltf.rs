@@ -44,9 +44,7 @@ fn step_linear_and_cubic_keys_follow_their_formulas() {
         ("LINEAR", flat([5.0, 6.0, 8.0]), [(0.0, 5.0), (1.25, 5.25), (2.0, 6.0), (3.0, 7.0), (9.0, 8.0)]),
         ("CUBICSPLINE", cubic, [(0.0, 1.0), (1.5, 3.375), (2.0, 8.0), (3.3, 35.937), (9.0, 64.0)]),
     ] {
-        let mut maker = Maker::new();
-        let mesh = maker.triangle();
-        maker.push("nodes", json!({ "mesh": mesh }));
+        let mut maker = Maker::with_triangle();
         maker.clip("move");
         maker.channel(0, "translation", how, &times, &values);
         let character = open(&maker.write(&folder));
@@ -142,9 +140,7 @@ fn skins_share_their_joints_and_equal_vertices_are_welded() {
 #[test]
 fn clips_start_where_they_are_asked_to_and_repeat() {
     let folder = Folder::empty();
-    let mut maker = Maker::new();
-    let mesh = maker.triangle();
-    maker.push("nodes", json!({ "mesh": mesh }));
+    let mut maker = Maker::with_triangle();
     maker.clip("sway");
     maker.channel(0, "translation", "LINEAR", &[3., 4., 5.], &[0., 0., 0., 1., 0., 0., 0., 0., 0.]);
     let path = maker.write(&folder);
@@ -164,9 +160,7 @@ fn clips_start_where_they_are_asked_to_and_repeat() {
 #[test]
 fn a_round_that_does_not_close_says_so_and_jumps_at_once() {
     let folder = Folder::empty();
-    let mut maker = Maker::new();
-    let mesh = maker.triangle();
-    maker.push("nodes", json!({ "mesh": mesh }));
+    let mut maker = Maker::with_triangle();
     maker.clip("walk");
     maker.channel(0, "translation", "LINEAR", &[0., 1.], &[0., 0., 0., 3., 0., 0.]);
     let character = Character::open(&maker.write(&folder), Play::default()).unwrap();

@@ -107,9 +107,7 @@ fn instances_that_cannot_be_are_a_sentence() {
 #[test]
 fn channels_without_a_node_are_passed_over_and_pointers_are_followed() {
     let folder = Folder::empty();
-    let mut maker = Maker::new();
-    let mesh = maker.triangle();
-    maker.push("nodes", json!({ "mesh": mesh }));
+    let mut maker = Maker::with_triangle();
     maker.clip("go");
     maker.channel(0, "translation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 4., 0., 0.]);
     maker.channel(0, "scale", "LINEAR", &[0.0, 2.0], &[1., 1., 1., 3., 1., 1.]);
@@ -128,9 +126,7 @@ fn channels_without_a_node_are_passed_over_and_pointers_are_followed() {
 #[test]
 fn clips_of_one_name_are_numbered_and_never_confused() {
     let folder = Folder::empty();
-    let mut maker = Maker::new();
-    let mesh = maker.triangle();
-    maker.push("nodes", json!({ "mesh": mesh }));
+    let mut maker = Maker::with_triangle();
     for (name, x) in [("go", 1.0), ("go #1", 2.0), ("go", 3.0), ("stay", 4.0)] {
         maker.clip(name);
         maker.channel(0, "translation", "STEP", &[0.0, 1.0], &[x, 0., 0., x, 0., 0.]);

@@ -6,6 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use crate::common::bodies::Dice;
 use crate::common::character;
 use crate::program::{CUBE, Folder, fails, works};
 use frazil::io::files::sequence::Pattern;
@@ -18,23 +19,6 @@ use frazil::{Context, Pool};
 use serde_json::Value;
 
 const ROUNDS: usize = 10_000;
-
-/// Always the same numbers (splitmix64).
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn below(&mut self, end: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % end.max(1) as u64) as usize
-    }
-
-    fn one<'a, T: ?Sized>(&mut self, of: &[&'a T]) -> &'a T {
-        of[self.below(of.len())]
-    }
-}
 
 /// Numbers and words that programs stumble over.
 const ODD: [&str; 36] = [
@@ -80,7 +64,7 @@ const ODD: [&str; 36] = [
 const PLAIN: [&str; 8] = ["0.05", "0.1", "1", "2", "3", "0.3", "-0.5", "0.02"];
 
 /// A text with a few changes.
-fn mutated(random: &mut Random, text: &str) -> String {
+fn mutated(random: &mut Dice, text: &str) -> String {
     let mut bytes = text.as_bytes().to_vec();
     for _ in 0..=random.below(6) / 4 {
         let at = random.below(bytes.len());
@@ -152,7 +136,7 @@ fn ten_thousand_changed_scenes_are_read_or_refused() {
     write_meshes(&folder);
     let path = folder.join("shot.toml");
     let ctx = Context::new(Pool::new(1).unwrap());
-    let mut random = Random(1);
+    let mut random = Dice(1);
     let (mut read, mut checked) = (0, 0);
     for round in 0..ROUNDS {
         let text = mutated(&mut random, SCENES[round % SCENES.len()]);
@@ -193,7 +177,7 @@ fn scenes_that_panicked_are_refused() {
 }
 
 /// A value with one of its parts changed.
-fn changed(random: &mut Random, value: &mut Value) {
+fn changed(random: &mut Dice, value: &mut Value) {
     match value {
         Value::Object(map) if !map.is_empty() && random.below(8) > 0 => {
             let at = random.below(map.len());
@@ -231,7 +215,7 @@ fn ten_thousand_changed_records_are_used_or_refused() {
     let scene = Scene::read(&half.join("half.toml")).unwrap();
     let inputs = Inputs::load(&scene).unwrap();
     let ctx = Context::new(Pool::new(1).unwrap());
-    let mut random = Random(2);
+    let mut random = Dice(2);
     let names = ["base.json", "base.0003.json", "files.json", "base.0004.json"];
     let precious = folder.join("precious");
     fs::write(&precious, "mine").unwrap();
@@ -291,7 +275,7 @@ fn ten_thousand_changed_states_are_refused() {
     let state = folder.join("out/state/base.0004.vdb");
     let whole = fs::read(&state).unwrap();
     let ctx = Context::new(Pool::new(1).unwrap());
-    let mut random = Random(3);
+    let mut random = Dice(3);
     let mut opened = Rebuild::open(&folder.join("out")).unwrap();
     for round in 0..ROUNDS {
         let mut bytes = whole.clone();
@@ -311,7 +295,7 @@ fn ten_thousand_changed_states_are_refused() {
 
 #[test]
 fn ten_thousand_names_are_patterns_or_not() {
-    let mut random = Random(4);
+    let mut random = Dice(4);
     for _ in 0..ROUNDS {
         let name = mutated(&mut random, "proj#3/body.%04d.$F4.####.obj");
         survives(&name, || {

@@ -11,8 +11,8 @@ use frazil::vdb::file::{self, WriteOptions};
 use frazil::vdb::{MetaValue, points};
 use frazil::{Context, Pool};
 
-use super::fuzz::Random;
 use super::shot_grains::{folder, grains};
+use crate::common::bodies::Dice;
 use crate::common::character;
 use crate::program::{Folder, fails, frazil, works};
 
@@ -138,7 +138,7 @@ fn changes_are_the_same_from_any_threads_stops_and_starts() {
 }
 
 /// Bytes that are cut, longer, or have other bits.
-fn damaged(random: &mut Random, whole: &[u8]) -> Vec<u8> {
+fn damaged(random: &mut Dice, whole: &[u8]) -> Vec<u8> {
     let mut bytes = whole.to_vec();
     match random.below(4) {
         0 => bytes.truncate(random.below(whole.len())),
@@ -170,7 +170,7 @@ fn damaged_changes_are_one_error_that_names_the_file() {
     let whole = fs::read(&path).unwrap();
     let mut cache = RebuildGrains::open(&at.join("out")).unwrap();
     let right = cache.bytes(&ctx, 9, &options).unwrap();
-    let mut random = Random(5);
+    let mut random = Dice(5);
     for round in 0..rounds(2000) {
         let bytes = damaged(&mut random, &whole);
         if bytes == whole {
@@ -224,7 +224,7 @@ fn damaged_changes_are_one_error_of_every_command() {
     let at = &folder("compression = 0.4\nradius = 0.005", "grains_mode = \"delta\"");
     works(at, "snow shot.toml -o out -q --frames 1-3");
     let whole = fs::read(at.join("out/grains/grains.0003.vdb")).unwrap();
-    let mut random = Random(6);
+    let mut random = Dice(6);
     let commands = ["convert a.vdb a.ply", "info a.vdb", "preview a.vdb -o a.png --size 16x16"];
     for round in 0..rounds(150) {
         fs::write(at.join("a.vdb"), damaged(&mut random, &whole)).unwrap();
@@ -309,7 +309,7 @@ fn changes_that_do_not_fit_are_refused() {
         let error = rebuilt(&held, 1, Some("")).unwrap_err();
         assert!(error.contains("grains.0002.vdb") && error.contains("identity"), "{error}");
     }
-    let mut random = Random(7);
+    let mut random = Dice(7);
     for _ in 0..rounds(2000) {
         let held: Vec<i64> = (0..12).filter(|_| random.below(3) == 0).collect();
         let gone: String = (0..random.below(8)).map(|_| char::from(b"0123589,-"[random.below(9)])).collect();

@@ -15,13 +15,13 @@ const GRAINS: &str = "compression = 0.4";
 const MIST: &str = "[mist]\nfrom_speed = 0.3";
 
 /// Files of an output in some folders.
-fn files(at: &Path, out: &str, kinds: &[&str]) -> Vec<(String, Vec<u8>)> {
+pub fn files(at: &Path, out: &str, kinds: &[&str]) -> Vec<(String, Vec<u8>)> {
     let is_of = |name: &String| kinds.iter().any(|kind| name.starts_with(&format!("{kind}/")));
     output(&at.join(out)).into_iter().filter(|(name, _)| is_of(name)).collect()
 }
 
 /// When the files of some folders were written.
-fn written(at: &Path, out: &str, kinds: &[&str]) -> Vec<std::time::SystemTime> {
+pub fn written(at: &Path, out: &str, kinds: &[&str]) -> Vec<std::time::SystemTime> {
     let names = files(at, out, kinds).into_iter().map(|(name, _)| name);
     names.map(|name| fs::metadata(at.join(out).join(name)).unwrap().modified().unwrap()).collect()
 }
@@ -108,15 +108,15 @@ fn a_killed_run_resumes_to_the_same_mist_from_any_number_of_threads() {
 #[test]
 fn caches_of_changes_give_the_same_mist() {
     let delta = format!("base_mode = \"delta\"\ngrains_mode = \"delta\"\n{MIST}");
-    let [whole, delta] = [folder(GRAINS, MIST), folder(GRAINS, &delta)];
-    works(whole.path(), "snow shot.toml -o out -q");
-    works(delta.path(), "snow shot.toml -o out -q");
-    assert!(grids(whole.path(), "out") == grids(delta.path(), "out"));
+    let [whole, delta] = &[folder(GRAINS, MIST), folder(GRAINS, &delta)];
+    works(whole, "snow shot.toml -o out -q");
+    works(delta, "snow shot.toml -o out -q");
+    assert!(grids(whole, "out") == grids(delta, "out"));
     // In one run, and stage by stage.
-    works(delta.path(), "snow shot.toml -o apart -q --stage base");
-    works(delta.path(), "snow shot.toml -o apart -q --stage grains");
-    works(delta.path(), "snow shot.toml -o apart -q --stage mist");
-    assert!(grids(delta.path(), "apart") == grids(delta.path(), "out"));
+    works(delta, "snow shot.toml -o apart -q --stage base");
+    works(delta, "snow shot.toml -o apart -q --stage grains");
+    works(delta, "snow shot.toml -o apart -q --stage mist");
+    assert!(grids(delta, "apart") == grids(delta, "out"));
 }
 
 #[test]

@@ -4,18 +4,12 @@ use std::fs;
 use std::path::Path;
 
 use super::shot_grains::folder;
-use crate::common::character::output;
+use super::shot_mist::{files, written};
 use crate::program::{fails, kill_at, works};
 use frazil::vdb::file::{read, to_bytes};
 
 const ALL: &str = "fog = [\"base\", \"grains\"]\nsnow = true\nmesh = [\"ply\", \"usd\"]";
 const GRAINS: &str = "compression = 0.4";
-
-/// Files of an output whose names begin with one of these folders.
-fn files(folder: &Path, out: &str, kinds: &[&str]) -> Vec<(String, Vec<u8>)> {
-    let is_of = |name: &String| kinds.iter().any(|kind| name.starts_with(&format!("{kind}/")));
-    output(&folder.join(out)).into_iter().filter(|(name, _)| is_of(name)).collect()
-}
 
 /// The grids of a kind's files, without what they say of their inputs.
 fn grids(folder: &Path, out: &str, kind: &str) -> Vec<Vec<u8>> {
@@ -25,12 +19,6 @@ fn grids(folder: &Path, out: &str, kind: &str) -> Vec<Vec<u8>> {
         to_bytes(&grids.iter().collect::<Vec<_>>(), &Default::default()).unwrap()
     };
     names.map(of_file).collect()
-}
-
-/// When the files of some folders were written.
-fn written(folder: &Path, out: &str, kinds: &[&str]) -> Vec<std::time::SystemTime> {
-    let names = files(folder, out, kinds).into_iter().map(|(name, _)| name);
-    names.map(|name| fs::metadata(folder.join(out).join(name)).unwrap().modified().unwrap()).collect()
 }
 
 #[test]
@@ -71,17 +59,17 @@ fn volumes_are_made_and_made_again_without_touching_base_and_grains() {
 fn caches_of_changes_give_the_same_volumes() {
     let all = "fog = [\"base\", \"grains\"]\nsnow = true\nmesh = [\"ply\"]";
     let delta = format!("base_mode = \"delta\"\ngrains_mode = \"delta\"\n{all}");
-    let [whole, delta] = [folder(GRAINS, all), folder(GRAINS, &delta)];
-    works(whole.path(), "snow shot.toml -o out -q");
-    works(delta.path(), "snow shot.toml -o out -q");
+    let [whole, delta] = &[folder(GRAINS, all), folder(GRAINS, &delta)];
+    works(whole, "snow shot.toml -o out -q");
+    works(delta, "snow shot.toml -o out -q");
     for kind in ["fog", "snow"] {
-        assert!(grids(whole.path(), "out", kind) == grids(delta.path(), "out", kind), "{kind}");
+        assert!(grids(whole, "out", kind) == grids(delta, "out", kind), "{kind}");
     }
-    assert!(files(whole.path(), "out", &["mesh"]) == files(delta.path(), "out", &["mesh"]));
+    assert!(files(whole, "out", &["mesh"]) == files(delta, "out", &["mesh"]));
     // A single frame, and frames apart.
-    works(delta.path(), "snow shot.toml -o some -q --stage base,grains");
-    works(delta.path(), "snow shot.toml -o some -q --stage volumes --frames 1-10x4");
-    let [all, some] = ["out", "some"].map(|out| grids(delta.path(), out, "fog"));
+    works(delta, "snow shot.toml -o some -q --stage base,grains");
+    works(delta, "snow shot.toml -o some -q --stage volumes --frames 1-10x4");
+    let [all, some] = ["out", "some"].map(|out| grids(delta, out, "fog"));
     assert!(some == [&all[0], &all[4], &all[8]].map(Clone::clone));
 }
 
