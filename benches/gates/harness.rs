@@ -124,18 +124,14 @@ impl Harness {
     }
 
     /// Measures gates together if any of them is wanted, and prints those that are.
-    pub fn measure_all<N: AsRef<str>, const COUNT: usize>(
+    pub fn measure_all<S: AsRef<str>, N: AsRef<str>, const COUNT: usize>(
         &mut self,
-        names: [&str; COUNT],
+        names: [S; COUNT],
         measure: impl FnOnce() -> [(f64, N); COUNT],
     ) {
-        let wanted = names.map(|name| self.wants(name));
-        if wanted == [false; COUNT] {
-            return;
-        }
-        for ((name, is_wanted), (value, note)) in names.into_iter().zip(wanted).zip(measure()) {
-            if is_wanted {
-                self.gate(name, value, note.as_ref());
+        if names.iter().any(|name| self.wants(name.as_ref())) {
+            for (name, (value, note)) in names.iter().zip(measure()) {
+                self.measure(name.as_ref(), || (value, note));
             }
         }
     }
@@ -187,8 +183,8 @@ impl Harness {
     }
 }
 
-/// Ticks of other processes and of all, since boot: for `# noisy`.
-fn ticks() -> Option<(f64, f64)> {
+/// Ticks of other processes since boot: for `# noisy`.
+fn ticks() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/stat").ok()?;
     let all: Vec<f64> =
         stat.lines().next()?.split_whitespace().skip(1).filter_map(|n| n.parse().ok()).collect();
@@ -197,7 +193,7 @@ fn ticks() -> Option<(f64, f64)> {
     let busy: f64 = all.iter().take(3).sum();
     // After the name's parenthesis and the state letter: utime and stime are numbers 11 and 12, the children's follow.
     let own: f64 = own.get(10..14)?.iter().sum();
-    Some((busy - own, Instant::now().elapsed().as_secs_f64()))
+    Some(busy - own)
 }
 
 /// Times what `work` does, and says what else the machine did meanwhile.
@@ -207,7 +203,7 @@ pub fn timed(mut work: impl FnMut()) -> (f64, String) {
     work();
     let seconds = start.elapsed().as_secs_f64();
     let others = match (before, ticks()) {
-        (Some((before, _)), Some((after, _))) => (after - before) / 100.0 / seconds,
+        (Some(before), Some(after)) => (after - before) / 100.0 / seconds,
         _ => 0.0,
     };
     (seconds, if others > 0.3 { " noisy".into() } else { String::new() })

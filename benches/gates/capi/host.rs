@@ -3,6 +3,8 @@
 
 use std::ffi::{CStr, c_void};
 use std::ptr::null_mut;
+use std::sync::OnceLock;
+use std::time::Instant;
 
 use frazil::capi::level_set::body::{frz_body, frz_body_init};
 use frazil::capi::mesh::triangles::*;
@@ -99,4 +101,10 @@ pub fn written(call: impl Fn(*mut c_void, usize, *mut usize) -> frz_status) -> V
     works(call(out.as_mut_ptr().cast(), size, &mut size));
     out.truncate(size);
     out
+}
+
+/// Microseconds since the first call, on the wall.
+pub fn clock() -> u64 {
+    static START: OnceLock<Instant> = OnceLock::new();
+    START.get_or_init(Instant::now).elapsed().as_micros() as u64
 }

@@ -34,10 +34,7 @@ const KINDS: [&str; 5] = ["obj", "ply", "stl", "gltf", "glb"];
 /// All of them.
 pub fn run(h: &mut Harness) {
     for kind in KINDS.into_iter().chain(["vdb"]) {
-        let name = format!("reliability.fuzz_{kind}");
-        if h.wants(&name) {
-            fuzz(h, &name, kind);
-        }
+        h.measure(&format!("reliability.fuzz_{kind}"), || fuzz(kind));
     }
     h.measure("reliability.cut", cut);
     h.measure("reliability.child_cost", child_cost);
@@ -252,11 +249,11 @@ pub fn read_mutated() {
     println!("{accepted}");
 }
 
-fn fuzz(h: &mut Harness, name: &str, kind: &str) {
+fn fuzz(kind: &str) -> (f64, String) {
     let count = if kind == "vdb" { VDB_INPUTS } else { INPUTS };
     let Tried { accepted, failed } = tried(kind, count);
     let note = format!("{count} inputs, {accepted} accepted {}", failed.join(", "));
-    h.gate(name, failed.len() as f64, &note);
+    (failed.len() as f64, note)
 }
 
 /// What became of mutated files: how many were read, and which ended the process that read them.

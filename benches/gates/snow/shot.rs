@@ -30,8 +30,8 @@ pub fn run(h: &mut Harness) {
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let Some(man) = wanted_data(h, &names, MAN) else { return };
     sweeps(h, &man);
-    skinning(h, &man);
-    edit(h, &man);
+    h.measure("snow.shot.skinning", || skinning(&man));
+    h.measure("snow.shot.edit", || edit(&man));
     pass(h, &man);
     check(h, &man);
     continued(h, &man);
@@ -100,19 +100,14 @@ fn fastest(motion: &dyn Motion, last: i32) -> Vec<(f64, i32)> {
 }
 
 /// Against Blender's poses at key times.
-fn skinning(h: &mut Harness, man: &Path) {
-    if h.wants("snow.shot.skinning") {
-        let (worst, height) = character::farthest_from_blender(man);
-        let note = format!("{} vertices at {} key times", character::VERTICES, character::FRAMES);
-        h.gate("snow.shot.skinning", worst / height, &note);
-    }
+fn skinning(man: &Path) -> (f64, String) {
+    let (worst, height) = character::farthest_from_blender(man);
+    let note = format!("{} vertices at {} key times", character::VERTICES, character::FRAMES);
+    (worst / height, note)
 }
 
 /// Seconds of a step without files.
-fn edit(h: &mut Harness, man: &Path) {
-    if !h.wants("snow.shot.edit") {
-        return;
-    }
+fn edit(man: &Path) -> (f64, String) {
     let ctx = context(2);
     let folder = tempfile::tempdir().expect("a folder");
     let scene = character::walk_scene(folder.path(), man, 240, 0.0075, "");
@@ -127,7 +122,7 @@ fn edit(h: &mut Harness, man: &Path) {
     let times: Vec<f64> = (2..=97).map(step).collect();
     let worst = times.iter().copied().fold(0.0, f64::max);
     let note = format!("median of 96 frames, worst {worst:.3} s; threads=2 thesis=3.15-4.59 s on 6 cores");
-    h.gate("snow.shot.edit", median(times), &note);
+    (median(times), note)
 }
 
 fn text(path: &Path) -> &str {
@@ -137,21 +132,18 @@ fn text(path: &Path) -> &str {
 /// The whole pass with its files, in both modes.
 fn pass(h: &mut Harness, man: &Path) {
     for mode in ["full", "delta"] {
-        let (pass, memory) = (format!("snow.shot.pass_{mode}"), format!("snow.shot.memory_{mode}"));
-        if !h.wants(&pass) && !h.wants(&memory) {
-            continue;
-        }
-        let folder = tempfile::tempdir().expect("a folder");
-        let scene =
-            character::walk_scene(folder.path(), man, 240, 0.0075, &format!("base_mode = \"{mode}\""));
-        let (out, report) = (folder.path().join("out"), folder.path().join("report.json"));
-        let arguments =
-            ["snow", text(&scene), "-o", text(&out), "--threads", "2", "-q", "--report", text(&report)];
-        let (took, noisy) = timed(|| works(&mut frazil(arguments)));
-        let peak = json(&report)["peak_memory_bytes"].as_f64().expect("a peak") / f64::from(1 << 20);
-        let note = format!("240 frames, 6 x 6 m, with files; threads=2 {THESIS}{noisy}");
-        h.gate(&pass, took, &note);
-        h.gate(&memory, peak, "");
+        let names = ["pass", "memory"].map(|what| format!("snow.shot.{what}_{mode}"));
+        h.measure_all(names, || {
+            let folder = tempfile::tempdir().expect("a folder");
+            let output = format!("base_mode = \"{mode}\"");
+            let scene = character::walk_scene(folder.path(), man, 240, 0.0075, &output);
+            let (out, report) = (folder.path().join("out"), folder.path().join("report.json"));
+            let mut pass = frazil(["snow", text(&scene), "-o", text(&out), "-q", "--threads", "2"]);
+            let (took, noisy) = timed(|| works(pass.args(["--report", text(&report)])));
+            let peak = json(&report)["peak_memory_bytes"].as_f64().expect("a peak") / f64::from(1 << 20);
+            let note = format!("240 frames, 6 x 6 m, with files; threads=2 {THESIS}{noisy}");
+            [(took, note), (peak, String::new())]
+        });
     }
 }
 
@@ -162,14 +154,12 @@ fn check(h: &mut Harness, man: &Path) {
         let run = || timed(|| works(&mut frazil(["check", text(scene)]))).0;
         median((0..5).map(|_| run()).collect())
     };
-    if h.wants("snow.shot.check_walk") {
-        let scene = character::walk_scene(folder.path(), man, 240, 0.0075, "");
-        h.gate("snow.shot.check_walk", seconds(&scene), "");
-    }
-    if h.wants("snow.shot.check_sequence") {
-        let scene = character::sequence_scene(folder.path(), 240, 158);
-        h.gate("snow.shot.check_sequence", seconds(&scene), "50,000 triangles a frame");
-    }
+    h.measure("snow.shot.check_walk", || {
+        (seconds(&character::walk_scene(folder.path(), man, 240, 0.0075, "")), "")
+    });
+    h.measure("snow.shot.check_sequence", || {
+        (seconds(&character::sequence_scene(folder.path(), 240, 158)), "50,000 triangles a frame")
+    });
 }
 
 /// Killed at ten moments and continued, in both modes; and whole frames rebuilt from changes.

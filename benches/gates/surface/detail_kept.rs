@@ -2,12 +2,11 @@
 //! where the liquid has neither broken nor stretched up to then. Whether it has is read off the particles alone, by their ids, and the
 //! detail off the mesh alone, as what smoothing takes away; neither asks the tracker.
 
-use std::collections::HashMap;
-
 use frazil::Context;
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Params, Particles, Tracker};
 
+use crate::bins::Bins;
 use crate::common::liquids::{Ball, ball, context, numbered, once_around};
 use crate::common::shapes::welded;
 use crate::harness::Harness;
@@ -165,38 +164,4 @@ fn shaken(
         });
         is_calm[particle] = strain < STRAIN && !is_met;
     }
-}
-
-/// Positions in cubes of an edge (m).
-struct Bins<'a> {
-    edge: f64,
-    positions: &'a [DVec3],
-    bins: HashMap<[i64; 3], Vec<usize>>,
-}
-
-impl<'a> Bins<'a> {
-    fn new(positions: &'a [DVec3], edge: f64) -> Self {
-        let mut bins: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
-        for (at, position) in positions.iter().enumerate() {
-            bins.entry(bin(position, edge)).or_default().push(at);
-        }
-        Self { edge, positions, bins }
-    }
-
-    /// Calls `see` with those within an edge of a position, in a fixed order.
-    fn near(&self, position: &DVec3, mut see: impl FnMut(usize)) {
-        let [x, y, z] = bin(position, self.edge);
-        for n in 0..27 {
-            let at = [x + n / 9 - 1, y + n / 3 % 3 - 1, z + n % 3 - 1];
-            for other in self.bins.get(&at).into_iter().flatten() {
-                if (self.positions[*other] - position).norm() <= self.edge {
-                    see(*other);
-                }
-            }
-        }
-    }
-}
-
-fn bin(position: &DVec3, edge: f64) -> [i64; 3] {
-    [0, 1, 2].map(|axis| (position[axis] / edge).floor() as i64)
 }

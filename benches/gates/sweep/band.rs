@@ -15,7 +15,6 @@ use rayon::prelude::*;
 
 use crate::common::character::data;
 use crate::common::{hero, shapes};
-use crate::harness::Harness;
 use crate::scenes::{self, context};
 use crate::sweep::dense_union::Dense;
 
@@ -56,10 +55,7 @@ struct Course {
 }
 
 /// All of them.
-pub fn run(h: &mut Harness) {
-    if !h.wants("reliability.band") {
-        return;
-    }
+pub fn measure() -> [(f64, String); 3] {
     let folder = std::env::temp_dir().join(format!("frazil-band-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder");
     let only = std::env::var("FRAZIL_BAND").ok();
@@ -75,12 +71,10 @@ pub fn run(h: &mut Harness) {
         }
     }
     std::fs::remove_dir_all(&folder).ok();
-    let note = format!("{} pairs, {}", found.pairs, found.worst_jump.1);
-    h.gate("reliability.band_jumps", found.jumps as f64, &note);
-    let note = format!("{} pairs, {}", in_snow.pairs, in_snow.worst_jump.1);
-    h.gate("reliability.band_snow", in_snow.jumps as f64, &note);
-    let note = format!("{} values of {} sweeps, {}", found.values, found.sweeps, found.worst.1);
-    h.gate("reliability.band_error", found.worst.0, &note);
+    let jumps =
+        |found: &Found| (found.jumps as f64, format!("{} pairs, {}", found.pairs, found.worst_jump.1));
+    let of_values = format!("{} values of {} sweeps, {}", found.values, found.sweeps, found.worst.1);
+    [jumps(&found), jumps(&in_snow), (found.worst.0, of_values)]
 }
 
 /// What was found, and where the worst of it.

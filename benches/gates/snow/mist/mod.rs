@@ -263,26 +263,24 @@ fn vortex_error(ctx: &Context, tiles: i32) -> f64 {
 /// Half of the mist after its half-life, and all of it without one.
 fn mass(h: &mut Harness) {
     let ctx = context(2);
-    let name = "snow.mist.half_life";
-    if h.wants(name) {
+    h.measure("snow.mist.half_life", || {
         let mut mist = puff(Params { half_life: 0.5, gravity: 0.0, ..air() }, 8.0, 0.0);
         let before = mist.mass();
         (0..12).for_each(|frame| drop(step(&mut mist, &ctx, &[], &open, frame)));
-        h.gate(name, (2.0 * mist.mass() / before - 1.0).abs(), "after 0.5 s");
-    }
-    let name = "snow.mist.mass_drift";
-    if h.wants(name) {
+        ((2.0 * mist.mass() / before - 1.0).abs(), "after 0.5 s")
+    });
+    h.measure("snow.mist.mass_drift", || {
         let mut mist = puff(air(), 8.0, 1.0);
         let before = mist.mass();
-        let mut note = String::new();
+        let mut note = "every 12 frames:".to_string();
         for frame in 1..=48 {
             step(&mut mist, &ctx, &[], &open, frame);
             if frame % 12 == 0 {
                 note += &format!(" {:.2} %", (mist.mass() / before - 1.0) * 100.0);
             }
         }
-        h.gate(name, (mist.mass() / before - 1.0).abs() * 100.0, &format!("every 12 frames:{note}"));
-    }
+        ((mist.mass() / before - 1.0).abs() * 100.0, note)
+    });
 }
 
 /// The same puff with one tile of air around it and with three.
