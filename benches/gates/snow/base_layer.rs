@@ -2,10 +2,10 @@
 
 use frazil::geometry::DVec3;
 use frazil::snow::base_layer::Params;
-use frazil::vdb::{FloatGrid, level_set};
+use frazil::vdb::{FloatGrid, Leaf, level_set};
 
 use crate::harness::Harness;
-use crate::scenes::{self, WALK_CELL, context};
+use crate::scenes::{self, WALK_CELL, context, voxel};
 use crate::sweep::oracle::{MovingBox, capsule};
 use crate::sweep::walls::{each_voxel, moving_body};
 
@@ -113,18 +113,11 @@ fn volume() -> [(f64, &'static str); 5] {
 
 /// Voxels where the snow is thicker than it was.
 fn growth(old: &FloatGrid, new: &FloatGrid) -> u64 {
-    let leaves = new.leaves().expect("leaves");
-    leaves
-        .iter()
-        .map(|leaf| {
-            let shrinks = |index: usize| {
-                let at = [index >> 6, index >> 3 & 7, index & 7];
-                let voxel = [0, 1, 2].map(|axis| leaf.origin[axis] + at[axis] as i32);
-                leaf.values[index] >= old.value(voxel)
-            };
-            (0..512).filter(|&index| !shrinks(index)).count() as u64
-        })
-        .sum()
+    let grown = |leaf: &Leaf<'_>| {
+        let shrinks = |index: usize| leaf.values[index] >= old.value(voxel(leaf.origin, index));
+        (0..512).filter(|&index| !shrinks(index)).count() as u64
+    };
+    new.leaves().expect("leaves").iter().map(grown).sum()
 }
 
 /// Islands that the noise makes: parts of the snow with it, less parts without it.

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::harness::{Harness, median, timed};
 use crate::process::{kilobytes, number_of, own, printed};
-use crate::scenes::{self, FRAMES, context};
+use crate::scenes::{self, FRAMES, context, voxel};
 
 /// Seconds of each of five frames of a scene, after the first pose and a frame to warm up.
 pub fn frame_times(ctx: &frazil::Context, base: &mut BaseLayer, body: &Body) -> Vec<f64> {
@@ -85,8 +85,7 @@ fn noise(ctx: &frazil::Context, swept: &FloatGrid) -> FloatGrid {
     noise.set_frequency(Some((1.0 / (8.0 * cell)) as f32));
     let block = |leaf: &frazil::vdb::Leaf<'_>| {
         let values = Box::new(std::array::from_fn(|index| {
-            let at = [index >> 6, index >> 3 & 7, index & 7];
-            let [x, y, z] = [0, 1, 2].map(|axis| f64::from(leaf.origin[axis] + at[axis] as i32) * cell);
+            let [x, y, z] = voxel(leaf.origin, index).map(|at| f64::from(at) * cell);
             2.0 * cell as f32 * noise.get_noise_3d(x, y, z).max(0.0)
         }));
         BlockEdit::Dense(Block { origin: leaf.origin, values, mask: [u64::MAX; 8] })

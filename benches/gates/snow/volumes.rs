@@ -11,7 +11,7 @@ use frazil::snow::render_volumes::{fog, united};
 use frazil::vdb::FloatGrid;
 
 use crate::harness::Harness;
-use crate::scenes::context;
+use crate::scenes::{self, context};
 use crate::snow::grains::Random;
 use crate::snow::grains::births::ploughed_snow;
 
@@ -144,8 +144,7 @@ fn balls(ctx: &Context, base: &FloatGrid, snow: &FloatGrid) -> (usize, usize) {
         for index in
             (0..512).filter(|index| leaf.values[*index] >= half && leaf.values[*index] < snow.background())
         {
-            let at = [index >> 6, index >> 3 & 7, index & 7];
-            positions.push([0, 1, 2].map(|axis| leaf.origin[axis] + at[axis] as i32));
+            positions.push(scenes::voxel(leaf.origin, index));
         }
     }
     // Up to six cells away.

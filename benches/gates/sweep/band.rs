@@ -193,8 +193,7 @@ impl<'a> Leaves<'a> {
         origins.sort_unstable();
         for origin in origins {
             for (index, value) in self.leaves[origin].values.iter().enumerate() {
-                let at = [0, 1, 2].map(|axis| origin[axis] + (index >> (6 - 3 * axis) & 7) as i32);
-                see(at, f64::from(*value) / self.cell);
+                see(scenes::voxel(*origin, index), f64::from(*value) / self.cell);
             }
         }
     }

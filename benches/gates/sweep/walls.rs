@@ -1,7 +1,6 @@
 //! Gates of the swept volume: walls, and distances against exact ones.
 
 use frazil::geometry::DVec3;
-use frazil::numeric::blocks::offset;
 use frazil::sweep::{self, Body, Settings};
 use frazil::vdb::{FloatGrid, level_set};
 
@@ -60,10 +59,8 @@ pub fn each_voxel(grid: &FloatGrid, mut see: impl FnMut(DVec3, f64)) {
     let cell = grid.voxel_size();
     for leaf in grid.leaves().expect("leaves") {
         for index in 0..512 {
-            let (x, y, z) = (index >> 6, index >> 3 & 7, index & 7);
-            let at = [leaf.origin[0] + x as i32, leaf.origin[1] + y as i32, leaf.origin[2] + z as i32];
-            let value = f64::from(leaf.values[offset(x, y, z)]) / cell;
-            see(DVec3::from(at.map(f64::from)) * cell, value);
+            let position = DVec3::from(scenes::voxel(leaf.origin, index).map(f64::from)) * cell;
+            see(position, f64::from(leaf.values[index]) / cell);
         }
     }
 }
