@@ -3,7 +3,7 @@
 use std::ffi::{c_int, c_void};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::ptr::null_mut;
+use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ use frazil::snow::base_layer::BaseLayer;
 use frazil::sweep::Body;
 
 use crate::capi::cancel_latency::latency;
-use crate::capi::host::{Threads, body_between, clock, sized, works, written};
+use crate::capi::host::{Threads, body_between, clock, made, sized, works, written};
 use crate::harness::{Harness, median, timed};
 use crate::process::said;
 use crate::scenes::{self, FRAMES, context};
@@ -82,39 +82,23 @@ struct Host {
 
 impl Host {
     fn new((layer, body): (BaseLayer, Body), threads: u32) -> Self {
-        let mut host = Self {
-            threads: Threads::new(threads),
-            snow: null_mut(),
-            base: null_mut(),
-            poses: Poses::of(&body),
-        };
+        let threads = Threads::new(threads);
         let options = frazil::vdb::file::WriteOptions::default();
         let bytes = frazil::vdb::file::to_bytes(&[layer.surface()], &options).expect("bytes");
         drop(layer);
+        let (data, size) = (bytes.as_ptr().cast(), bytes.len());
         // SAFETY: the pointers are valid.
-        unsafe {
-            let bytes = (bytes.as_ptr().cast(), bytes.len());
-            works(frz_grid_from_bytes(host.threads.ctx, bytes.0, bytes.1, std::ptr::null(), &mut host.snow));
-        }
+        let snow = made(|snow| unsafe { frz_grid_from_bytes(threads.ctx, data, size, null(), snow) });
+        let mut host = Self { threads, snow, base: null_mut(), poses: Poses::of(&body) };
         host.base = host.make(&[]);
         host
     }
 
     fn make(&self, state: &[u8]) -> *mut frz_base {
-        let mut base = null_mut();
-        let restart = if state.is_empty() { std::ptr::null() } else { state.as_ptr().cast() };
+        let restart = if state.is_empty() { null() } else { state.as_ptr().cast() };
+        let (ctx, snow) = (self.threads.ctx, self.snow);
         // SAFETY: the pointers are valid.
-        unsafe {
-            works(frz_base_create(
-                self.threads.ctx,
-                std::ptr::null(),
-                self.snow,
-                restart,
-                state.len(),
-                &mut base,
-            ))
-        };
-        base
+        made(|base| unsafe { frz_base_create(ctx, null(), snow, restart, state.len(), base) })
     }
 
     fn restore(&mut self, state: &[u8]) {

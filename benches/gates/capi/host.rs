@@ -79,14 +79,19 @@ pub fn body_between([from, to]: [&[[f32; 3]]; 2], triangles: &[[u32; 3]]) -> frz
     body
 }
 
+/// The handle that a call makes, which is to be destroyed.
+pub fn made<T>(make: impl FnOnce(*mut *mut T) -> frz_status) -> *mut T {
+    let mut out = null_mut();
+    works(make(&mut out));
+    out
+}
+
 /// A mesh, which is to be destroyed.
 pub fn mesh(ctx: *mut frz_context, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> *mut frz_mesh {
     let mut desc: frz_mesh_desc = sized();
     (desc.positions, desc.indices) = (view(positions), view(triangles.as_flattened()));
-    let mut mesh = null_mut();
     // SAFETY: the pointers are valid.
-    unsafe { works(frz_mesh_create(ctx, &desc, &mut mesh)) };
-    mesh
+    made(|mesh| unsafe { frz_mesh_create(ctx, &desc, mesh) })
 }
 
 pub fn view<T>(elements: &[T]) -> frz_view {

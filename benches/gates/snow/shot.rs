@@ -256,11 +256,14 @@ fn clients(h: &mut Harness, man: &Path) {
     works(&mut frazil(["snow", text(&scene), "-o", text(&out)]));
     let blender = clients::blender().map(|blender| clients::blender_opens(&blender, &out, 1, 24));
     let usd = clients::usd_python().map(|python| clients::usd_composes(&python, &out, 1, 24));
-    for (name, answer) in [("snow.shot.clients_blender", blender), ("snow.shot.clients_usd", usd)] {
-        match answer {
-            None => h.skipped(name, "not installed: make test-clients"),
-            Some(Ok(said)) => h.holds(name, true, &said),
-            Some(Err(said)) => h.holds(name, false, said.lines().last().unwrap_or_default()),
-        }
-    }
+    answered(h, "snow.shot.clients_blender", blender);
+    answered(h, "snow.shot.clients_usd", usd);
+}
+
+/// Whether another program did what it was asked, and what it said; none: it is not installed.
+pub fn answered(h: &mut Harness, name: &str, answer: Option<Result<String, String>>) {
+    let Some(answer) = answer else { return h.skipped(name, "not installed: make test-clients") };
+    let is_right = answer.is_ok();
+    let said = answer.unwrap_or_else(|error| error);
+    h.holds(name, is_right, said.lines().last().unwrap_or_default());
 }

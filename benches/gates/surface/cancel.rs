@@ -12,7 +12,7 @@ use frazil::capi::{frz_span, frz_status};
 use frazil::geometry::{DVec3, TriMesh, Vec3};
 
 use crate::capi::cancel_latency;
-use crate::capi::host::{self, Threads, sized, usual, view, works, written};
+use crate::capi::host::{self, Threads, made, sized, usual, view, works, written};
 use crate::common::liquids::{ball, context, filled, own_surface, turned};
 use crate::harness::Harness;
 use crate::snow::grains::Random;
@@ -59,21 +59,11 @@ impl Host {
         };
         let corners: Vec<[f32; 3]> = mesh.positions.iter().map(|place| (*place).into()).collect();
         host.mesh = host::mesh(host.threads.ctx, &corners, &mesh.triangles);
-        let mut tracker = null_mut();
+        let (first, ctx) = (host.particles(0), host.threads.ctx);
         // SAFETY: the pointers are valid.
-        unsafe {
-            let first = host.particles(0);
-            works(frz_tracker_create(
-                host.threads.ctx,
-                &host.params,
-                host.mesh,
-                &first,
-                null(),
-                0,
-                &mut tracker,
-            ));
-        }
-        host.tracker.set(tracker);
+        let create =
+            |out| unsafe { frz_tracker_create(ctx, &host.params, host.mesh, &first, null(), 0, out) };
+        host.tracker.set(made(create));
         host.first = host.state();
         host
     }
@@ -122,20 +112,12 @@ impl Host {
     }
 
     fn put_back(&self) {
-        let mut again = null_mut();
-        // SAFETY: the pointers are valid, or null where that is allowed; nobody uses the old tracker any more.
-        unsafe {
-            works(frz_tracker_create(
-                self.others.ctx,
-                &self.params,
-                self.mesh,
-                null(),
-                self.first.as_ptr().cast(),
-                self.first.len(),
-                &mut again,
-            ));
-            frz_tracker_destroy(self.tracker.replace(again));
-        }
+        let (ctx, state, size) = (self.others.ctx, self.first.as_ptr().cast(), self.first.len());
+        // SAFETY: the pointers are valid, or null where that is allowed.
+        let create =
+            |out| unsafe { frz_tracker_create(ctx, &self.params, self.mesh, null(), state, size, out) };
+        // SAFETY: nobody uses the old tracker any more.
+        unsafe { frz_tracker_destroy(self.tracker.replace(made(create))) };
     }
 
     fn state(&self) -> Vec<u8> {

@@ -12,6 +12,7 @@ use crate::common::clients;
 use crate::harness::Harness;
 use crate::scenes::context;
 use crate::snow::grains::births::ploughed;
+use crate::snow::shot::answered;
 
 /// Frame of the files.
 const FRAME: i32 = 36;
@@ -46,16 +47,14 @@ pub fn run(h: &mut Harness) {
         }
     }
     if h.wants(usd) {
-        let Some(python) = clients::usd_python() else {
-            h.skipped(usd, "not installed: make test-clients");
-            return;
-        };
-        let [file, seen] = ["grains.usda", "ours"].map(|name| folder.path().join(name));
-        std::fs::write(&file, usd::points::frame("grains", FRAME, 24.0, &grains.points())).expect("a file");
-        std::fs::write(&seen, &ours).expect("a file");
-        let answer = clients::usd_reads_grains(&python, &file, &seen, FRAME);
-        let said = answer.as_ref().unwrap_or_else(|said| said);
-        h.holds(usd, answer.is_ok(), said.lines().last().unwrap_or_default());
+        let answer = clients::usd_python().map(|python| {
+            let [file, seen] = ["grains.usda", "ours"].map(|name| folder.path().join(name));
+            let frame = usd::points::frame("grains", FRAME, 24.0, &grains.points());
+            std::fs::write(&file, frame).expect("a file");
+            std::fs::write(&seen, &ours).expect("a file");
+            clients::usd_reads_grains(&python, &file, &seen, FRAME)
+        });
+        answered(h, usd, answer);
     }
 }
 

@@ -12,6 +12,7 @@ use crate::harness::{Harness, timed};
 use crate::process::works;
 use crate::scenes::{MAN, wanted_data};
 use crate::snow::grains::passes::{kill, pass, walk};
+use crate::snow::shot::answered;
 
 /// Frames of the pass, and its cell (m).
 const FRAMES: i32 = 24;
@@ -56,17 +57,13 @@ pub fn run(h: &mut Harness) {
         h.holds(same, others.is_empty() && is_whole, &note);
     }
     if h.wants(blender) {
-        match clients::blender() {
-            Some(program) => {
-                works(run("parts", 2).args(["--set", "output.grains=[\"vdb\",\"ply\"]"]));
-                let picture = folder.path().join("frame.png");
-                let answer = clients::blender_renders(&program, &out("parts"), FRAMES, &picture);
-                let is_whole = answer.as_ref().is_ok_and(|said| said.ends_with("with base, grains, mist"));
-                let said = answer.unwrap_or_else(|error| error);
-                h.holds(blender, is_whole, said.lines().last().unwrap_or_default());
-            }
-            None => h.skipped(blender, "not installed: make test-clients"),
-        }
+        let answer = clients::blender().map(|program| {
+            works(run("parts", 2).args(["--set", "output.grains=[\"vdb\",\"ply\"]"]));
+            let picture = folder.path().join("frame.png");
+            let said = clients::blender_renders(&program, &out("parts"), FRAMES, &picture)?;
+            if said.ends_with("with base, grains, mist") { Ok(said) } else { Err(said) }
+        });
+        answered(h, blender, answer);
     }
     if h.wants(apart) {
         let before = written(&out("once"));
