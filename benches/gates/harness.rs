@@ -119,7 +119,7 @@ impl Harness {
     pub fn measure<V: Into<f64>, N: AsRef<str>>(&mut self, name: &str, measure: impl FnOnce() -> (V, N)) {
         if self.wants(name) {
             let (value, note) = measure();
-            self.gate(name, value.into(), note.as_ref());
+            self.gate(name, value, note.as_ref());
         }
     }
 
@@ -136,18 +136,18 @@ impl Harness {
         }
     }
 
-    /// Prints a gate.
+    /// Prints a gate: its value, or a yes or no.
     ///
     /// # Panics
     /// When there is no such gate, or it was printed before.
-    pub fn gate(&mut self, name: &str, value: f64, note: &str) {
+    pub fn gate(&mut self, name: &str, value: impl Into<f64>, note: &str) {
         let index = self.gates.iter().position(|gate| gate.name == name);
         let index = index.unwrap_or_else(|| panic!("list.rs has no gate {name}"));
         assert!(!self.done[index], "gate {name} was printed before");
         self.done[index] = true;
         let Gate { unit, must, aim, .. } = self.gates[index];
         // A nought is not printed as -0.
-        let value = value + 0.0;
+        let value = value.into() + 0.0;
         let state = match (must.holds(value), aim.holds(value)) {
             (true, true) => "aim",
             (true, false) => "ok",
@@ -156,14 +156,6 @@ impl Harness {
         self.short |= state == "short";
         let note = if note.is_empty() { String::new() } else { format!(" # {note}") };
         println!("gate {name} {value:.6} {unit} must {} aim {} {state}{note}", must.text(), aim.text());
-    }
-
-    /// Prints a yes or no.
-    ///
-    /// # Panics
-    /// As [`Harness::gate`].
-    pub fn holds(&mut self, name: &str, yes: bool, note: &str) {
-        self.gate(name, f64::from(u8::from(yes)), note);
     }
 
     /// Gates that were asked for and neither measured nor skipped.

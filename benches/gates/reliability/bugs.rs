@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::character;
 use crate::harness::Harness;
 use crate::process;
+use crate::scenes::wanted_data;
 
 /// Volumes are right within this part.
 const CLOSE: f64 = 0.02;
@@ -15,17 +15,12 @@ const PLY: &str = "p.%04d.ply";
 
 /// The count of cases whose result is not right.
 pub fn run(h: &mut Harness) {
-    if !h.wants("reliability.bugs") {
-        return;
-    }
-    let Some(data) = character::data("bugs") else { return h.skipped("reliability.bugs", "no data") };
-    let folder = std::env::temp_dir().join(format!("frazil-gates-bugs-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
-    let bugs = Bugs { data, folder };
-    let cases = bugs.cases();
+    let name = "reliability.bugs";
+    let Some(data) = wanted_data(h, &[name], "bugs") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let cases = Bugs { data, folder: folder.path().into() }.cases();
     let wrong: Vec<&str> = cases.iter().filter(|(_, right)| !right).map(|(name, _)| *name).collect();
-    h.gate("reliability.bugs", wrong.len() as f64, &format!("of {} cases {}", cases.len(), wrong.join(", ")));
-    let _ = std::fs::remove_dir_all(bugs.folder);
+    h.gate(name, wrong.len() as f64, &format!("of {} cases {}", cases.len(), wrong.join(", ")));
 }
 
 struct Bugs {

@@ -190,7 +190,7 @@ fn continued(h: &mut Harness, man: &Path) {
         }
         works(&mut frazil(["snow", text(&scene), "-o", text(&killed)]));
         let same = character::output(&once) == character::output(&killed);
-        h.holds(&name, same, &format!("{kills} kills, a run takes {took:.1} s"));
+        h.gate(&name, same, &format!("{kills} kills, a run takes {took:.1} s"));
     }
     let [full, delta] = [&whole[0], &whole[1]];
     let mut same = true;
@@ -201,7 +201,7 @@ fn continued(h: &mut Harness, man: &Path) {
         same &= quiet(&mut frazil(arguments)).status().expect("frazil").success();
         same &= voxels(&file) == voxels(&full.join(format!("base/base.{frame:04}.vdb")));
     }
-    h.holds("snow.shot.rebuilt", same, "5 frames, values and active voxels of all three grids");
+    h.gate("snow.shot.rebuilt", same, "5 frames, values and active voxels of all three grids");
 }
 
 /// Leaves of a grid: origin, bits of the values, active voxels.
@@ -234,7 +234,7 @@ fn changed(h: &mut Harness, man: &Path) {
     let refused = run(&["--set", "snow.noise.seed=2"]);
     let said = String::from_utf8_lossy(&refused.stderr).into_owned();
     let named = refused.status.code() == Some(2) && said.contains("snow.noise.seed was 0");
-    h.holds("snow.shot.changed_refused", made && named && character::output(&out) == before, said.trim());
+    h.gate("snow.shot.changed_refused", made && named && character::output(&out) == before, said.trim());
     let again = run(&["--set", "snow.noise.seed=2", "--from", "100"]);
     let after = character::output(&out);
     let kept = |frame: i32| {
@@ -242,7 +242,7 @@ fn changed(h: &mut Harness, man: &Path) {
         before.contains_key(&name) && before.get(&name) == after.get(&name)
     };
     let yes = again.status.success() && (1..100).all(kept) && !(100..=120).any(kept);
-    h.holds("snow.shot.changed_from", yes, "frames 1-99 keep their bytes, 100-120 are new");
+    h.gate("snow.shot.changed_from", yes, "frames 1-99 keep their bytes, 100-120 are new");
 }
 
 /// Other programs open the shot, where they are installed.
@@ -265,5 +265,5 @@ pub fn answered(h: &mut Harness, name: &str, answer: Option<Result<String, Strin
     let Some(answer) = answer else { return h.skipped(name, "not installed: make test-clients") };
     let is_right = answer.is_ok();
     let said = answer.unwrap_or_else(|error| error);
-    h.holds(name, is_right, said.lines().last().unwrap_or_default());
+    h.gate(name, is_right, said.lines().last().unwrap_or_default());
 }

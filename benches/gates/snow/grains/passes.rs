@@ -52,7 +52,7 @@ pub fn run(h: &mut Harness) {
             "{} files of a pass of {took:.1} s, after kills at frames {kills:?}; 1 and 2 threads",
             once.len()
         );
-        h.holds(same, once == alone && once == killed && kills.len() > 2, &note);
+        h.gate(same, once == alone && once == killed && kills.len() > 2, &note);
     }
     if h.wants(delta) {
         let (scene, full, _) = made(REPEATED, "full", 2);
@@ -60,7 +60,7 @@ pub fn run(h: &mut Harness) {
         works(pass(&scene, &changes, 2).args(["--set", "output.grains_mode=delta"]));
         let (same, sizes) = rebuilt(&changes, &full, REPEATED.0);
         let note = format!("{} frames, {:.0} % of the bytes", REPEATED.0, 100.0 * sizes[0] / sizes[1]);
-        h.holds(delta, same, &note);
+        h.gate(delta, same, &note);
     }
 }
 

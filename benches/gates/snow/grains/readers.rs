@@ -11,7 +11,7 @@ use frazil::vdb::points;
 use crate::common::clients;
 use crate::harness::Harness;
 use crate::scenes::context;
-use crate::snow::grains::births::ploughed;
+use crate::snow::grains::births::ploughed_snow;
 use crate::snow::shot::answered;
 
 /// Frame of the files.
@@ -27,7 +27,7 @@ pub fn run(h: &mut Harness) {
         return;
     }
     let ctx = context(2);
-    let grains = ploughed(&ctx, FRAME);
+    let grains = ploughed_snow(&ctx, FRAME).1;
     let awake = grains.awake().filter(|awake| *awake).count();
     assert!(awake > 0 && awake < grains.count(), "{awake} of {} grains are awake", grains.count());
     let ours = records(&grains);
@@ -42,7 +42,7 @@ pub fn run(h: &mut Harness) {
                 let seen = std::fs::read(&seen).unwrap_or_default();
                 let said = String::from_utf8_lossy(&output.stderr).trim().to_string();
                 let note = format!("{} grains, {awake} of them awake {said}", grains.count());
-                h.holds(openvdb, output.status.success() && is_same(&ours, &seen, &grains), note.trim());
+                h.gate(openvdb, output.status.success() && is_same(&ours, &seen, &grains), note.trim());
             }
         }
     }

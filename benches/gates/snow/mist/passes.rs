@@ -54,7 +54,7 @@ pub fn run(h: &mut Harness) {
         let note =
             format!("{mist} files of mist in a pass of {took:.1} s; kills in {kills:?}; others: {others:?}");
         let is_whole = mist == FRAMES as usize && STAGES.iter().all(|stage| kills.contains(stage));
-        h.holds(same, others.is_empty() && is_whole, &note);
+        h.gate(same, others.is_empty() && is_whole, &note);
     }
     if h.wants(blender) {
         let answer = clients::blender().map(|program| {
@@ -74,7 +74,7 @@ pub fn run(h: &mut Harness) {
         let made = after.iter().filter(|(file, time)| before.get(*file) != Some(*time));
         let made: Vec<&PathBuf> = made.map(|(file, _)| file).collect();
         let others: Vec<&&PathBuf> = made.iter().filter(|file| !is_mist(file)).collect();
-        h.holds(
+        h.gate(
             apart,
             others.is_empty() && !made.is_empty(),
             &format!("{} files made again, of others {others:?}", made.len()),
