@@ -206,3 +206,10 @@ pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     values[values.len() / 2]
 }
+
+/// Mean, 95th percentile and greatest of some numbers.
+pub fn spread(mut values: Vec<f64>) -> [f64; 3] {
+    values.sort_unstable_by(f64::total_cmp);
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    [mean, values[values.len() * 95 / 100], values[values.len() - 1]]
+}

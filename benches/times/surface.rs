@@ -12,7 +12,7 @@ use frazil::surface::{Distances, Implicit, Isosurface, Params, Particles, Tracke
 use crate::common::liquids::{Ball, ball, context, follow, numbered, once_around, surface_on};
 use crate::common::nearest::distances;
 use crate::common::spot;
-use crate::harness::median;
+use crate::harness::{median, spread};
 use crate::projections::{Follower, WAYS, measured};
 use crate::surface_gates::{PHASES, steps_with, time};
 
@@ -104,13 +104,6 @@ fn of_cache(mesh: &TriMesh, frames: &[Particles], cores: usize) {
 fn phase_times(threads: usize, ball: &Ball, params: Params, steps: usize) -> [f64; 4] {
     let reports = steps_with(&context(threads), ball, params, steps);
     PHASES.map(|phase| median(reports.iter().map(|(_, report)| time(report, phase)).collect()))
-}
-
-/// Mean, 95th percentile and greatest of some numbers.
-pub fn spread(mut values: Vec<f64>) -> [f64; 3] {
-    values.sort_unstable_by(f64::total_cmp);
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    [mean, values[(values.len() * 95 / 100).min(values.len() - 1)], values[values.len() - 1]]
 }
 
 /// Mean, 95th percentile and greatest as a cell of a table.

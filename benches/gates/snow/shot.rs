@@ -1,7 +1,6 @@
 //! Gates of characters and shots: skinned sweeps, whole passes with files, continuing.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 use frazil::geometry::DVec3;
 use frazil::motion::{Character, Key, Keys, Motion, Placed, Play, Space};
@@ -15,6 +14,7 @@ use crate::common::clients;
 use crate::harness::{Harness, median, timed};
 use crate::process::{frazil, json, quiet, works};
 use crate::scenes::{MAN, context, wanted_data};
+use crate::snow::grains::passes::{self, kill};
 use crate::sweep::pose_union::Union;
 use crate::sweep::walls::each_voxel;
 
@@ -162,7 +162,7 @@ fn check(h: &mut Harness, man: &Path) {
     });
 }
 
-/// Killed at ten moments and continued, in both modes; and whole frames rebuilt from changes.
+/// Killed again and again, and continued, in both modes; and whole frames rebuilt from changes.
 fn continued(h: &mut Harness, man: &Path) {
     if !h.wants("snow.shot.continued") && !h.wants("snow.shot.rebuilt") {
         return;
@@ -175,19 +175,8 @@ fn continued(h: &mut Harness, man: &Path) {
         let [once, killed] = ["once", "killed"].map(|name| folder.path().join(format!("{name}_{mode}")));
         let (took, _) = timed(|| works(&mut frazil(["snow", text(&scene), "-o", text(&once)])));
         whole.push(once.clone());
-        let mut kills = 0;
-        for moment in character::moments(10) {
-            let start = Instant::now();
-            let mut child =
-                quiet(&mut frazil(["snow", text(&scene), "-o", text(&killed)])).spawn().expect("frazil");
-            // Short enough that ten of them do not finish the shot.
-            let limit = Duration::from_secs_f64(0.02 + 0.25 * took * moment);
-            while start.elapsed() < limit && child.try_wait().expect("a child").is_none() {
-                std::thread::sleep(Duration::from_millis(1));
-            }
-            kills += usize::from(child.kill().is_ok());
-            child.wait().expect("a child");
-        }
+        // Short enough that all of them do not finish the shot.
+        let kills = kill(|threads| passes::pass(&scene, &killed, threads), 0.25 * took, || Some(())).len();
         works(&mut frazil(["snow", text(&scene), "-o", text(&killed)]));
         let same = character::output(&once) == character::output(&killed);
         h.gate(&name, same, &format!("{kills} kills, a run takes {took:.1} s"));

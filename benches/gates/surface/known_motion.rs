@@ -9,7 +9,7 @@ use frazil::surface::{Params, Particles, StepReport, Tracker};
 use crate::common::liquids::{
     Ball, Errors, Random, ball, context, filled, follow, numbered, once_around, own_surface, turned,
 };
-use crate::harness::{Harness, median};
+use crate::harness::{Harness, median, spread};
 
 const FRAME: f64 = 1.0 / 24.0;
 /// Phases of a step.
@@ -151,8 +151,8 @@ fn pool() -> [(f64, &'static str); 2] {
         ways.extend(tracker.vertices().iter().zip(&before).map(|(a, b)| (a - b).norm() / ball.spacing));
         from = to;
     }
-    ways.sort_unstable_by(f64::total_cmp);
-    [(ways.iter().sum::<f64>() / ways.len() as f64, "20 frames"), (ways[ways.len() * 95 / 100], "20 frames")]
+    let [mean, p95, _] = spread(ways);
+    [(mean, "20 frames"), (p95, "20 frames")]
 }
 
 /// Where the surface of a half-space lies above its outermost particles.

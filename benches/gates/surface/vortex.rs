@@ -11,7 +11,7 @@ use frazil::surface::{Params, Particles, Tracker};
 use crate::common::liquids::{context, numbered};
 use crate::common::made_sets::Vortex;
 use crate::common::shapes::welded;
-use crate::harness::Harness;
+use crate::harness::{Harness, spread};
 
 /// About as many particles: with 100,000 the gate would take some minutes on one thread, not one.
 const PARTICLES: usize = 16_000;
@@ -166,9 +166,4 @@ fn apart(positions: &[DVec3], others: &[DVec3], spacing: f64) -> [f64; 3] {
 fn off_ball(positions: &[DVec3], others: &[DVec3], spacing: f64) -> [f64; 3] {
     let far = |position: &DVec3| (position - DVec3::repeat(Vortex::CENTRE)).norm();
     spread(positions.iter().zip(others).map(|(a, b)| (far(a) - far(b)).abs() / spacing).collect())
-}
-
-fn spread(mut off: Vec<f64>) -> [f64; 3] {
-    off.sort_unstable_by(f64::total_cmp);
-    [off.iter().sum::<f64>() / off.len() as f64, off[off.len() * 95 / 100], off[off.len() - 1]]
 }

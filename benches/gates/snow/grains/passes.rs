@@ -106,7 +106,7 @@ fn parts(grains: &Points) {
 /// each had written: what it says of those that were running.
 pub fn kill<T>(pass: impl Fn(usize) -> Command, within: f64, seen: impl Fn() -> Option<T>) -> Vec<T> {
     let mut kills = Vec::new();
-    for (round, moment) in character::moments(8).into_iter().enumerate() {
+    for (round, moment) in character::moments(10).into_iter().enumerate() {
         let start = Instant::now();
         let mut child = pass(1 + round % 2).spawn().expect("frazil");
         let limit = Duration::from_secs_f64(0.1 + within * moment);
