@@ -170,7 +170,7 @@ pictures: setup
 
 # make gates [ONLY=snow.base.wall,...]
 gates: setup hosts hosts-core
-	@cargo bench --quiet --bench gates -- $(ONLY) && status=0 || status=$$?; ./tools/plots target/plots && exit $$status
+	@cargo bench --quiet --bench gates -- $(ONLY) && status=0 || status=$$?; ./tools/plots target/plots; exit $$status
 
 # Times and errors beside the thesis', stock OpenVDB's and other methods': make bench [ONLY=snow,surface,shallow]
 bench: setup

@@ -10,6 +10,9 @@ mod edit_history;
 mod harness;
 #[path = "times/matching.rs"]
 mod matching;
+#[path = "gates/surface/matching.rs"]
+#[allow(dead_code)]
+mod matching_gates;
 #[path = "gates/process.rs"]
 #[allow(dead_code)]
 mod process;

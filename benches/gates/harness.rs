@@ -119,39 +119,35 @@ impl Harness {
     pub fn measure<V: Into<f64>, N: AsRef<str>>(&mut self, name: &str, measure: impl FnOnce() -> (V, N)) {
         if self.wants(name) {
             let (value, note) = measure();
-            self.gate(name, value.into(), note.as_ref());
+            self.gate(name, value, note.as_ref());
         }
     }
 
     /// Measures gates together if any of them is wanted, and prints those that are.
-    pub fn measure_all<N: AsRef<str>, const COUNT: usize>(
+    pub fn measure_all<S: AsRef<str>, N: AsRef<str>, const COUNT: usize>(
         &mut self,
-        names: [&str; COUNT],
+        names: [S; COUNT],
         measure: impl FnOnce() -> [(f64, N); COUNT],
     ) {
-        let wanted = names.map(|name| self.wants(name));
-        if wanted == [false; COUNT] {
-            return;
-        }
-        for ((name, is_wanted), (value, note)) in names.into_iter().zip(wanted).zip(measure()) {
-            if is_wanted {
-                self.gate(name, value, note.as_ref());
+        if names.iter().any(|name| self.wants(name.as_ref())) {
+            for (name, (value, note)) in names.iter().zip(measure()) {
+                self.measure(name.as_ref(), || (value, note));
             }
         }
     }
 
-    /// Prints a gate.
+    /// Prints a gate: its value, or a yes or no.
     ///
     /// # Panics
     /// When there is no such gate, or it was printed before.
-    pub fn gate(&mut self, name: &str, value: f64, note: &str) {
+    pub fn gate(&mut self, name: &str, value: impl Into<f64>, note: &str) {
         let index = self.gates.iter().position(|gate| gate.name == name);
         let index = index.unwrap_or_else(|| panic!("list.rs has no gate {name}"));
         assert!(!self.done[index], "gate {name} was printed before");
         self.done[index] = true;
         let Gate { unit, must, aim, .. } = self.gates[index];
         // A nought is not printed as -0.
-        let value = value + 0.0;
+        let value = value.into() + 0.0;
         let state = match (must.holds(value), aim.holds(value)) {
             (true, true) => "aim",
             (true, false) => "ok",
@@ -160,14 +156,6 @@ impl Harness {
         self.short |= state == "short";
         let note = if note.is_empty() { String::new() } else { format!(" # {note}") };
         println!("gate {name} {value:.6} {unit} must {} aim {} {state}{note}", must.text(), aim.text());
-    }
-
-    /// Prints a yes or no.
-    ///
-    /// # Panics
-    /// As [`Harness::gate`].
-    pub fn holds(&mut self, name: &str, yes: bool, note: &str) {
-        self.gate(name, f64::from(u8::from(yes)), note);
     }
 
     /// Gates that were asked for and neither measured nor skipped.
@@ -187,8 +175,8 @@ impl Harness {
     }
 }
 
-/// Ticks of other processes and of all, since boot: for `# noisy`.
-fn ticks() -> Option<(f64, f64)> {
+/// Ticks of other processes since boot: for `# noisy`.
+fn ticks() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/stat").ok()?;
     let all: Vec<f64> =
         stat.lines().next()?.split_whitespace().skip(1).filter_map(|n| n.parse().ok()).collect();
@@ -197,7 +185,7 @@ fn ticks() -> Option<(f64, f64)> {
     let busy: f64 = all.iter().take(3).sum();
     // After the name's parenthesis and the state letter: utime and stime are numbers 11 and 12, the children's follow.
     let own: f64 = own.get(10..14)?.iter().sum();
-    Some((busy - own, Instant::now().elapsed().as_secs_f64()))
+    Some(busy - own)
 }
 
 /// Times what `work` does, and says what else the machine did meanwhile.
@@ -207,7 +195,7 @@ pub fn timed(mut work: impl FnMut()) -> (f64, String) {
     work();
     let seconds = start.elapsed().as_secs_f64();
     let others = match (before, ticks()) {
-        (Some((before, _)), Some((after, _))) => (after - before) / 100.0 / seconds,
+        (Some(before), Some(after)) => (after - before) / 100.0 / seconds,
         _ => 0.0,
     };
     (seconds, if others > 0.3 { " noisy".into() } else { String::new() })
@@ -217,4 +205,11 @@ pub fn timed(mut work: impl FnMut()) -> (f64, String) {
 pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     values[values.len() / 2]
+}
+
+/// Mean, 95th percentile and greatest of some numbers.
+pub fn spread(mut values: Vec<f64>) -> [f64; 3] {
+    values.sort_unstable_by(f64::total_cmp);
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    [mean, values[values.len() * 95 / 100], values[values.len() - 1]]
 }

@@ -30,16 +30,16 @@ pub const GATES: &[Gate] = &[
     gate("snow.grains.preview_angle", "%", Most(10.0), Most(5.0)),
     // Free motion against formulas, and heaps that nothing holds.
     gate("snow.grains.fall_speed", "1", Most(1.0e-6), Open),
-    gate("snow.grains.fall_way", "1", Most(1.0e-6), Open),
+    gate("snow.grains.fall_distance", "1", Most(1.0e-6), Open),
     gate("snow.grains.air", "1", Most(1.0e-6), Open),
-    gate("snow.grains.free_momentum", "1", Most(1.0e-5), Open),
-    gate("snow.grains.free_energy", "1", Most(1.0e-5), Open),
+    gate("snow.grains.momentum", "1", Most(1.0e-5), Open),
+    gate("snow.grains.energy", "1", Most(1.0e-5), Open),
     // Deep beds.
     gate("snow.grains.bed_overlap", "%", Most(5.0), Most(2.0)),
     gate("snow.grains.bed_height", "%", Most(2.0), Most(0.5)),
     // The angle at which a bed slides, less the angle of repose that was asked for.
-    gate("snow.grains.turned_bed_least", "deg", Least(-1.0), Open),
-    gate("snow.grains.turned_bed_most", "deg", Most(5.0), Open),
+    gate("snow.grains.slide_angle_min", "deg", Least(-1.0), Open),
+    gate("snow.grains.slide_angle_max", "deg", Most(5.0), Open),
     // Columns that collapse, and a grain on a plane that leans.
     gate("snow.grains.column_runout", "%", Most(15.0), Most(8.0)),
     // The same as scenes with default settings, on their snow.
@@ -117,8 +117,8 @@ pub const GATES: &[Gate] = &[
     // what the step reports, which has them.
     gate("snow.base.volume_frame", "%", Open, Open),
     gate("snow.base.volume_walk", "%", Open, Open),
-    gate("snow.base.volume_told_frame", "%", Most(2.0), Most(1.5)),
-    gate("snow.base.volume_told_walk", "%", Most(0.5), Most(0.35)),
+    gate("snow.base.volume_report_frame", "%", Most(2.0), Most(1.5)),
+    gate("snow.base.volume_report_walk", "%", Most(0.5), Most(0.35)),
     none("snow.base.monotone_grown", "voxels"),
     // What the step reports of a plate of 3 to 8 cells, against what it cuts out: the worst of a hundred.
     gate("snow.base.plates", "%", Most(1.0), Most(0.3)),
@@ -279,7 +279,7 @@ pub const GATES: &[Gate] = &[
     gate("surface.cancel_rebuilt_p99", "s", Most(0.2), Most(0.05)),
     gate("surface.cancel_eased_p99", "s", Most(0.2), Most(0.05)),
     // Frames from a change of the particles' own surface to its first flag.
-    gate("surface.early", "frames", Most(1.0), Most(0.0)),
+    gate("surface.flag_delay", "frames", Most(1.0), Most(0.0)),
     // A ball in a vortex, drawn out into a sheet and back: vertices from where they began, after a period.
     gate("surface.vortex", "r", Open, Open),
     // The same with the mesh rebuilt: what it encloses after a period, less than at first, and how far it is from where it began.
@@ -323,7 +323,7 @@ pub const GATES: &[Gate] = &[
     // Rebuilt over flagged cells, changes that took more than their cells, triangles that are left at the end.
     gate("surface.rebuilt_cells_median", "x", Most(2.0), Most(1.5)),
     gate("surface.rebuilt_cells_p99", "x", Most(10.0), Most(6.0)),
-    gate("surface.rebuilt_rungs", "%", Most(1.0), Most(0.1)),
+    gate("surface.rebuilt_levels", "%", Most(1.0), Most(0.1)),
     gate("surface.rebuilt_alive", "%", Open, Open),
     // By how much a change changes the volume, and the volume over that of the particles' own surface, against the first frame.
     gate("surface.rebuilt_jump", "%", Most(1.0), Most(0.3)),

@@ -1,5 +1,6 @@
 //! Every promise with a number: `make gates [ONLY=prefix,...]`.
 
+mod bins;
 mod capi;
 #[path = "../../tests/common/mod.rs"]
 mod common;
@@ -45,7 +46,7 @@ fn main() {
     h.measure("snow.mist.turbulence_decorrelates", snow::mist::eddies::measure);
     snow::mist::walls::run(&mut h);
     snow::mist::passes::run(&mut h);
-    snow::mist::cancel::run(&mut h);
+    h.measure("snow.mist.cancel_p99", snow::mist::cancel::measure);
     snow::shot::run(&mut h);
     snow::volumes::run(&mut h);
     capi::calls::run(&mut h);
@@ -53,12 +54,13 @@ fn main() {
     reliability::step_calls::run(&mut h);
     h.measure_all(["reliability.flip_wrong", "reliability.flip_unnamed"], snow::damaged_folder::measure);
     snow::far::run(&mut h);
-    sweep::band::run(&mut h);
+    let names = ["reliability.band_jumps", "reliability.band_snow", "reliability.band_error"];
+    h.measure_all(names, sweep::band::measure);
     sweep::spin::run(&mut h);
     reliability::damage::run(&mut h);
     h.measure("reliability.empty_frames", reliability::empty_frames::measure);
     surface::known_motion::run(&mut h);
-    h.measure("surface.early", surface::first_flag::measure);
+    h.measure("surface.flag_delay", surface::first_flag::measure);
     surface::vortex::run(&mut h);
     surface::readers::run(&mut h);
     surface::large::run(&mut h);
@@ -73,14 +75,14 @@ fn main() {
     surface::rebuilt_speed::run(&mut h);
     surface::rebuilt_frames::run(&mut h);
     surface::rebuilt_large::run(&mut h);
-    surface::matching::run(&mut h);
+    h.measure_all(["surface.match_near", "surface.match_neck"], surface::matching::measure);
     shallow::core::run(&mut h);
     shallow::film::run(&mut h);
     h.measure("shallow.delivery", shallow::delivery::measure);
     h.measure("shallow.orifice", shallow::orifice::measure);
     let names = ["exponent", "exponent_coarse", "front", "front_coarse"]
         .map(|name| format!("shallow.huppert_{name}"));
-    h.measure_all(names.each_ref().map(String::as_str), shallow::huppert::measure);
+    h.measure_all(names, shallow::huppert::measure);
     shallow::incline::run(&mut h);
     shallow::walls::run(&mut h);
     h.measure_all(["shallow.spread_exponent", "shallow.spread_round"], shallow::spread::measure);
@@ -104,9 +106,11 @@ fn main() {
     shallow::surface::run(&mut h);
     shallow::whole::run(&mut h);
     shallow::threads::run(&mut h);
-    surface::easing::run(&mut h);
+    let names = ["surface.easing_jump", "surface.easing_depth", "surface.easing_volume"];
+    h.measure_all(names, surface::easing::measure);
     reliability::bugs::run(&mut h);
-    reliability::orientation::run(&mut h);
+    let names = ["silent", "decidable", "correct"].map(|name| format!("reliability.orientation_{name}"));
+    h.measure_all(names, reliability::orientation::measure);
     surface::rest_kept::run(&mut h);
     surface::detail_kept::run(&mut h);
     h.finish();

@@ -55,6 +55,12 @@ pub fn body(mesh: TriMesh, at: [DVec3; 2], turn: [DVec3; 2], frames: f64) -> Bod
     Body::new(Box::new(Rigid::new(mesh, keys)), 0.0).expect("body")
 }
 
+/// A voxel of a leaf, or a cell of a tile, by its index there.
+pub fn voxel(origin: [i32; 3], index: usize) -> [i32; 3] {
+    let at = [index >> 6, index >> 3 & 7, index & 7];
+    [0, 1, 2].map(|axis| origin[axis] + at[axis] as i32)
+}
+
 /// Frames of the timed scenes.
 pub const FRAMES: i32 = 6;
 

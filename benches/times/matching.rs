@@ -4,11 +4,11 @@ use std::f64::consts::PI;
 use std::time::Instant;
 
 use frazil::Context;
-use frazil::geometry::DVec3;
 use frazil::surface::{Matched, Matching, Node, Solver, match_topology};
 
 use crate::common::liquids::context;
 use crate::harness::median;
+use crate::matching_gates::{HALF, REACH, balls};
 use crate::surface::title;
 
 /// Two balls, on cells so many times smaller, and the relaxation factors that are tried on them.
@@ -16,10 +16,6 @@ const SETS: [(i32, &str, &[f64]); 2] = [
     (1, "two balls", &[1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.7, 1.8, 1.9, 1.95]),
     (2, "on cells half as large", &[1.5, 1.6, 1.7, 1.8, 1.9, 1.95]),
 ];
-/// How far the grid reaches from the origin on each axis (cells of the first set).
-const HALF: [i32; 3] = [26, 18, 18];
-/// How far from flagged nodes a tracker's Gamma may change (cells).
-const REACH: i32 = 8;
 /// Changes of psi at which a solution ends (cells), the thesis' and one that leaves nothing, and how often it is timed.
 const TOLERANCES: [(f64, usize); 2] = [(0.01, 3), (1e-6, 1)];
 /// That of the solution that all are compared with.
@@ -42,7 +38,7 @@ pub fn tables() {
     );
     let ctx = context(1);
     for (scale, name, factors) in SETS {
-        let nodes = balls(scale);
+        let nodes = balls(scale, 0.0);
         let set = Set { ctx: &ctx, name, nodes: &nodes };
         let exact = set.exact(&near);
         set.row(&exact, "no iteration", Matching { most: 0, ..near });
@@ -104,22 +100,4 @@ impl Set<'_> {
         });
         println!("| {} | {way} | {rough} | {fine} |", self.name);
     }
-}
-
-/// Nodes around two balls with a radius of 8 and 1.5 between them, on cells `scale` times smaller. For phi a neck has grown between
-/// them; flagged within 7 of the gap.
-fn balls(scale: i32) -> Vec<Node> {
-    let cell = 1.0 / f64::from(scale);
-    let node = |position: [i32; 3]| {
-        let at = DVec3::from(position.map(f64::from)) * cell;
-        let ball = |side: f64| (at - DVec3::new(side * 8.75, 0.0, 0.0)).norm() - 8.0;
-        let (a, b) = (ball(-1.0), ball(1.0));
-        // Smooth minimum.
-        let near = (6.0 - (a - b).abs()).max(0.0) / 6.0;
-        let (phi, gamma) = ((a.min(b) - near * near * 1.5) / cell, a.min(b) / cell);
-        let is_flagged = at.norm() <= 7.0;
-        Node { position, gamma: gamma.clamp(-4.0, 4.0) as f32, phi: phi.clamp(-5.0, 5.0) as f32, is_flagged }
-    };
-    let on = |axis: usize| -HALF[axis] * scale..=HALF[axis] * scale;
-    on(0).flat_map(|x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z]))).map(node).collect()
 }

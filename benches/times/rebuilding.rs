@@ -13,8 +13,9 @@ use frazil::surface::{Params, Particles, Tracker};
 use crate::common::liquids::{context, own_surface};
 use crate::common::nearest::distances;
 use crate::edit_history::History;
+use crate::harness::spread;
 use crate::rebuilt_sequences::{CELL, Sequence, dambreak, made, spot_drop};
-use crate::surface::{EXAMPLES, spread, text, title};
+use crate::surface::{EXAMPLES, text, title};
 use crate::surface_gates::time;
 
 /// Rows of Table 2.1, of the gazelle: cells (spacings), what they are called, and seconds a frame of matching, and of topology and

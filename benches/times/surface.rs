@@ -12,9 +12,9 @@ use frazil::surface::{Distances, Implicit, Isosurface, Params, Particles, Tracke
 use crate::common::liquids::{Ball, ball, context, follow, numbered, once_around, surface_on};
 use crate::common::nearest::distances;
 use crate::common::spot;
-use crate::harness::median;
+use crate::harness::{median, spread};
 use crate::projections::{Follower, WAYS, measured};
-use crate::surface_gates::{steps_with, time};
+use crate::surface_gates::{PHASES, steps_with, time};
 
 /// Rows of Table 2.2: particles, triangles, and seconds a frame of the phases below, on one core of an i7-3930K.
 pub const EXAMPLES: [(&str, usize, usize, [f64; 4]); 7] = [
@@ -26,7 +26,6 @@ pub const EXAMPLES: [(&str, usize, usize, [f64; 4]); 7] = [
     ("splitting gazelle", 21_362, 242_932, [0.87, 3.43, 2.53, 0.81]),
     ("liquid armadillo", 35_214, 100_870, [0.41, 6.04, 4.15, 0.67]),
 ];
-const PHASES: [&str; 4] = ["advect", "phi", "distance", "project"];
 /// The first frames of `spot_drop`, which projections are compared on.
 const FIRST: usize = 11;
 /// How far from the surface distances are known to projections (spacings).
@@ -42,9 +41,10 @@ pub fn tables(cores: usize) {
         "like | particles | triangles | by | advect | phi | distance | project | the four",
     );
     for (name, particles, triangles, thesis) in EXAMPLES {
-        phases(name, &ball_of(particles, triangles), Some((particles, triangles, thesis)), 3, cores);
+        row(name, "thesis", [particles, triangles], thesis);
+        phases(name, &ball_of(particles, triangles), 3, cores);
     }
-    phases("a million", &ball_of(1_000_000, 1_000_000), None, 1, cores);
+    phases("a million", &ball_of(1_000_000, 1_000_000), 1, cores);
     let read = |file: PathBuf| (1..=spot::FRAMES).map(|frame| spot::particles_at(&file, frame)).collect();
     let spot: Vec<Particles> = spot::first().map(read).unwrap_or_default();
     if spot.is_empty() {
@@ -69,50 +69,41 @@ fn ball_of(particles: usize, triangles: usize) -> Ball {
     ball(radius, (triangles as f64 / 12.0).sqrt().round() as usize, 0.25)
 }
 
-fn phases(name: &str, ball: &Ball, thesis: Option<(usize, usize, [f64; 4])>, steps: usize, cores: usize) {
-    let row = |who: &str, particles: usize, triangles: usize, times: [f64; 4]| {
-        let each = times.map(|time| format!("{time:.3}")).join(" | ");
-        let sum: f64 = times.iter().sum();
-        println!("| {name} | {particles} | {triangles} | {who} | {each} | {sum:.2} |");
-    };
-    if let Some((particles, triangles, times)) = thesis {
-        row("thesis", particles, triangles, times);
-    }
+/// A row of the table: particles, triangles, and the times of the phases.
+fn row(name: &str, who: &str, [particles, triangles]: [usize; 2], times: [f64; 4]) {
+    let each = times.map(|time| format!("{time:.3}")).join(" | ");
+    println!("| {name} | {particles} | {triangles} | {who} | {each} | {:.2} |", times.iter().sum::<f64>());
+}
+
+/// Rows on one thread and on all.
+fn rows(name: &str, counts: [usize; 2], cores: usize, times: impl Fn(usize) -> [f64; 4]) {
     for threads in [1, cores].into_iter().take(cores.min(2)) {
-        let times = phase_times(threads, ball, Params::for_spacing(ball.spacing), steps);
-        let who = format!("frazil, {threads} thread{}", if threads > 1 { "s" } else { "" });
-        row(&who, ball.positions.len(), ball.mesh.triangles.len(), times);
+        row(name, &format!("frazil, {threads} thread(s)"), counts, times(threads));
     }
+}
+
+fn phases(name: &str, ball: &Ball, steps: usize, cores: usize) {
+    let times = |threads| phase_times(threads, ball, Params::for_spacing(ball.spacing), steps);
+    rows(name, [ball.positions.len(), ball.mesh.triangles.len()], cores, times);
 }
 
 /// The row of the first steps of `spot_drop`.
 fn of_cache(mesh: &TriMesh, frames: &[Particles], cores: usize) {
-    for threads in [1, cores].into_iter().take(cores.min(2)) {
+    rows("spot_drop", [frames[0].positions.len(), mesh.triangles.len()], cores, |threads| {
         let ctx = context(threads);
         let mut tracker =
             Tracker::new(&ctx, Params::for_spacing(spot::SPACING), mesh, &frames[0]).expect("a tracker");
         let step =
             |pair: &[Particles]| tracker.step(&ctx, &pair[0], &pair[1], 1.0 / spot::FPS).expect("a step");
         let reports: Vec<_> = frames[..FIRST].windows(2).map(step).collect();
-        let times = PHASES.map(|phase| median(reports.iter().map(|report| time(report, phase)).collect()));
-        let each = times.map(|time| format!("{time:.3}")).join(" | ");
-        let (particles, triangles) = (frames[0].positions.len(), mesh.triangles.len());
-        let (who, sum) = (format!("frazil, {threads} thread(s)"), times.iter().sum::<f64>());
-        println!("| spot_drop | {particles} | {triangles} | {who} | {each} | {sum:.2} |");
-    }
+        PHASES.map(|phase| median(reports.iter().map(|report| time(report, phase)).collect()))
+    });
 }
 
 /// Seconds of each phase of a frame.
 fn phase_times(threads: usize, ball: &Ball, params: Params, steps: usize) -> [f64; 4] {
     let reports = steps_with(&context(threads), ball, params, steps);
     PHASES.map(|phase| median(reports.iter().map(|(_, report)| time(report, phase)).collect()))
-}
-
-/// Mean, 95th percentile and greatest of some numbers.
-pub fn spread(mut values: Vec<f64>) -> [f64; 3] {
-    values.sort_unstable_by(f64::total_cmp);
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    [mean, values[(values.len() * 95 / 100).min(values.len() - 1)], values[values.len() - 1]]
 }
 
 /// Mean, 95th percentile and greatest as a cell of a table.

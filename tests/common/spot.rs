@@ -23,8 +23,12 @@ pub fn first() -> Option<PathBuf> {
 
 /// The particles of a frame, by the file of any.
 pub fn particles_at(file: &Path, frame: i32) -> Particles {
-    let path = file.with_file_name(format!("spot.{frame:04}.bgeo"));
-    let cloud = particles::read(&path).expect("particles");
+    read(&file.with_file_name(format!("spot.{frame:04}.bgeo")))
+}
+
+/// The particles of a file of a cache.
+pub fn read(path: &Path) -> Particles {
+    let cloud = particles::read(path).expect("particles");
     let ids = match cloud.attribute("id") {
         Some(Values::Long(column)) => (0..cloud.positions.len()).map(|n| column.get(n)).collect(),
         Some(Values::Int(column)) => (0..cloud.positions.len()).map(|n| column.get(n).into()).collect(),

@@ -3,9 +3,9 @@
 use std::ffi::{c_int, c_void};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::ptr::null_mut;
+use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use frazil::capi::frz_status;
 use frazil::capi::grid::bytes::*;
@@ -19,7 +19,7 @@ use frazil::snow::base_layer::BaseLayer;
 use frazil::sweep::Body;
 
 use crate::capi::cancel_latency::latency;
-use crate::capi::host::{Threads, body_between, sized, works, written};
+use crate::capi::host::{Threads, body_between, clock, made, sized, works, written};
 use crate::harness::{Harness, median, timed};
 use crate::process::said;
 use crate::scenes::{self, FRAMES, context};
@@ -82,39 +82,23 @@ struct Host {
 
 impl Host {
     fn new((layer, body): (BaseLayer, Body), threads: u32) -> Self {
-        let mut host = Self {
-            threads: Threads::new(threads),
-            snow: null_mut(),
-            base: null_mut(),
-            poses: Poses::of(&body),
-        };
+        let threads = Threads::new(threads);
         let options = frazil::vdb::file::WriteOptions::default();
         let bytes = frazil::vdb::file::to_bytes(&[layer.surface()], &options).expect("bytes");
         drop(layer);
+        let (data, size) = (bytes.as_ptr().cast(), bytes.len());
         // SAFETY: the pointers are valid.
-        unsafe {
-            let bytes = (bytes.as_ptr().cast(), bytes.len());
-            works(frz_grid_from_bytes(host.threads.ctx, bytes.0, bytes.1, std::ptr::null(), &mut host.snow));
-        }
+        let snow = made(|snow| unsafe { frz_grid_from_bytes(threads.ctx, data, size, null(), snow) });
+        let mut host = Self { threads, snow, base: null_mut(), poses: Poses::of(&body) };
         host.base = host.make(&[]);
         host
     }
 
     fn make(&self, state: &[u8]) -> *mut frz_base {
-        let mut base = null_mut();
-        let restart = if state.is_empty() { std::ptr::null() } else { state.as_ptr().cast() };
+        let restart = if state.is_empty() { null() } else { state.as_ptr().cast() };
+        let (ctx, snow) = (self.threads.ctx, self.snow);
         // SAFETY: the pointers are valid.
-        unsafe {
-            works(frz_base_create(
-                self.threads.ctx,
-                std::ptr::null(),
-                self.snow,
-                restart,
-                state.len(),
-                &mut base,
-            ))
-        };
-        base
+        made(|base| unsafe { frz_base_create(ctx, null(), snow, restart, state.len(), base) })
     }
 
     fn restore(&mut self, state: &[u8]) {
@@ -174,18 +158,24 @@ fn built(name: &str) -> PathBuf {
 
 /// All gates of the C interface.
 pub fn run(h: &mut Harness) {
-    if h.wants("capi.cancel") {
-        cancel(h);
-    }
-    if h.wants("capi.state") {
-        state(h);
-    }
+    h.measure_all(["capi.cancel_latency", "capi.cancel_state"], cancel);
+    h.measure_all(["capi.state_seconds", "capi.state_bytes"], || {
+        measure(scenes::large(&context(2), 6.0), "after its frames")
+    });
+    h.measure_all(["capi.state_all_seconds", "capi.state_all_bytes"], || {
+        // A plate that is pressed 2 cm into all of the surface: every block of it changes.
+        let ends = [DVec3::new(0.0, 0.45, 0.0), DVec3::new(0.0, 0.38, 0.0)];
+        let (layer, _) = scenes::large(&context(2), 6.0);
+        let plate = crate::common::shapes::cuboid([6.5, 0.2, 6.5]);
+        let body = scenes::body(plate, ends, [DVec3::zeros(); 2], f64::from(FRAMES));
+        measure((layer, body), "with the whole surface touched")
+    });
     h.measure("capi.border_cost", border);
     programs(h);
 }
 
 /// Cancels at random moments of a step of `large`, from another thread and from the poll.
-fn cancel(h: &mut Harness) {
+fn cancel() -> [(f64, String); 2] {
     let mut host = Host::new(scenes::large(&context(2), 6.0), 2);
     works(host.step(0));
     works(host.step(1));
@@ -214,18 +204,12 @@ fn cancel(h: &mut Harness) {
     latencies.sort_unstable_by(f64::total_cmp);
     let (p99, count) = (latencies[latencies.len() * 99 / 100], latencies.len());
     let note = format!("{count} cancels of a step of {whole:.3} s; median {:.4} s", median(latencies));
-    h.gate("capi.cancel_latency", p99, &note);
-    h.holds("capi.cancel_state", same, "the state after cancels, and the grids of the step made in the end");
+    let of_state = "the state after cancels, and the grids of the step made in the end".into();
+    [(p99, note), (f64::from(same), of_state)]
 }
 
 /// When the poll is to cancel (microseconds of [`clock`]).
 static DUE: AtomicU64 = AtomicU64::new(0);
-
-/// Microseconds since the first call.
-fn clock() -> u64 {
-    static START: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
-    START.get_or_init(Instant::now).elapsed().as_micros() as u64
-}
 
 /// Cancels when its time has come.
 unsafe extern "C" fn poll(_: *mut c_void, _: *const frz_progress) -> c_int {
@@ -246,23 +230,10 @@ fn from_the_poll(host: &Host, moment: Duration) -> Option<f64> {
     (status == frz_status::FRZ_CANCELLED).then(|| ended.saturating_sub(due) as f64 / 1e6)
 }
 
-/// Time and size of states of `large`: after its frames, and with the whole surface touched.
-fn state(h: &mut Harness) {
-    let host = Host::new(scenes::large(&context(2), 6.0), 2);
+/// Time and size of states of a scene after its frames.
+fn measure(scene: (BaseLayer, Body), note: &str) -> [(f64, String); 2] {
+    let host = Host::new(scene, 2);
     (0..=FRAMES).for_each(|frame| works(host.step(frame)));
-    measure(h, &host, "capi.state", "after its frames");
-    drop(host);
-    // A plate that is pressed 2 cm into all of the surface: every block of it changes.
-    let ends = [DVec3::new(0.0, 0.45, 0.0), DVec3::new(0.0, 0.38, 0.0)];
-    let (layer, _) = scenes::large(&context(2), 6.0);
-    let plate = crate::common::shapes::cuboid([6.5, 0.2, 6.5]);
-    let body = scenes::body(plate, ends, [DVec3::zeros(); 2], f64::from(FRAMES));
-    let host = Host::new((layer, body), 2);
-    (0..=FRAMES).for_each(|frame| works(host.step(frame)));
-    measure(h, &host, "capi.state_all", "with the whole surface touched");
-}
-
-fn measure(h: &mut Harness, host: &Host, name: &str, note: &str) {
     let state = host.state();
     let round = || {
         timed(|| {
@@ -276,9 +247,7 @@ fn measure(h: &mut Harness, host: &Host, name: &str, note: &str) {
     round();
     let seconds = median((0..5).map(|_| round()).collect());
     let note = format!("threads=2, {} bytes {note}", state.len());
-    h.gate(&format!("{name}_seconds"), seconds, &note);
-    let bytes = state.len() as f64 / host.voxels() as f64;
-    h.gate(&format!("{name}_bytes"), bytes, &note);
+    [(seconds, note.clone()), (state.len() as f64 / host.voxels() as f64, note)]
 }
 
 /// Steps of `small` through C over the same steps in Rust, in turn.

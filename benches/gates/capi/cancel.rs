@@ -13,7 +13,7 @@ use frazil::capi::runtime::context::*;
 use frazil::capi::snow::base_layer::*;
 use frazil::capi::snow::layer::*;
 
-use crate::capi::host::{Threads, body_between, mesh, usual, view, works, written};
+use crate::capi::host::{self, Threads, body_between, mesh, usual, view, works, written};
 use crate::common::shapes;
 use crate::snow::grains::Random;
 
@@ -117,10 +117,8 @@ impl Host {
     }
 
     fn base(&self) -> *mut frz_base {
-        let mut base = null_mut();
         // SAFETY: the pointers are valid.
-        works(unsafe { frz_base_create(self.calm.ctx, null(), self.snow, null(), 0, &mut base) });
-        base
+        host::made(|base| unsafe { frz_base_create(self.calm.ctx, null(), self.snow, null(), 0, base) })
     }
 
     fn base_bytes(&self, base: *const frz_base) -> Vec<u8> {

@@ -6,33 +6,32 @@ use frazil::capi::frz_status;
 use frazil::capi::runtime::context::*;
 
 use crate::capi::host::{Threads, works};
-use crate::harness::{Harness, median, timed};
+use crate::harness::{median, timed};
 use crate::snow::grains::Random;
 
 /// Cancels that are measured.
 const CANCELS: usize = 200;
 
-/// Something that a host steps.
-pub trait Steps {
-    fn threads(&self) -> &Threads;
-    fn step(&self) -> frz_status;
-    /// All that the next step depends on.
-    fn state(&self) -> Vec<u8>;
-}
-
-/// Gate of the time (s) from a cancel at any moment of a step to its return; `what` is stepped.
-pub fn measure(h: &mut Harness, name: &'static str, host: &impl Steps, random: &mut Random, what: &str) {
-    let (whole, noisy) = timed(|| works(host.step()));
-    let mut before = host.state();
+/// The time (s) from a cancel on these threads at any moment of a step to its return; `state` is all that the next step depends on, and
+/// `what` is stepped.
+pub fn measure(
+    threads: &Threads,
+    step: impl Fn() -> frz_status,
+    state: impl Fn() -> Vec<u8>,
+    random: &mut Random,
+    what: &str,
+) -> (f64, String) {
+    let (whole, noisy) = timed(|| works(step()));
+    let mut before = state();
     let mut latencies = Vec::new();
     for attempt in 0..2 * CANCELS {
         let moment = Duration::from_secs_f64(whole * random.next());
-        match latency(host.threads(), moment, || host.step()) {
+        match latency(threads, moment, &step) {
             Some(latency) => latencies.push(latency),
             // The step ended first.
-            None => before = host.state(),
+            None => before = state(),
         }
-        assert!(attempt % 50 > 0 || host.state() == before, "a cancel changed {what}");
+        assert!(attempt % 50 > 0 || state() == before, "a cancel changed {what}");
         if latencies.len() == CANCELS {
             break;
         }
@@ -44,7 +43,7 @@ pub fn measure(h: &mut Harness, name: &'static str, host: &impl Steps, random: &
         "{count} cancels of a step of {whole:.2} s of {what}{noisy}; median {:.4} s",
         median(latencies)
     );
-    h.gate(name, p99, &note);
+    (p99, note)
 }
 
 /// Seconds from a cancel after `moment` to the return of a step; none when the step ended first.

@@ -3,6 +3,8 @@
 
 use std::ffi::{CStr, c_void};
 use std::ptr::null_mut;
+use std::sync::OnceLock;
+use std::time::Instant;
 
 use frazil::capi::level_set::body::{frz_body, frz_body_init};
 use frazil::capi::mesh::triangles::*;
@@ -77,14 +79,19 @@ pub fn body_between([from, to]: [&[[f32; 3]]; 2], triangles: &[[u32; 3]]) -> frz
     body
 }
 
+/// The handle that a call makes, which is to be destroyed.
+pub fn made<T>(make: impl FnOnce(*mut *mut T) -> frz_status) -> *mut T {
+    let mut out = null_mut();
+    works(make(&mut out));
+    out
+}
+
 /// A mesh, which is to be destroyed.
 pub fn mesh(ctx: *mut frz_context, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> *mut frz_mesh {
     let mut desc: frz_mesh_desc = sized();
     (desc.positions, desc.indices) = (view(positions), view(triangles.as_flattened()));
-    let mut mesh = null_mut();
     // SAFETY: the pointers are valid.
-    unsafe { works(frz_mesh_create(ctx, &desc, &mut mesh)) };
-    mesh
+    made(|mesh| unsafe { frz_mesh_create(ctx, &desc, mesh) })
 }
 
 pub fn view<T>(elements: &[T]) -> frz_view {
@@ -99,4 +106,10 @@ pub fn written(call: impl Fn(*mut c_void, usize, *mut usize) -> frz_status) -> V
     works(call(out.as_mut_ptr().cast(), size, &mut size));
     out.truncate(size);
     out
+}
+
+/// Microseconds since the first call, on the wall.
+pub fn clock() -> u64 {
+    static START: OnceLock<Instant> = OnceLock::new();
+    START.get_or_init(Instant::now).elapsed().as_micros() as u64
 }

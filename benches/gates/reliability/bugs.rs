@@ -2,26 +2,25 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::character;
 use crate::harness::Harness;
 use crate::process;
+use crate::scenes::wanted_data;
 
 /// Volumes are right within this part.
 const CLOSE: f64 = 0.02;
+/// Folders of bugs, and particles in them.
+const INSIDE_OUT: &str = "02-inside-out-part-vanishes";
+const ROWS: &str = "13-ids-are-row-numbers";
+const PLY: &str = "p.%04d.ply";
 
 /// The count of cases whose result is not right.
 pub fn run(h: &mut Harness) {
-    if !h.wants("reliability.bugs") {
-        return;
-    }
-    let Some(data) = character::data("bugs") else { return h.skipped("reliability.bugs", "no data") };
-    let folder = std::env::temp_dir().join(format!("frazil-gates-bugs-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
-    let bugs = Bugs { data, folder };
-    let cases = bugs.cases();
+    let name = "reliability.bugs";
+    let Some(data) = wanted_data(h, &[name], "bugs") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let cases = Bugs { data, folder: folder.path().into() }.cases();
     let wrong: Vec<&str> = cases.iter().filter(|(_, right)| !right).map(|(name, _)| *name).collect();
-    h.gate("reliability.bugs", wrong.len() as f64, &format!("of {} cases {}", cases.len(), wrong.join(", ")));
-    let _ = std::fs::remove_dir_all(bugs.folder);
+    h.gate(name, wrong.len() as f64, &format!("of {} cases {}", cases.len(), wrong.join(", ")));
 }
 
 struct Bugs {
@@ -67,38 +66,19 @@ impl Bugs {
             ("02 from-mesh", self.makes_a_volume("02-inside-out-part-vanishes/boots.obj", 0.024)),
             ("02 sweep", self.sweeps_alike()),
             ("02 snow", self.snow_is_removed("boots") && self.snow_is_removed("boots_right")),
-            (
-                "02 shallow object",
-                self.liquid_around("02-inside-out-part-vanishes", "block_inside_out", 84_000.0),
-            ),
-            (
-                "02 shallow terrain",
-                self.liquid_on("02-inside-out-part-vanishes", "slab_block_inside_out", 84_000.0),
-            ),
+            ("02 shallow object", self.liquid_around(INSIDE_OUT, "block_inside_out", 84_000.0)),
+            ("02 shallow terrain", self.liquid_on(INSIDE_OUT, "slab_block_inside_out", 84_000.0)),
             ("04 from-mesh", self.makes_a_volume("04-double-sided/box2.obj", 0.027)),
             ("04 shallow object", self.liquid_around("04-double-sided", "block2", 84_000.0)),
             ("04 shallow terrain", self.liquid_on("04-double-sided", "slab2", 100_000.0)),
             ("04 static object", self.statics_are_alike()),
             ("05 extensions", self.extensions()),
             ("07 channel without node", self.is_read("07-gltf-channel-without-node/pointer.glb")),
-            (
-                "08 instances",
-                self.info("08-gltf-instances/three_stones.glb", "").numbers("triangles") == [36.0],
-            ),
+            ("08 instances", self.has_triangles("08-gltf-instances/three_stones.glb", 36.0)),
             ("09 clips of one name", self.clips_are_told_apart()),
             ("11 far terrain", self.info("11-utm-terrain/hills_utm.obj", "").objects("apart")),
-            (
-                "13 ids are rows",
-                self.follows("13-ids-are-row-numbers/rows/p.%04d.bgeo", "13-ids-are-row-numbers/ball.ply")
-                    .objects("row numbers"),
-            ),
-            (
-                "13 stable ids",
-                self.is_silent(
-                    "13-ids-are-row-numbers/stable/p.%04d.bgeo",
-                    "13-ids-are-row-numbers/ball.ply",
-                ),
-            ),
+            ("13 ids are rows", self.follows(ROWS, "rows/p.%04d.bgeo", "ball.ply").objects("row numbers")),
+            ("13 stable ids", self.is_silent(ROWS, "stable/p.%04d.bgeo", "ball.ply")),
             ("14 from-particles", self.every_frame_is_surfaced()),
             ("14 surface", self.every_frame_is_followed()),
             ("15 continued lines", self.volume("15-obj-line-continuation/lf.obj", 1.0)),
@@ -113,22 +93,21 @@ impl Bugs {
             ("19 velocities", self.velocities_are_usds()),
             ("20 text .stl", self.text_is_read()),
             ("21 mixed winding", self.mixed_winding()),
-            (
-                "ids are rows",
-                self.follows("surface-ids_are_rows/p.%04d.ply", "surface-ids_are_rows/m.ply")
-                    .objects("row numbers"),
-            ),
-            (
-                "velocity unit",
-                self.follows("surface-velocity_unit/p.%04d.ply", "surface-velocity_unit/m.ply")
-                    .objects("their unit"),
-            ),
+            ("ids are rows", self.follows("surface-ids_are_rows", PLY, "m.ply").objects("row numbers")),
+            ("velocity unit", self.follows("surface-velocity_unit", PLY, "m.ply").objects("their unit")),
             ("inside-out words", self.inside_out_is_named()),
         ]
     }
 
     fn path(&self, name: &str) -> String {
         self.data.join(name).display().to_string()
+    }
+
+    /// The files of a bug with an ending.
+    fn files(&self, bug: &str, ending: &str) -> Vec<String> {
+        let files = std::fs::read_dir(self.data.join(bug)).expect("a folder").filter_map(Result::ok);
+        let names = files.map(|entry| format!("{bug}/{}", entry.file_name().to_string_lossy()));
+        names.filter(|name| name.ends_with(ending)).collect()
     }
 
     fn output(&self, name: &str) -> String {
@@ -154,6 +133,10 @@ impl Bugs {
     fn is_read(&self, name: &str) -> bool {
         let said = self.info(name, "");
         said.is_done() && said.numbers("triangles").iter().any(|count| *count > 0.0)
+    }
+
+    fn has_triangles(&self, name: &str, count: f64) -> bool {
+        self.info(name, "").numbers("triangles") == [count]
     }
 
     fn volume(&self, name: &str, expected: f64) -> bool {
@@ -193,7 +176,7 @@ impl Bugs {
     }
 
     fn snow_is_removed(&self, object: &str) -> bool {
-        let bug = self.data.join("02-inside-out-part-vanishes");
+        let bug = self.data.join(INSIDE_OUT);
         let file = format!("object.1.file={}", bug.join(format!("{object}.obj")).display());
         let out = self.shot("snow", &bug.join("snow.toml"), &[file]);
         let removed = |frame: u32| report(&out.join(format!("report/base.{frame:04}.json")), "removed_m3");
@@ -242,11 +225,9 @@ impl Bugs {
 
     fn extensions(&self) -> bool {
         let bug = "05-gltf-required-extensions";
-        let files = std::fs::read_dir(self.data.join(bug)).expect("a folder").filter_map(Result::ok);
-        let models = files.map(|entry| entry.file_name().to_string_lossy().into_owned());
-        models.filter(|name| name.ends_with(".glb")).all(|name| {
-            let said = self.info(&format!("{bug}/{name}"), "");
-            if name.starts_with("acme") {
+        self.files(bug, ".glb").iter().all(|name| {
+            let said = self.info(name, "");
+            if name.contains("/acme") {
                 said.code == 2 && said.err.contains("needs the glTF extension ACME_custom")
             } else {
                 said.is_done()
@@ -263,15 +244,15 @@ impl Bugs {
         are_listed && choose("go").objects("2 clips") && choose("go #2").is_done()
     }
 
-    fn follows(&self, particles: &str, mesh: &str) -> Said {
+    fn follows(&self, bug: &str, particles: &str, mesh: &str) -> Said {
         let out = self.folder.join("followed");
         let _ = std::fs::remove_dir_all(&out);
-        let (particles, mesh) = (self.path(particles), self.path(mesh));
+        let [particles, mesh] = [particles, mesh].map(|name| self.path(&format!("{bug}/{name}")));
         self.frazil(&["surface", "-p", &particles, "-m", &mesh, "-o", &out.display().to_string()])
     }
 
-    fn is_silent(&self, particles: &str, mesh: &str) -> bool {
-        let said = self.follows(particles, mesh);
+    fn is_silent(&self, bug: &str, particles: &str, mesh: &str) -> bool {
+        let said = self.follows(bug, particles, mesh);
         said.is_done() && !said.err.contains("row numbers")
     }
 
@@ -290,10 +271,12 @@ impl Bugs {
 
     fn every_frame_is_followed(&self) -> bool {
         // Where the liquid comes later, the mesh has nothing to follow in its first frame: that may be refused, in words.
-        let gone = self.follows("14-empty-frames/gone/p.%04d.bgeo", "14-empty-frames/ball.ply");
-        let all = gone.is_done() && count(&self.folder.join("followed/surface")) == 20;
-        let later = self.follows("14-empty-frames/later/p.%04d.bgeo", "14-empty-frames/ball.ply");
-        all && (later.is_done() && count(&self.folder.join("followed/surface")) == 20 || later.code == 2)
+        let is_whole = |said: &Said| said.is_done() && count(&self.folder.join("followed/surface")) == 20;
+        let follows =
+            |kind: &str| self.follows("14-empty-frames", &format!("{kind}/p.%04d.bgeo"), "ball.ply");
+        let gone = is_whole(&follows("gone"));
+        let later = follows("later");
+        gone && (is_whole(&later) || later.code == 2)
     }
 
     fn same_names_are_measured(&self) -> bool {
@@ -324,12 +307,8 @@ impl Bugs {
     /// Each is read, with as many triangles as the others.
     fn text_is_read(&self) -> bool {
         let bug = "20-stl-text-variants";
-        let files = std::fs::read_dir(self.data.join(bug)).expect("a folder").filter_map(Result::ok);
-        let names = files.map(|entry| entry.file_name().to_string_lossy().into_owned());
-        let counts: Vec<Vec<f64>> = names
-            .filter(|name| name.ends_with(".stl"))
-            .map(|name| self.info(&format!("{bug}/{name}"), "").numbers("triangles"))
-            .collect();
+        let names = self.files(bug, ".stl");
+        let counts: Vec<_> = names.iter().map(|name| self.info(name, "").numbers("triangles")).collect();
         counts.iter().all(|count| count.len() == 1 && *count == counts[0])
     }
 
@@ -342,7 +321,7 @@ impl Bugs {
     }
 
     fn inside_out_is_named(&self) -> bool {
-        let said = self.follows("surface-inside_out_words/p.%04d.ply", "surface-inside_out_words/in.ply");
+        let said = self.follows("surface-inside_out_words", PLY, "in.ply");
         !said.err.contains("as its indices have it")
     }
 }

@@ -1,6 +1,6 @@
 //! Gates of damaged files: mutated ones, cut ones, and what the process costs that decodes foreign .vdb files.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Stdio;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -34,10 +34,7 @@ const KINDS: [&str; 5] = ["obj", "ply", "stl", "gltf", "glb"];
 /// All of them.
 pub fn run(h: &mut Harness) {
     for kind in KINDS.into_iter().chain(["vdb"]) {
-        let name = format!("reliability.fuzz_{kind}");
-        if h.wants(&name) {
-            fuzz(h, &name, kind);
-        }
+        h.measure(&format!("reliability.fuzz_{kind}"), || fuzz(kind));
     }
     h.measure("reliability.cut", cut);
     h.measure("reliability.child_cost", child_cost);
@@ -252,11 +249,11 @@ pub fn read_mutated() {
     println!("{accepted}");
 }
 
-fn fuzz(h: &mut Harness, name: &str, kind: &str) {
+fn fuzz(kind: &str) -> (f64, String) {
     let count = if kind == "vdb" { VDB_INPUTS } else { INPUTS };
     let Tried { accepted, failed } = tried(kind, count);
     let note = format!("{count} inputs, {accepted} accepted {}", failed.join(", "));
-    h.gate(name, failed.len() as f64, &note);
+    (failed.len() as f64, note)
 }
 
 /// What became of mutated files: how many were read, and which ended the process that read them.
@@ -323,12 +320,11 @@ fn sized(folder: &Path) -> Vec<(String, Vec<u8>)> {
 }
 
 fn cut() -> (f64, String) {
-    let folder = std::env::temp_dir().join(format!("frazil-cut-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
+    let folder = tempfile::tempdir().expect("a folder");
     let guard = decoder(MOST_MEMORY);
-    let (mut accepted, mut cuts, files) = (0, 0, sized(&folder));
+    let (mut accepted, mut cuts, files) = (0, 0, sized(folder.path()));
     for (kind, bytes) in &files {
-        let path: PathBuf = folder.join(format!("cut.{kind}"));
+        let path = folder.path().join(format!("cut.{kind}"));
         let mut dice = Dice::new(bytes.len());
         for turn in 0..CUTS {
             // Half of them near the beginning, where everything else hangs on what is lost.
@@ -344,7 +340,6 @@ fn cut() -> (f64, String) {
             accepted += usize::from(read);
         }
     }
-    let _ = std::fs::remove_dir_all(&folder);
     let note = format!("{cuts} cuts of {} files", files.len());
     (accepted as f64, note)
 }
@@ -358,7 +353,8 @@ fn child_cost() -> (f64, String) {
     for leaf in surface.leaves_mut().expect("leaves") {
         leaf.values.iter_mut().for_each(|value| *value += dice.below(1000) as f32 * 1e-7);
     }
-    let path = std::env::temp_dir().join(format!("frazil-foreign-{}.vdb", std::process::id()));
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("foreign.vdb");
     file::write(&path, &[&surface], &WriteOptions::default()).expect("a file");
     let megabytes = std::fs::metadata(&path).map_or(0.0, |file| file.len() as f64 / 1e6);
     let guard = decoder(u64::MAX);
@@ -372,7 +368,6 @@ fn child_cost() -> (f64, String) {
             note = format!("{noise}{more}");
         }
     }
-    let _ = std::fs::remove_file(path);
     let (direct, child) = (median(direct), median(child));
     let note =
         format!("{megabytes:.1} MB, {} leaves, {direct:.3} s and {child:.3} s{note}", surface.leaf_count());

@@ -29,17 +29,16 @@ struct Count {
 }
 
 pub fn measure() -> (f64, String) {
-    let folder = std::env::temp_dir().join(format!("frazil-empty-frames-{}", std::process::id()));
+    let folder = tempfile::tempdir().expect("a folder");
     let mut count = Count::default();
     for (n, pattern) in patterns().iter().enumerate() {
-        let folder = folder.join(n.to_string());
+        let folder = folder.path().join(n.to_string());
         std::fs::create_dir_all(&folder).expect("a folder");
         (1..=FRAMES).zip(pattern).for_each(|(number, frame)| write(&folder, number, *frame));
         alone(&folder, pattern, &mut count);
         followed(&folder, pattern, &mut count);
         moved(&folder, pattern, &mut count);
     }
-    let _ = std::fs::remove_dir_all(folder);
     let note = format!("of {} frames of {PATTERNS} patterns in 7 stages", count.all);
     (count.lost as f64, note)
 }

@@ -9,15 +9,11 @@ use frazil::scene::{self, Scene};
 use frazil::snow::base_layer::initial::{Cover, Ground, layer};
 use frazil::snow::base_layer::{BaseLayer, Params};
 use frazil::sweep::{self, Body, Settings};
-use frazil::vdb::level_set::measure;
+use frazil::vdb::level_set;
 use frazil::{Context, Pool, io};
 
 use crate::common::oriented::{Case, Kind, MOVE, case, mirrored_skin};
-use crate::harness::Harness;
 
-const SILENT: &str = "reliability.orientation_silent";
-const DECIDABLE: &str = "reliability.orientation_decidable";
-const CORRECT: &str = "reliability.orientation_correct";
 /// Meshes, each through every door.
 const MESHES: u64 = 200;
 const CELL: f64 = 0.01;
@@ -51,10 +47,7 @@ const DOORS: [Door; 9] = [
     ("mirrored skin", Doors::skinned),
 ];
 
-pub fn run(h: &mut Harness) {
-    if ![SILENT, DECIDABLE, CORRECT].iter().any(|name| h.wants(name)) {
-        return;
-    }
+pub fn measure() -> [(f64, String); 3] {
     let folder = tempfile::tempdir().expect("a folder");
     let doors = Doors::new(folder.path());
     let (mut silent, mut decidable, mut correct) = (0, 0, 0);
@@ -88,9 +81,7 @@ pub fn run(h: &mut Harness) {
         }
     }
     let note = format!("{MESHES} meshes, {} doors", DOORS.len());
-    for (name, count) in [(SILENT, silent), (DECIDABLE, decidable), (CORRECT, correct)] {
-        h.gate(name, count as f64, &note);
-    }
+    [silent, decidable, correct].map(|count| (count as f64, note.clone()))
 }
 
 struct Doors {
@@ -119,28 +110,25 @@ impl Doors {
         Body::new(Box::new(Rigid::new(case.mesh.clone(), Keys::new(vec![key(0.0), key(1.0)])?)), 0.0)
     }
 
+    /// What a body sweeps until a time (s).
+    fn sweep(&self, body: Body, to: f64, meant: f64) -> frazil::Result<Found> {
+        let grid = sweep::chain(&self.ctx, std::slice::from_ref(&body), 0.0, to, &Settings::new(CELL))?;
+        Ok(Found { volume: level_set::measure(&self.ctx, &grid)?.volume, meant, warning: body.warning() })
+    }
+
     fn still(&self, case: &Case) -> frazil::Result<Found> {
-        let body = [Self::body(case, 0.0)?];
-        let grid = sweep::chain(&self.ctx, &body, 0.0, 0.0, &Settings::new(CELL))?;
-        let volume = measure(&self.ctx, &grid)?.volume;
-        Ok(Found { volume, meant: case.volume, warning: body[0].warning() })
+        self.sweep(Self::body(case, 0.0)?, 0.0, case.volume)
     }
 
     fn swept(&self, case: &Case) -> frazil::Result<Found> {
-        let body = [Self::body(case, MOVE)?];
-        let grid = sweep::chain(&self.ctx, &body, 0.0, 1.0, &Settings::new(CELL))?;
-        let volume = measure(&self.ctx, &grid)?.volume;
-        Ok(Found { volume, meant: case.swept, warning: body[0].warning() })
+        self.sweep(Self::body(case, MOVE)?, 1.0, case.swept)
     }
 
     /// The mesh as a skin that an ancestor of its joint mirrors.
     fn skinned(&self, case: &Case) -> frazil::Result<Found> {
         let file = self.folder.join("skin.gltf");
         std::fs::write(&file, mirrored_skin(&case.mesh)).expect("a file");
-        let body = [Body::new(Box::new(Character::open(&file, Play::default())?), 0.0)?];
-        let grid = sweep::chain(&self.ctx, &body, 0.0, 0.0, &Settings::new(CELL))?;
-        let volume = measure(&self.ctx, &grid)?.volume;
-        Ok(Found { volume, meant: case.volume, warning: body[0].warning() })
+        self.sweep(Body::new(Box::new(Character::open(&file, Play::default())?), 0.0)?, 0.0, case.volume)
     }
 
     /// Snow 0.6 m deep around the body.
@@ -162,13 +150,14 @@ impl Doors {
         let plane = || Ground::Plane { height: 0.0, area: [-x, -z, x, z] };
         let snow = layer(&self.ctx, &plane(), &[mesh], &Cover::Depth(DEPTH), CELL, 3.0)?;
         let bare = layer(&self.ctx, &plane(), &[], &Cover::Depth(DEPTH), CELL, 3.0)?;
-        let volume = measure(&self.ctx, &snow)?.volume - measure(&self.ctx, &bare)?.volume;
+        let volume =
+            level_set::measure(&self.ctx, &snow)?.volume - level_set::measure(&self.ctx, &bare)?.volume;
         Ok(Found { volume, meant: case.seen[0] * DEPTH + case.seen[1], warning: self.warning() })
     }
 
     fn ground(&self, case: &Case) -> frazil::Result<Found> {
         let snow = layer(&self.ctx, &Ground::Mesh(case.mesh.clone()), &[], &Cover::Depth(DEPTH), CELL, 3.0)?;
-        let volume = measure(&self.ctx, &snow)?.volume;
+        let volume = level_set::measure(&self.ctx, &snow)?.volume;
         Ok(Found { volume, meant: case.seen[0] * DEPTH + case.seen[1], warning: self.warning() })
     }
 

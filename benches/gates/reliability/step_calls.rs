@@ -100,11 +100,12 @@ impl Known {
     }
 
     fn part(&self, name: &str, part: usize) -> Option<Judged> {
-        Judged::read(&std::fs::read_to_string(self.0.join(format!("{name}.{part}"))).ok()?)
+        serde_json::from_slice(&std::fs::read(self.0.join(format!("{name}.{part}"))).ok()?).ok()
     }
 
     fn keep(&self, name: &str, part: usize, judged: &Judged) {
-        std::fs::write(self.0.join(format!("{name}.{part}")), judged.line()).expect("a file");
+        let text = serde_json::to_vec(judged).expect("JSON");
+        std::fs::write(self.0.join(format!("{name}.{part}")), text).expect("a file");
     }
 }
 

@@ -48,11 +48,10 @@ fn cube(half: f32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
 }
 
 fn snow(tried: &Tried) -> *mut frz_grid {
-    let (mut desc, mut snow) = (usual(frz_snow_desc_init), null_mut());
+    let mut desc = usual(frz_snow_desc_init);
     (desc.voxel_size, desc.depth, desc.area) = (VOXEL, 0.1, [-0.2, -0.2, 0.2, 0.2]);
     // SAFETY: the pointers are valid.
-    works(unsafe { frz_snow_layer(tried.ctx(), &desc, &mut snow) });
-    snow
+    host::made(|snow| unsafe { frz_snow_layer(tried.ctx(), &desc, snow) })
 }
 
 /// A layer and a cube for each of some frames.

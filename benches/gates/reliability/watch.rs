@@ -6,9 +6,10 @@ use std::time::Duration;
 
 use frazil::capi::frz_status::{self, *};
 use frazil::capi::runtime::context::*;
-use rustix::time::{ClockId, clock_gettime};
+use serde::{Deserialize, Serialize};
 
-use crate::capi::host::Threads;
+use crate::capi::host::{Threads, clock};
+use crate::shallow::speed::thread_seconds;
 use crate::snow::grains::Random;
 
 /// Steps of each function, in parts that run apart, each with settings of its own.
@@ -36,7 +37,7 @@ pub struct Tried<'a> {
     watch: &'a Watch,
     pub random: Random,
     name: &'static str,
-    /// CPU time of each (s).
+    /// CPU time of each (s), of this thread, which does all the work: what else the machine does is no step's fault.
     times: Vec<f64>,
     median: f64,
     cancelled: usize,
@@ -46,7 +47,7 @@ pub struct Tried<'a> {
 }
 
 /// What is known of the steps of a part.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Serialize, Deserialize)]
 pub struct Judged {
     /// How many went on for too long.
     pub slow: usize,
@@ -58,21 +59,6 @@ pub struct Judged {
 }
 
 impl Judged {
-    /// As a line of text.
-    pub fn line(&self) -> String {
-        format!("{} {} {:e} {:e}", self.slow, self.cancelled, self.median, self.slowest)
-    }
-
-    /// From such a line.
-    pub fn read(line: &str) -> Option<Self> {
-        let mut words = line.split_whitespace();
-        let slow = words.next()?.parse().ok()?;
-        let cancelled = words.next()?.parse().ok()?;
-        let median = words.next()?.parse().ok()?;
-        let slowest = words.next()?.parse().ok()?;
-        Some(Self { slow, cancelled, median, slowest })
-    }
-
     /// Of all parts, and a note on them.
     pub fn all(parts: &[Self]) -> (usize, String) {
         let mut medians: Vec<f64> = parts.iter().map(|part| part.median).collect();
@@ -87,18 +73,6 @@ impl Judged {
     }
 }
 
-/// Microseconds of the clock on the wall.
-fn wall() -> u64 {
-    static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-    START.get_or_init(std::time::Instant::now).elapsed().as_micros() as u64
-}
-
-/// CPU time of this thread, which does all the work (s): what else the machine does is no step's fault.
-fn cpu() -> f64 {
-    let time = clock_gettime(ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
-}
-
 impl Watch {
     pub fn new() -> Self {
         let threads = Threads::new(0);
@@ -109,7 +83,7 @@ impl Watch {
             let mut cancelled = (u64::MAX, 0);
             while !other_ends.load(Ordering::SeqCst) {
                 std::thread::sleep(Duration::from_millis(1));
-                let (now, due) = (wall(), other_due.load(Ordering::SeqCst));
+                let (now, due) = (clock(), other_due.load(Ordering::SeqCst));
                 if due == u64::MAX {
                     continue;
                 }
@@ -162,13 +136,13 @@ impl<'a> Tried<'a> {
     /// One step; whether it was made to its end.
     pub fn step(&mut self, step: impl FnOnce(*mut frz_context) -> frz_status) -> bool {
         let limit = (TIMES * self.median).max(EARLIEST);
-        let (before, began) = (cpu(), wall());
+        let (before, began) = (thread_seconds(), clock());
         self.watch.due.store(began + (limit * 1e6) as u64, Ordering::SeqCst);
         let status = step(self.ctx());
         self.watch.due.store(u64::MAX, Ordering::SeqCst);
-        let took = cpu() - before;
+        let took = thread_seconds() - before;
         // A cancel that came too late is of this step, too.
-        if (wall() - began) as f64 > 0.5e6 * limit {
+        if (clock() - began) as f64 > 0.5e6 * limit {
             std::thread::sleep(Duration::from_millis(3));
         }
         self.watch.threads.reset();

@@ -10,7 +10,7 @@ const FRAMES: usize = 12;
 /// Depths out of range, and fluxes that are not finite, over random scenes.
 pub fn measure() -> (f64, String) {
     let mut sums = Sums::default();
-    (0..SCENES).for_each(|seed| sums.add(&flow(seed)));
+    (0..SCENES).for_each(|seed| flow(seed, &mut sums));
     let Sums { violations, missing, columns, emptied, filled } = sums;
     let note = format!(
         "{SCENES} scenes of {} columns on average, {missing} with units missing; rows scaled by K_min {emptied}, by K_max \
@@ -20,7 +20,7 @@ pub fn measure() -> (f64, String) {
     ((violations + missing) as f64, note)
 }
 
-/// What a scene did, and all of them.
+/// What the scenes did.
 #[derive(Default)]
 struct Sums {
     violations: u64,
@@ -30,22 +30,12 @@ struct Sums {
     filled: u64,
 }
 
-impl Sums {
-    fn add(&mut self, other: &Self) {
-        self.violations += other.violations;
-        self.missing += other.missing;
-        self.columns += other.columns;
-        self.emptied += other.emptied;
-        self.filled += other.filled;
-    }
-}
-
 /// One of them.
-fn flow(seed: u64) -> Sums {
+fn flow(seed: u64, sums: &mut Sums) {
     let ctx = context();
     let (plan, step) = extreme(seed);
     let mut liquid = plan.make(&ctx, Turn::NONE);
-    let mut sums = Sums { columns: liquid.columns().count() as u64, ..Sums::default() };
+    sums.columns += liquid.columns().count() as u64;
     for frame in 0..FRAMES {
         let report = extreme_frame(&ctx, &mut liquid, step, frame);
         sums.violations += violations(&liquid) as u64;
@@ -53,5 +43,4 @@ fn flow(seed: u64) -> Sums {
         sums.emptied += report.emptied;
         sums.filled += report.filled;
     }
-    sums
 }

@@ -159,7 +159,8 @@ fn hash_drawn(surface: &mut Surface, balls: &mut Balls, liquid: &Shallow) -> u64
     let round = balls.build(&drops, &layout, &mut buffers.drops()).expect("drops");
     bits(&buffers.positions[..3 * round.vertices]);
     bits(&buffers.normals[..3 * round.vertices]);
-    [&layers[..], &triangles, &buffers.indices[..round.indices]].map(|numbers| numbers.hash(&mut hasher));
+    let indices = [&layers[..], &triangles, &buffers.indices[..round.indices]];
+    indices.into_iter().for_each(|numbers| numbers.hash(&mut hasher));
     hasher.finish()
 }
 

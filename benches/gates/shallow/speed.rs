@@ -194,9 +194,8 @@ impl Frames {
     /// Median over the five of columns times steps a second (millions).
     pub fn rate(&self) -> f64 {
         let rate = |frames: &[(f64, u32)]| {
-            let [seconds, steps] = [0, 1].map(|which| {
-                frames.iter().map(|frame| if which == 0 { frame.0 } else { f64::from(frame.1) }).sum::<f64>()
-            });
+            let seconds: f64 = frames.iter().map(|frame| frame.0).sum();
+            let steps: f64 = frames.iter().map(|frame| f64::from(frame.1)).sum();
             1e-6 * self.columns as f64 * steps / seconds
         };
         median(self.times.chunks(self.together).map(rate).collect())

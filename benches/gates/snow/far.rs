@@ -14,23 +14,20 @@ const HALF: f64 = 3.6;
 
 /// All of them.
 pub fn run(h: &mut Harness) {
-    if h.wants("reliability.far_noise") {
+    let names = ["reliability.far_noise", "reliability.far_noise_removed", "reliability.far_noise_walk"];
+    h.measure_all(names, || {
         let (snow, removed, walk) = worst(Params::for_cell(WALK_CELL));
         let note =
             "snow left after each frame; the noise is fixed in the world: each place has another part of it";
-        h.gate("reliability.far_noise", snow, note);
-        let note = "removed in a frame, of those that remove over a litre";
-        h.gate("reliability.far_noise_removed", removed, note);
-        h.gate("reliability.far_noise_walk", walk, "removed in all");
-    }
-    if h.wants("reliability.far") {
+        let of_removed = "removed in a frame, of those that remove over a litre";
+        [(snow, note), (removed, of_removed), (walk, "removed in all")]
+    });
+    h.measure("reliability.far", || {
         let (snow, removed, walk) = worst(scenes::EXACT);
         let worst = snow.max(removed).max(walk);
-        let note = format!(
-            "{worst:.1e}: snow left and removed, each frame and in all, at 1.2 and 60 km against the origin"
-        );
-        h.gate("reliability.far", worst, &note);
-    }
+        let note = "snow left and removed, each frame and in all, at 1.2 and 60 km against the origin";
+        (worst, format!("{worst:.1e}: {note}"))
+    });
 }
 
 /// Largest relative differences to the walk at the origin: of the snow left, of what a frame removes, and of all removed.

@@ -1,7 +1,6 @@
 //! Gates of characters and shots: skinned sweeps, whole passes with files, continuing.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 use frazil::geometry::DVec3;
 use frazil::motion::{Character, Key, Keys, Motion, Placed, Play, Space};
@@ -15,6 +14,7 @@ use crate::common::clients;
 use crate::harness::{Harness, median, timed};
 use crate::process::{frazil, json, quiet, works};
 use crate::scenes::{MAN, context, wanted_data};
+use crate::snow::grains::passes::{self, kill};
 use crate::sweep::pose_union::Union;
 use crate::sweep::walls::each_voxel;
 
@@ -30,8 +30,8 @@ pub fn run(h: &mut Harness) {
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let Some(man) = wanted_data(h, &names, MAN) else { return };
     sweeps(h, &man);
-    skinning(h, &man);
-    edit(h, &man);
+    h.measure("snow.shot.skinning", || skinning(&man));
+    h.measure("snow.shot.edit", || edit(&man));
     pass(h, &man);
     check(h, &man);
     continued(h, &man);
@@ -100,19 +100,14 @@ fn fastest(motion: &dyn Motion, last: i32) -> Vec<(f64, i32)> {
 }
 
 /// Against Blender's poses at key times.
-fn skinning(h: &mut Harness, man: &Path) {
-    if h.wants("snow.shot.skinning") {
-        let (worst, height) = character::farthest_from_blender(man);
-        let note = format!("{} vertices at {} key times", character::VERTICES, character::FRAMES);
-        h.gate("snow.shot.skinning", worst / height, &note);
-    }
+fn skinning(man: &Path) -> (f64, String) {
+    let (worst, height) = character::farthest_from_blender(man);
+    let note = format!("{} vertices at {} key times", character::VERTICES, character::FRAMES);
+    (worst / height, note)
 }
 
 /// Seconds of a step without files.
-fn edit(h: &mut Harness, man: &Path) {
-    if !h.wants("snow.shot.edit") {
-        return;
-    }
+fn edit(man: &Path) -> (f64, String) {
     let ctx = context(2);
     let folder = tempfile::tempdir().expect("a folder");
     let scene = character::walk_scene(folder.path(), man, 240, 0.0075, "");
@@ -127,7 +122,7 @@ fn edit(h: &mut Harness, man: &Path) {
     let times: Vec<f64> = (2..=97).map(step).collect();
     let worst = times.iter().copied().fold(0.0, f64::max);
     let note = format!("median of 96 frames, worst {worst:.3} s; threads=2 thesis=3.15-4.59 s on 6 cores");
-    h.gate("snow.shot.edit", median(times), &note);
+    (median(times), note)
 }
 
 fn text(path: &Path) -> &str {
@@ -137,21 +132,18 @@ fn text(path: &Path) -> &str {
 /// The whole pass with its files, in both modes.
 fn pass(h: &mut Harness, man: &Path) {
     for mode in ["full", "delta"] {
-        let (pass, memory) = (format!("snow.shot.pass_{mode}"), format!("snow.shot.memory_{mode}"));
-        if !h.wants(&pass) && !h.wants(&memory) {
-            continue;
-        }
-        let folder = tempfile::tempdir().expect("a folder");
-        let scene =
-            character::walk_scene(folder.path(), man, 240, 0.0075, &format!("base_mode = \"{mode}\""));
-        let (out, report) = (folder.path().join("out"), folder.path().join("report.json"));
-        let arguments =
-            ["snow", text(&scene), "-o", text(&out), "--threads", "2", "-q", "--report", text(&report)];
-        let (took, noisy) = timed(|| works(&mut frazil(arguments)));
-        let peak = json(&report)["peak_memory_bytes"].as_f64().expect("a peak") / f64::from(1 << 20);
-        let note = format!("240 frames, 6 x 6 m, with files; threads=2 {THESIS}{noisy}");
-        h.gate(&pass, took, &note);
-        h.gate(&memory, peak, "");
+        let names = ["pass", "memory"].map(|what| format!("snow.shot.{what}_{mode}"));
+        h.measure_all(names, || {
+            let folder = tempfile::tempdir().expect("a folder");
+            let output = format!("base_mode = \"{mode}\"");
+            let scene = character::walk_scene(folder.path(), man, 240, 0.0075, &output);
+            let (out, report) = (folder.path().join("out"), folder.path().join("report.json"));
+            let mut pass = frazil(["snow", text(&scene), "-o", text(&out), "-q", "--threads", "2"]);
+            let (took, noisy) = timed(|| works(pass.args(["--report", text(&report)])));
+            let peak = json(&report)["peak_memory_bytes"].as_f64().expect("a peak") / f64::from(1 << 20);
+            let note = format!("240 frames, 6 x 6 m, with files; threads=2 {THESIS}{noisy}");
+            [(took, note), (peak, String::new())]
+        });
     }
 }
 
@@ -162,17 +154,15 @@ fn check(h: &mut Harness, man: &Path) {
         let run = || timed(|| works(&mut frazil(["check", text(scene)]))).0;
         median((0..5).map(|_| run()).collect())
     };
-    if h.wants("snow.shot.check_walk") {
-        let scene = character::walk_scene(folder.path(), man, 240, 0.0075, "");
-        h.gate("snow.shot.check_walk", seconds(&scene), "");
-    }
-    if h.wants("snow.shot.check_sequence") {
-        let scene = character::sequence_scene(folder.path(), 240, 158);
-        h.gate("snow.shot.check_sequence", seconds(&scene), "50,000 triangles a frame");
-    }
+    h.measure("snow.shot.check_walk", || {
+        (seconds(&character::walk_scene(folder.path(), man, 240, 0.0075, "")), "")
+    });
+    h.measure("snow.shot.check_sequence", || {
+        (seconds(&character::sequence_scene(folder.path(), 240, 158)), "50,000 triangles a frame")
+    });
 }
 
-/// Killed at ten moments and continued, in both modes; and whole frames rebuilt from changes.
+/// Killed again and again, and continued, in both modes; and whole frames rebuilt from changes.
 fn continued(h: &mut Harness, man: &Path) {
     if !h.wants("snow.shot.continued") && !h.wants("snow.shot.rebuilt") {
         return;
@@ -185,22 +175,11 @@ fn continued(h: &mut Harness, man: &Path) {
         let [once, killed] = ["once", "killed"].map(|name| folder.path().join(format!("{name}_{mode}")));
         let (took, _) = timed(|| works(&mut frazil(["snow", text(&scene), "-o", text(&once)])));
         whole.push(once.clone());
-        let mut kills = 0;
-        for moment in character::moments(10) {
-            let start = Instant::now();
-            let mut child =
-                quiet(&mut frazil(["snow", text(&scene), "-o", text(&killed)])).spawn().expect("frazil");
-            // Short enough that ten of them do not finish the shot.
-            let limit = Duration::from_secs_f64(0.02 + 0.25 * took * moment);
-            while start.elapsed() < limit && child.try_wait().expect("a child").is_none() {
-                std::thread::sleep(Duration::from_millis(1));
-            }
-            kills += usize::from(child.kill().is_ok());
-            child.wait().expect("a child");
-        }
+        // Short enough that all of them do not finish the shot.
+        let kills = kill(|threads| passes::pass(&scene, &killed, threads), 0.25 * took, || Some(())).len();
         works(&mut frazil(["snow", text(&scene), "-o", text(&killed)]));
         let same = character::output(&once) == character::output(&killed);
-        h.holds(&name, same, &format!("{kills} kills, a run takes {took:.1} s"));
+        h.gate(&name, same, &format!("{kills} kills, a run takes {took:.1} s"));
     }
     let [full, delta] = [&whole[0], &whole[1]];
     let mut same = true;
@@ -211,7 +190,7 @@ fn continued(h: &mut Harness, man: &Path) {
         same &= quiet(&mut frazil(arguments)).status().expect("frazil").success();
         same &= voxels(&file) == voxels(&full.join(format!("base/base.{frame:04}.vdb")));
     }
-    h.holds("snow.shot.rebuilt", same, "5 frames, values and active voxels of all three grids");
+    h.gate("snow.shot.rebuilt", same, "5 frames, values and active voxels of all three grids");
 }
 
 /// Leaves of a grid: origin, bits of the values, active voxels.
@@ -244,7 +223,7 @@ fn changed(h: &mut Harness, man: &Path) {
     let refused = run(&["--set", "snow.noise.seed=2"]);
     let said = String::from_utf8_lossy(&refused.stderr).into_owned();
     let named = refused.status.code() == Some(2) && said.contains("snow.noise.seed was 0");
-    h.holds("snow.shot.changed_refused", made && named && character::output(&out) == before, said.trim());
+    h.gate("snow.shot.changed_refused", made && named && character::output(&out) == before, said.trim());
     let again = run(&["--set", "snow.noise.seed=2", "--from", "100"]);
     let after = character::output(&out);
     let kept = |frame: i32| {
@@ -252,7 +231,7 @@ fn changed(h: &mut Harness, man: &Path) {
         before.contains_key(&name) && before.get(&name) == after.get(&name)
     };
     let yes = again.status.success() && (1..100).all(kept) && !(100..=120).any(kept);
-    h.holds("snow.shot.changed_from", yes, "frames 1-99 keep their bytes, 100-120 are new");
+    h.gate("snow.shot.changed_from", yes, "frames 1-99 keep their bytes, 100-120 are new");
 }
 
 /// Other programs open the shot, where they are installed.
@@ -266,11 +245,14 @@ fn clients(h: &mut Harness, man: &Path) {
     works(&mut frazil(["snow", text(&scene), "-o", text(&out)]));
     let blender = clients::blender().map(|blender| clients::blender_opens(&blender, &out, 1, 24));
     let usd = clients::usd_python().map(|python| clients::usd_composes(&python, &out, 1, 24));
-    for (name, answer) in [("snow.shot.clients_blender", blender), ("snow.shot.clients_usd", usd)] {
-        match answer {
-            None => h.skipped(name, "not installed: make test-clients"),
-            Some(Ok(said)) => h.holds(name, true, &said),
-            Some(Err(said)) => h.holds(name, false, said.lines().last().unwrap_or_default()),
-        }
-    }
+    answered(h, "snow.shot.clients_blender", blender);
+    answered(h, "snow.shot.clients_usd", usd);
+}
+
+/// Whether another program did what it was asked, and what it said; none: it is not installed.
+pub fn answered(h: &mut Harness, name: &str, answer: Option<Result<String, String>>) {
+    let Some(answer) = answer else { return h.skipped(name, "not installed: make test-clients") };
+    let is_right = answer.is_ok();
+    let said = answer.unwrap_or_else(|error| error);
+    h.gate(name, is_right, said.lines().last().unwrap_or_default());
 }

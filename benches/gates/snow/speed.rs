@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::harness::{Harness, median, timed};
 use crate::process::{kilobytes, number_of, own, printed};
-use crate::scenes::{self, FRAMES, context};
+use crate::scenes::{self, FRAMES, context, voxel};
 
 /// Seconds of each of five frames of a scene, after the first pose and a frame to warm up.
 pub fn frame_times(ctx: &frazil::Context, base: &mut BaseLayer, body: &Body) -> Vec<f64> {
@@ -25,32 +25,34 @@ pub fn frame_times(ctx: &frazil::Context, base: &mut BaseLayer, body: &Body) -> 
 pub fn run(h: &mut Harness) {
     let ctx = context(2);
     let cpu = format!("threads=2 cpu={:?}", frazil::numeric::cpu::cpu_level());
-    if h.wants("snow.base.small") || h.wants("snow.base.stock_small") {
+    let stocked = |body: &Body, base: &BaseLayer, seconds: f64| {
+        let (stock, noisy) = timed(|| stock(&ctx, body, base));
+        (stock / seconds, format!("stock {stock:.2} s{noisy}"))
+    };
+    h.measure_all(["snow.base.small", "snow.base.stock_small"], || {
         let (mut base, body) = scenes::small(&ctx, 2.0);
         let seconds = median(frame_times(&ctx, &mut base, &body));
-        let note = format!("{cpu} thesis=1.7-1.84 s on 6 cores");
-        h.gate("snow.base.small", seconds, &note);
-        let (stock, noisy) = timed(|| stock(&ctx, &body, &scenes::snow(&ctx, 2.0, 0.005, scenes::EXACT)));
-        let note = format!("stock {stock:.2} s{noisy}");
-        h.gate("snow.base.stock_small", stock / seconds, &note);
-    }
-    if ["large", "area", "stock_large", "memory"].iter().any(|name| h.wants(&format!("snow.base.{name}"))) {
+        let of_stock = stocked(&body, &scenes::snow(&ctx, 2.0, 0.005, scenes::EXACT), seconds);
+        [(seconds, format!("{cpu} thesis=1.7-1.84 s on 6 cores")), of_stock]
+    });
+    let names = ["large", "memory_voxel", "memory_peak", "stock_large", "area"];
+    h.measure_all(names.map(|name| format!("snow.base.{name}")), || {
         let (mut base, body) = scenes::large(&ctx, 6.0);
         let seconds = median(frame_times(&ctx, &mut base, &body));
-        let note = format!("{cpu} thesis=3.15-4.59 s on 6 cores");
-        h.gate("snow.base.large", seconds, &note);
         let bytes = base.surface().memory_bytes() as f64 / base.surface().active_voxels() as f64;
-        h.gate("snow.base.memory_voxel", bytes, "stock=12-14");
         let peak = number_of(&printed(&mut own("peak-of-large")), "MB ").expect("a peak");
-        h.gate("snow.base.memory_peak", peak, "stock=370; a process of its own, the layer's making included");
-        let (stock, noisy) = timed(|| stock(&ctx, &body, &base));
-        let note = format!("stock {stock:.2} s{noisy}");
-        h.gate("snow.base.stock_large", stock / seconds, &note);
+        let of_stock = stocked(&body, &base, seconds);
         drop(base);
         let (mut wide, body) = scenes::large(&ctx, 20.0);
         let ratio = median(frame_times(&ctx, &mut wide, &body)) / seconds;
-        h.gate("snow.base.area", ratio, &cpu);
-    }
+        [
+            (seconds, format!("{cpu} thesis=3.15-4.59 s on 6 cores")),
+            (bytes, "stock=12-14".into()),
+            (peak, "stock=370; a process of its own, the layer's making included".into()),
+            of_stock,
+            (ratio, cpu.clone()),
+        ]
+    });
 }
 
 /// The run that makes the frames of `large` and prints its peak of memory (MB).
@@ -83,8 +85,7 @@ fn noise(ctx: &frazil::Context, swept: &FloatGrid) -> FloatGrid {
     noise.set_frequency(Some((1.0 / (8.0 * cell)) as f32));
     let block = |leaf: &frazil::vdb::Leaf<'_>| {
         let values = Box::new(std::array::from_fn(|index| {
-            let at = [index >> 6, index >> 3 & 7, index & 7];
-            let [x, y, z] = [0, 1, 2].map(|axis| f64::from(leaf.origin[axis] + at[axis] as i32) * cell);
+            let [x, y, z] = voxel(leaf.origin, index).map(|at| f64::from(at) * cell);
             2.0 * cell as f32 * noise.get_noise_3d(x, y, z).max(0.0)
         }));
         BlockEdit::Dense(Block { origin: leaf.origin, values, mask: [u64::MAX; 8] })

@@ -11,32 +11,25 @@ use frazil::snow::render_volumes::{fog, united};
 use frazil::vdb::FloatGrid;
 
 use crate::harness::Harness;
-use crate::scenes::context;
+use crate::scenes::{self, context};
 use crate::snow::grains::Random;
 use crate::snow::grains::births::ploughed_snow;
 
 /// Frames after which a plough's grains have come to rest.
 const FRAMES: i32 = 48;
 
-const NAMES: [&str; 2] = ["snow.shot.fog_volume", "snow.shot.snow_seam"];
-
 pub fn run(h: &mut Harness) {
-    let [volume, seams] = NAMES.map(|name| h.wants(name));
-    if !volume && !seams {
-        return;
-    }
-    let ctx = context(2);
-    let (base, grains) = ploughed_snow(&ctx, FRAMES);
-    if volume {
-        density(h, &ctx, &grains);
-    }
-    if seams {
-        seam(h, &ctx, &base, &grains);
+    let names @ [volume, seams] = ["snow.shot.fog_volume", "snow.shot.snow_seam"];
+    if names.iter().any(|name| h.wants(name)) {
+        let ctx = context(2);
+        let (base, grains) = ploughed_snow(&ctx, FRAMES);
+        h.measure(volume, || density(&ctx, &grains));
+        h.measure(seams, || seam(&ctx, &base, &grains));
     }
 }
 
 /// Volume of full density against that of the union of spheres: of a heap whose spheres overlap, and of grains at rest.
-fn density(h: &mut Harness, ctx: &Context, grains: &Grains) {
+fn density(ctx: &Context, grains: &Grains) -> (f64, String) {
     let real: Vec<DVec3> = grains.positions().collect();
     let off = |centres: &[DVec3], radius: f64, what: &str| {
         let grid = fog::grains(ctx, centres, radius, fog::VOXEL * radius).expect("a grid");
@@ -53,7 +46,7 @@ fn density(h: &mut Harness, ctx: &Context, grains: &Grains) {
     };
     let heap = off(&heap(4000, 0.0025), 0.0025, "a heap");
     let real = off(&real, grains.params().radius, "ploughed snow");
-    h.gate(NAMES[0], heap.max(real), &format!("heap {heap:.3}, ploughed {real:.3}"));
+    (heap.max(real), format!("heap {heap:.3}, ploughed {real:.3}"))
 }
 
 /// Overlapping spheres in a cube, the same ones every time.
@@ -99,7 +92,7 @@ fn union(centres: &[DVec3], radius: f64) -> f64 {
 
 /// Holes between the base and resting grains in their united surface: positions without snow that are a voxel long on the way from
 /// a grain that touches the base to it, and balls of a cell of the base that have base below and a grain above them.
-fn seam(h: &mut Harness, ctx: &Context, base: &BaseLayer, grains: &Grains) {
+fn seam(ctx: &Context, base: &BaseLayer, grains: &Grains) -> (f64, String) {
     let radius = grains.params().radius;
     let there = grains.positions().zip(grains.awake());
     let resting: Vec<DVec3> = there.filter(|(_, awake)| !awake).map(|(position, _)| position).collect();
@@ -111,7 +104,7 @@ fn seam(h: &mut Harness, ctx: &Context, base: &BaseLayer, grains: &Grains) {
         "{} resting, {touching} touch the base, {gaps} of them apart from it; {balls} balls of {positions} places",
         resting.len()
     );
-    h.gate(NAMES[1], (gaps + balls) as f64, &note);
+    ((gaps + balls) as f64, note)
 }
 
 /// Count of grains within a tenth of their diameter of the base, and of those from which no unbroken snow leads to it.
@@ -151,8 +144,7 @@ fn balls(ctx: &Context, base: &FloatGrid, snow: &FloatGrid) -> (usize, usize) {
         for index in
             (0..512).filter(|index| leaf.values[*index] >= half && leaf.values[*index] < snow.background())
         {
-            let at = [index >> 6, index >> 3 & 7, index & 7];
-            positions.push([0, 1, 2].map(|axis| leaf.origin[axis] + at[axis] as i32));
+            positions.push(scenes::voxel(leaf.origin, index));
         }
     }
     // Up to six cells away.

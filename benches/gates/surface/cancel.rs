@@ -11,8 +11,8 @@ use frazil::capi::tracker::mesh::*;
 use frazil::capi::{frz_span, frz_status};
 use frazil::geometry::{DVec3, TriMesh, Vec3};
 
-use crate::capi::cancel_latency::{Steps, measure};
-use crate::capi::host::{self, Threads, sized, usual, view, works, written};
+use crate::capi::cancel_latency;
+use crate::capi::host::{self, Threads, made, sized, usual, view, works, written};
 use crate::common::liquids::{ball, context, filled, own_surface, turned};
 use crate::harness::Harness;
 use crate::snow::grains::Random;
@@ -59,21 +59,11 @@ impl Host {
         };
         let corners: Vec<[f32; 3]> = mesh.positions.iter().map(|place| (*place).into()).collect();
         host.mesh = host::mesh(host.threads.ctx, &corners, &mesh.triangles);
-        let mut tracker = null_mut();
+        let (first, ctx) = (host.particles(0), host.threads.ctx);
         // SAFETY: the pointers are valid.
-        unsafe {
-            let first = host.particles(0);
-            works(frz_tracker_create(
-                host.threads.ctx,
-                &host.params,
-                host.mesh,
-                &first,
-                null(),
-                0,
-                &mut tracker,
-            ));
-        }
-        host.tracker.set(tracker);
+        let create =
+            |out| unsafe { frz_tracker_create(ctx, &host.params, host.mesh, &first, null(), 0, out) };
+        host.tracker.set(made(create));
         host.first = host.state();
         host
     }
@@ -122,30 +112,12 @@ impl Host {
     }
 
     fn put_back(&self) {
-        let mut again = null_mut();
-        // SAFETY: the pointers are valid, or null where that is allowed; nobody uses the old tracker any more.
-        unsafe {
-            works(frz_tracker_create(
-                self.others.ctx,
-                &self.params,
-                self.mesh,
-                null(),
-                self.first.as_ptr().cast(),
-                self.first.len(),
-                &mut again,
-            ));
-            frz_tracker_destroy(self.tracker.replace(again));
-        }
-    }
-}
-
-impl Steps for Host {
-    fn threads(&self) -> &Threads {
-        &self.threads
-    }
-
-    fn step(&self) -> frz_status {
-        self.step_told(null_mut())
+        let (ctx, state, size) = (self.others.ctx, self.first.as_ptr().cast(), self.first.len());
+        // SAFETY: the pointers are valid, or null where that is allowed.
+        let create =
+            |out| unsafe { frz_tracker_create(ctx, &self.params, self.mesh, null(), state, size, out) };
+        // SAFETY: nobody uses the old tracker any more.
+        unsafe { frz_tracker_destroy(self.tracker.replace(made(create))) };
     }
 
     fn state(&self) -> Vec<u8> {
@@ -153,26 +125,6 @@ impl Steps for Host {
         written(|room, capacity, size| unsafe {
             frz_tracker_save(self.threads.ctx, self.tracker.get(), room, capacity, size)
         })
-    }
-}
-
-/// A host that looks at the step, and does not make it. Its tracker has so many vertices.
-struct Looking<'a> {
-    host: &'a Host,
-    vertices: usize,
-}
-
-impl Steps for Looking<'_> {
-    fn threads(&self) -> &Threads {
-        &self.host.threads
-    }
-
-    fn step(&self) -> frz_status {
-        self.host.look(&mut vec![[0.0; 3]; self.vertices])
-    }
-
-    fn state(&self) -> Vec<u8> {
-        self.host.state()
     }
 }
 
@@ -187,23 +139,23 @@ impl Drop for Host {
 }
 
 pub fn run(h: &mut Harness) {
-    following(h);
+    h.measure("surface.cancel_p99", following);
     rebuilding(h);
 }
 
+/// Cancels of a step, or of the look at it.
+fn cancels(host: &Host, step: impl Fn() -> frz_status, seed: u64, what: &str) -> (f64, String) {
+    cancel_latency::measure(&host.threads, step, || host.state(), &mut Random(seed), what)
+}
+
 /// A ball that turns.
-fn following(h: &mut Harness) {
-    let name = "surface.cancel_p99";
-    if !h.wants(name) {
-        return;
-    }
+fn following() -> (f64, String) {
     let ball = ball(26.0, 100, 0.25);
     let at = |angle: f64| {
         ball.positions.iter().map(|position| turned(*position, angle, Default::default())).collect()
     };
     let host = Host::new([at(0.0), at(0.02)], &ball.mesh, false);
-    let what = format!("{} particles", host.ids.len());
-    measure(h, name, &host, &mut Random(42), &what);
+    cancels(&host, || host.step_told(null_mut()), 42, &format!("{} particles", host.ids.len()))
 }
 
 /// Two blocks that meet: the step, and the look at it.
@@ -225,12 +177,7 @@ fn rebuilding(h: &mut Harness) {
     let mut report: frz_tracker_report = sized();
     works(host.step_told(&mut report));
     if report.rebuilt_cells == 0 {
-        for name in names {
-            if h.wants(name) {
-                h.gate(name, f64::NAN, "nothing was rebuilt");
-            }
-        }
-        return;
+        return h.measure_all(names, || [(f64::NAN, "nothing was rebuilt"); 2]);
     }
     let what = format!(
         "{} particles and {} triangles, {} cells flagged and {} rebuilt, {} triangles made",
@@ -240,24 +187,19 @@ fn rebuilding(h: &mut Harness) {
         report.rebuilt_cells,
         report.made_triangles
     );
-    if h.wants(step) {
-        measure(h, step, &host, &mut Random(43), &what);
-    }
-    if h.wants(look) {
-        looking(h, look, &host, &mesh, &what);
-    }
+    h.measure(step, || cancels(&host, || host.step_told(null_mut()), 43, &what));
+    h.measure(look, || looking(&host, &mesh, &what));
 }
 
 /// The look at a step to come, from a mesh.
-fn looking(h: &mut Harness, name: &'static str, host: &Host, mesh: &TriMesh, what: &str) {
+fn looking(host: &Host, mesh: &TriMesh, what: &str) -> (f64, String) {
     let mut shown = vec![[0.0; 3]; mesh.positions.len()];
     works(host.look(&mut shown));
     let is_moved = |(shown, own): &(&[f64; 3], &Vec3)| DVec3::from(**shown) != own.cast::<f64>();
     let moved = shown.iter().zip(&mesh.positions).filter(is_moved).count();
     if moved == 0 {
-        return h.gate(name, f64::NAN, "no vertex is eased");
+        return (f64::NAN, "no vertex is eased".into());
     }
     let what = format!("{what}; it is only looked at, and {moved} vertices are eased");
-    let looking = Looking { host, vertices: mesh.positions.len() };
-    measure(h, name, &looking, &mut Random(44), &what);
+    cancels(host, || host.look(&mut vec![[0.0; 3]; mesh.positions.len()]), 44, &what)
 }

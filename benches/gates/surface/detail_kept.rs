@@ -2,25 +2,18 @@
 //! where the liquid has neither broken nor stretched up to then. Whether it has is read off the particles alone, by their ids, and the
 //! detail off the mesh alone, as what smoothing takes away; neither asks the tracker.
 
-use std::collections::HashMap;
-
 use frazil::Context;
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Params, Particles, Tracker};
 
+use crate::bins::Bins;
 use crate::common::liquids::{Ball, ball, context, numbered, once_around};
 use crate::common::shapes::welded;
 use crate::harness::Harness;
+use crate::scenes::wanted_data;
 use crate::surface::rebuilt_sequences::spot_drop;
 use crate::surface::spot::{detail, neighbours, regression};
 
-/// Correlation of the detail with that of the first frame, and by how much its size is off, on a solver's cache and on a rippled ball.
-const NAMES: [&str; 4] = [
-    "surface.detail_kept_cache",
-    "surface.detail_kept_cache_gain",
-    "surface.detail_kept_turned",
-    "surface.detail_kept_turned_gain",
-];
 /// Least count of particles in a part of the mesh, as scenes have it.
 const MIN_DROP: usize = 8;
 /// Particles within so much of each other at the first frame are neighbours; those farther than this were apart (spacings).
@@ -34,23 +27,21 @@ const AROUND: f64 = 2.0;
 const TURN: usize = 100;
 
 pub fn run(h: &mut Harness) {
-    let wanted = NAMES.map(|name| h.wants(name));
     let ctx = context(2);
-    if wanted[0] || wanted[1] {
-        match spot_drop() {
-            Some(cache) => {
-                let frames: Vec<Particles> = (0..cache.frames).map(|frame| by_id(cache.at(frame))).collect();
-                report(h, [NAMES[0], NAMES[1]], &kept(&ctx, &cache.mesh, &frames, cache.spacing, cache.dt));
-            }
-            None => [NAMES[0], NAMES[1]].into_iter().for_each(|name| h.skipped(name, "no data")),
-        }
+    let names = ["surface.detail_kept_cache", "surface.detail_kept_cache_gain"];
+    if wanted_data(h, &names, "particles/spot_drop/spot.0001.bgeo").is_some() {
+        h.measure_all(names, || {
+            let cache = spot_drop().expect("the data");
+            let frames: Vec<Particles> = (0..cache.frames).map(|frame| by_id(cache.at(frame))).collect();
+            report(&kept(&ctx, &cache.mesh, &frames, cache.spacing, cache.dt))
+        });
     }
-    if wanted[2] || wanted[3] {
+    h.measure_all(["surface.detail_kept_turned", "surface.detail_kept_turned_gain"], || {
         let Ball { spacing, positions, mesh } = ball(8.0, 40, 0.25);
         let at = |frame| numbered(positions.iter().map(|position| once_around(*position, frame)).collect());
         let frames: Vec<Particles> = (0..=TURN).map(at).collect();
-        report(h, [NAMES[2], NAMES[3]], &kept(&ctx, &welded(&mesh), &frames, spacing, 1.0 / 24.0));
-    }
+        report(&kept(&ctx, &welded(&mesh), &frames, spacing, 1.0 / 24.0))
+    });
 }
 
 /// How much of the detail is left in a frame.
@@ -63,7 +54,8 @@ struct Left {
     gain: f64,
 }
 
-fn report(h: &mut Harness, names: [&str; 2], all: &[Left]) {
+/// Correlation of the detail with that of the first frame, and by how much its size is off: the worst frames.
+fn report(all: &[Left]) -> [(f64, String); 2] {
     for (frame, left) in (2..).zip(all).filter(|(frame, _)| frame % 5 == 1) {
         println!(
             "# frame {frame}: the liquid of {:.1} % has kept its shape; of these {:.2} % are there, correlation {:.4}, gain {:.4}",
@@ -74,13 +66,13 @@ fn report(h: &mut Harness, names: [&str; 2], all: &[Left]) {
         );
     }
     let frames = (2..).zip(all);
-    let (frame, worst) =
+    let (at, least) =
         frames.clone().min_by(|a, b| a.1.correlation.total_cmp(&b.1.correlation)).expect("frames");
-    let note = format!("the worst of {} frames: {frame}, {:.2} % are there", all.len(), 100.0 * worst.there);
-    h.gate(names[0], worst.correlation, &note);
+    let note = format!("the worst of {} frames: {at}, {:.2} % are there", all.len(), 100.0 * least.there);
     let off = |left: &Left| (left.gain - 1.0).abs();
-    let (frame, worst) = frames.max_by(|a, b| off(a.1).total_cmp(&off(b.1))).expect("frames");
-    h.gate(names[1], off(worst), &format!("a gain of {:.4} in the worst frame, {frame}", worst.gain));
+    let (at, worst) = frames.max_by(|a, b| off(a.1).total_cmp(&off(b.1))).expect("frames");
+    let of_gain = format!("a gain of {:.4} in the worst frame, {at}", worst.gain);
+    [(least.correlation, note), (off(worst), of_gain)]
 }
 
 /// Particles in the order of their ids.
@@ -165,38 +157,4 @@ fn shaken(
         });
         is_calm[particle] = strain < STRAIN && !is_met;
     }
-}
-
-/// Positions in cubes of an edge (m).
-struct Bins<'a> {
-    edge: f64,
-    positions: &'a [DVec3],
-    bins: HashMap<[i64; 3], Vec<usize>>,
-}
-
-impl<'a> Bins<'a> {
-    fn new(positions: &'a [DVec3], edge: f64) -> Self {
-        let mut bins: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
-        for (at, position) in positions.iter().enumerate() {
-            bins.entry(bin(position, edge)).or_default().push(at);
-        }
-        Self { edge, positions, bins }
-    }
-
-    /// Calls `see` with those within an edge of a position, in a fixed order.
-    fn near(&self, position: &DVec3, mut see: impl FnMut(usize)) {
-        let [x, y, z] = bin(position, self.edge);
-        for n in 0..27 {
-            let at = [x + n / 9 - 1, y + n / 3 % 3 - 1, z + n % 3 - 1];
-            for other in self.bins.get(&at).into_iter().flatten() {
-                if (self.positions[*other] - position).norm() <= self.edge {
-                    see(*other);
-                }
-            }
-        }
-    }
-}
-
-fn bin(position: &DVec3, edge: f64) -> [i64; 3] {
-    [0, 1, 2].map(|axis| (position[axis] / edge).floor() as i64)
 }

@@ -7,12 +7,10 @@ use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Change, Outlook, Particles, Tracker};
 
 use crate::common::liquids::context;
-use crate::harness::Harness;
 use crate::surface::rebuilt_sequences::{Sequence, dambreak, made, spot_drop};
 use crate::surface::windings::depth_and_share;
 use crate::worst::Worst;
 
-const NAMES: [&str; 3] = ["surface.easing_jump", "surface.easing_depth", "surface.easing_volume"];
 /// Frames ahead, as is usual.
 const AHEAD: usize = 4;
 /// Frames of the caches from one look at the lattice to the next.
@@ -37,10 +35,7 @@ struct Shown {
     frames: usize,
 }
 
-pub fn run(h: &mut Harness) {
-    if !NAMES.iter().any(|name| h.wants(name)) {
-        return;
-    }
+pub fn measure() -> [(f64, String); 3] {
     let ctx = context(2);
     let [mut of_made, mut of_caches] = [Jumps::default(), Jumps::default()];
     let mut shown = Shown::default();
@@ -63,16 +58,11 @@ pub fn run(h: &mut Harness) {
     };
     let frames =
         format!("{} frames of {} as they are shown, where that is eased", shown.frames, names.join(", "));
-    let results = [
+    [
         (of_made.eased.value(), format!("of the made sets, {}; {caches}", of_made.told())),
         (shown.depth.value(), format!("{frames}; {}", shown.depth.note())),
         (shown.volume.value(), format!("{frames}; {}", shown.volume.note())),
-    ];
-    for (name, (value, note)) in NAMES.iter().zip(results) {
-        if h.wants(name) {
-            h.gate(name, value, &note);
-        }
-    }
+    ]
 }
 
 /// Lets a mesh follow a sequence, and looks at every so many frames as they are shown.

@@ -9,9 +9,11 @@ use frazil::surface::{Params, Particles, StepReport, Tracker};
 use crate::common::liquids::{
     Ball, Errors, Random, ball, context, filled, follow, numbered, once_around, own_surface, turned,
 };
-use crate::harness::{Harness, median};
+use crate::harness::{Harness, median, spread};
 
 const FRAME: f64 = 1.0 / 24.0;
+/// Phases of a step.
+pub const PHASES: [&str; 4] = ["advect", "phi", "distance", "project"];
 
 pub fn run(h: &mut Harness) {
     known_motions(h);
@@ -64,10 +66,6 @@ fn moved(ball: &Ball, angle: f64, by: DVec3) -> Particles {
 
 /// Nothing moves; particles in another order; one and two threads.
 fn still(h: &mut Harness) {
-    let names = ["surface.still", "surface.order", "surface.same_bytes_threads"];
-    if !names.iter().any(|name| h.wants(name)) {
-        return;
-    }
     let ball = ball(8.0, 30, 0.25);
     let frames = [moved(&ball, 0.0, DVec3::zeros()), moved(&ball, 0.1, DVec3::new(0.02, 0.01, 0.0))];
     let walk = |threads: usize, frames: &[Particles]| {
@@ -79,14 +77,13 @@ fn still(h: &mut Harness) {
         }
         tracker.vertices().to_vec()
     };
-    if h.wants("surface.still") {
-        let [first, _] = &frames;
+    h.measure("surface.still", || {
+        let first = &frames[0];
         let rested = walk(2, &[first.clone(), first.clone(), first.clone()]);
         let begun: Vec<DVec3> = ball.mesh.positions.iter().map(|position| position.cast()).collect();
-        h.holds("surface.still", rested == begun, "two frames of the same particles");
-    }
-    let two = walk(2, &frames);
-    if h.wants("surface.order") {
+        (rested == begun, "two frames of the same particles")
+    });
+    h.measure("surface.order", || {
         let turned = frames.each_ref().map(|frame| {
             let mut frame = frame.clone();
             frame.positions.reverse();
@@ -95,11 +92,9 @@ fn still(h: &mut Harness) {
             frame.ids.rotate_left(11);
             frame
         });
-        h.holds("surface.order", walk(2, &turned) == two, "particles from the last to the first");
-    }
-    if h.wants("surface.same_bytes_threads") {
-        h.holds("surface.same_bytes_threads", walk(1, &frames) == two, "1 and 2 threads");
-    }
+        (walk(2, &turned) == walk(2, &frames), "particles from the last to the first")
+    });
+    h.measure("surface.same_bytes_threads", || (walk(1, &frames) == walk(2, &frames), "1 and 2 threads"));
 }
 
 /// The same liquid 1 km from the origin, its particles in 32 bits as files hold them.
@@ -156,8 +151,8 @@ fn pool() -> [(f64, &'static str); 2] {
         ways.extend(tracker.vertices().iter().zip(&before).map(|(a, b)| (a - b).norm() / ball.spacing));
         from = to;
     }
-    ways.sort_unstable_by(f64::total_cmp);
-    [(ways.iter().sum::<f64>() / ways.len() as f64, "20 frames"), (ways[ways.len() * 95 / 100], "20 frames")]
+    let [mean, p95, _] = spread(ways);
+    [(mean, "20 frames"), (p95, "20 frames")]
 }
 
 /// Where the surface of a half-space lies above its outermost particles.
@@ -172,30 +167,28 @@ fn half_space() -> (f64, &'static str) {
 
 /// Times of the phases, on one thread, with as many particles and triangles as the thesis' dragon and its falling objects.
 fn speed(h: &mut Harness) {
-    let phases = ["advect", "phi", "distance", "project"];
-    let names = phases.map(|phase| format!("surface.time_{phase}"));
     let cpu = frazil::numeric::cpu::cpu_level();
-    if names.iter().any(|name| h.wants(name)) {
+    let names = PHASES.map(|phase| format!("surface.time_{phase}"));
+    h.measure_all(names, || {
         let reports = steps(&context(1), &ball(17.0, 146, 0.25));
-        for ((name, phase), thesis) in names.iter().zip(phases).zip([1.17, 3.01, 1.39, 1.24]) {
-            if h.wants(name) {
-                let note = format!("threads=1 cpu={cpu:?} thesis={thesis} s");
-                h.gate(name, median(reports.iter().map(|(_, report)| time(report, phase)).collect()), &note);
-            }
-        }
-    }
-    if h.wants("surface.time_260k") {
+        let times =
+            PHASES.map(|phase| median(reports.iter().map(|(_, report)| time(report, phase)).collect()));
+        let note = |thesis: f64| format!("threads=1 cpu={cpu:?} thesis={thesis} s");
+        let [advect, phi, distance, project] = times;
+        [(advect, note(1.17)), (phi, note(3.01)), (distance, note(1.39)), (project, note(1.24))]
+    });
+    h.measure("surface.time_260k", || {
         let reports = steps(&context(1), &ball(39.5, 176, 0.25));
-        let each = |(_, report): &(f64, StepReport)| phases.iter().map(|phase| time(report, phase)).sum();
+        let each = |(_, report): &(f64, StepReport)| PHASES.iter().map(|phase| time(report, phase)).sum();
         let note = format!("threads=1 cpu={cpu:?} thesis=48 s without meshing");
-        h.gate("surface.time_260k", median(reports.iter().map(each).collect()), &note);
-    }
-    if h.wants("surface.threads") {
+        (median(reports.iter().map(each).collect()), note)
+    });
+    h.measure("surface.threads", || {
         let ball = ball(39.5, 176, 0.25);
         let [one, two] = [1, 2]
             .map(|threads| median(steps(&context(threads), &ball).iter().map(|(time, _)| *time).collect()));
-        h.gate("surface.threads", one / two, &format!("{one:.2} s and {two:.2} s"));
-    }
+        (one / two, format!("{one:.2} s and {two:.2} s"))
+    });
 }
 
 /// Wall clock and report of five steps, after one that warms up.

@@ -4,27 +4,22 @@ use frazil::geometry::DVec3;
 use frazil::surface::{Matching, Node, Solver, match_topology};
 
 use crate::common::liquids::context;
-use crate::harness::Harness;
 
-const NAMES: [&str; 2] = ["surface.match_near", "surface.match_neck"];
 /// How far the grid of two balls reaches from the origin on each axis (cells).
-const HALF: [i32; 3] = [26, 18, 18];
+pub const HALF: [i32; 3] = [26, 18, 18];
 /// How far from flagged nodes a tracker's Gamma may change (cells).
-const REACH: i32 = 8;
+pub const REACH: i32 = 8;
 /// Change of psi at which a solution ends (cells): its residual is then less than [`SOLVED`].
 const TOLERANCE: f64 = 1e-8;
 const SOLVED: f64 = 1e-6;
 /// By how much Gamma may differ at flagged nodes (cells).
 const APART: f32 = 0.1;
 
-pub fn run(h: &mut Harness) {
-    if !NAMES.iter().any(|name| h.wants(name)) {
-        return;
-    }
+pub fn measure() -> [(f64, String); 2] {
     let ctx = context(2);
     let (mut is_same, mut far, mut residual, mut worst) = (true, 0.0f32, 0.0f64, 0.0f64);
     for (shift, solver) in [(0.0, Solver::Sor), (1.0, Solver::Gradients)] {
-        let nodes = balls(shift);
+        let nodes = balls(1, shift);
         let [near, whole] = [REACH, i32::MAX].map(|reach| {
             let matching = Matching { solver, tolerance: TOLERANCE, reach, most: 5000, omega: None };
             match_topology(&ctx, &nodes, &matching).expect("a matching")
@@ -43,12 +38,8 @@ pub fn run(h: &mut Harness) {
         worst = worst.max(100.0 * (neck[0] / neck[1] - 1.0).abs());
     }
     let note = format!("at flagged nodes {far:.4} cells apart at most; residual {residual:.1e} cells");
-    if h.wants(NAMES[0]) {
-        h.holds(NAMES[0], is_same && far <= APART && residual <= SOLVED, &note);
-    }
-    if h.wants(NAMES[1]) {
-        h.gate(NAMES[1], worst, &note);
-    }
+    let is_near = is_same && far <= APART && residual <= SOLVED;
+    [(f64::from(is_near), note.clone()), (worst, note)]
 }
 
 /// How much of the cube around a node is inside, about.
@@ -56,20 +47,21 @@ fn share(gamma: f32) -> f64 {
     f64::from(0.5 - gamma).clamp(0.0, 1.0)
 }
 
-/// Nodes around two balls with a radius of 8 and 1.5 between them. For phi they lie `shift` farther along y, and a neck has grown
-/// between them; flagged within 7 of the gap.
-fn balls(shift: f64) -> Vec<Node> {
+/// Nodes around two balls with a radius of 8 and 1.5 between them, on cells `scale` times smaller. For phi they lie `shift` farther along
+/// y, and a neck has grown between them; flagged within 7 of the gap.
+pub fn balls(scale: i32, shift: f64) -> Vec<Node> {
+    let cell = 1.0 / f64::from(scale);
     let node = |position: [i32; 3]| {
-        let at = DVec3::from(position.map(f64::from));
+        let at = DVec3::from(position.map(f64::from)) * cell;
         let ball = |side: f64, shift: f64| (at - DVec3::new(side * 8.75, shift, 0.0)).norm() - 8.0;
         let (a, b) = (ball(-1.0, shift), ball(1.0, shift));
         // Smooth minimum.
         let near = (6.0 - (a - b).abs()).max(0.0) / 6.0;
-        let phi = a.min(b) - near * near * 1.5;
-        let gamma = ball(-1.0, 0.0).min(ball(1.0, 0.0));
+        let phi = (a.min(b) - near * near * 1.5) / cell;
+        let gamma = ball(-1.0, 0.0).min(ball(1.0, 0.0)) / cell;
         let is_flagged = at.norm() <= 7.0;
         Node { position, gamma: gamma.clamp(-4.0, 4.0) as f32, phi: phi.clamp(-5.0, 5.0) as f32, is_flagged }
     };
-    let on = |axis: usize| -HALF[axis]..=HALF[axis];
+    let on = |axis: usize| -HALF[axis] * scale..=HALF[axis] * scale;
     on(0).flat_map(|x| on(1).flat_map(move |y| on(2).map(move |z| [x, y, z]))).map(node).collect()
 }

@@ -91,7 +91,7 @@ fn same(h: &mut Harness) {
         let _ = std::fs::remove_file(records);
     }
     let note = format!("{} files, {count} particles {}", files.len(), wrong.join("; "));
-    h.holds(SAME, wrong.is_empty(), note.trim());
+    h.gate(SAME, wrong.is_empty(), note.trim());
 }
 
 /// A file of particles as another that the command writes.

@@ -33,7 +33,7 @@ const OF_ALL: &[&str] = &[
     "surface.rebuilt_valid",
     "surface.rebuilt_cells_median",
     "surface.rebuilt_cells_p99",
-    "surface.rebuilt_rungs",
+    "surface.rebuilt_levels",
 ];
 /// Of all sequences, on the lattice.
 const OF_LATTICE: &[&str] = &["surface.rebuilt_winding_depth", "surface.rebuilt_winding_volume"];

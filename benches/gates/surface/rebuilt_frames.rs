@@ -93,12 +93,12 @@ pub struct Step {
 
 pub fn run(h: &mut Harness) {
     for (name, scene, thesis) in EXAMPLES {
-        if h.wants(name) {
+        h.measure(name, || {
             let ctx = context(1);
             let scene = scene(&ctx);
             let (seconds, note) = scene.told(&scene.follow(&ctx, params()));
-            h.gate(name, seconds, &format!("{note} thesis={thesis} s"));
-        }
+            (seconds, format!("{note} thesis={thesis} s"))
+        });
     }
     h.measure("surface.match_fine", fine);
 }

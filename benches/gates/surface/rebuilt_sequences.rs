@@ -1,11 +1,7 @@
 //! Liquids that merge and split: the caches of a solver and the made sets, and a mesh that follows them and is rebuilt.
 
-use std::path::Path;
-
 use frazil::Context;
-use frazil::geometry::TriMesh;
-use frazil::geometry::points::Values;
-use frazil::io::particles;
+use frazil::geometry::{DVec3, TriMesh};
 use frazil::surface::{Params, Particles, StepReport, Tracker};
 
 use crate::common::character::data;
@@ -48,6 +44,33 @@ pub struct Sequence {
 }
 
 impl Sequence {
+    /// One with 24 frames a second, from frame 0 on.
+    fn new(
+        name: &'static str,
+        spacing: f64,
+        frames: usize,
+        mesh: TriMesh,
+        particles: impl Fn(usize) -> Particles + 'static,
+    ) -> Self {
+        let particles = Box::new(particles);
+        Self { name, first: 0, spacing, dt: 1.0 / FPS, frames, mesh, every: false, particles }
+    }
+
+    /// A liquid of one frame, at rest.
+    pub fn at_rest(name: &'static str, spacing: f64, mesh: TriMesh, positions: Vec<DVec3>) -> Self {
+        Self::new(name, spacing, 1, mesh, move |_| numbered(positions.clone()))
+    }
+
+    /// A made set for so many frames, with its particles' own surface at the first one; it stays as it is at frame `last`.
+    fn of(ctx: &Context, set: Set, frames: usize, last: usize) -> Self {
+        let Set { name, positions, motion } = set;
+        let at = move |frame: usize| {
+            let passed = frame.min(last) as f64;
+            numbered(positions.iter().map(|position| motion(*position, passed) * SPACING).collect())
+        };
+        Self::new(name, SPACING, frames, own_surface(ctx, &at(0).positions, SPACING), at)
+    }
+
     /// The particles of a frame, counted from 0.
     pub fn at(&self, frame: usize) -> Particles {
         (self.particles)(frame)
@@ -73,84 +96,29 @@ pub fn spot_drop() -> Option<Sequence> {
     let first = spot::first()?;
     let mesh = spot::sculpted(&first);
     let at = move |frame: usize| spot::particles_at(&first, frame as i32 + 1);
-    Some(Sequence {
-        name: "spot_drop",
-        first: 1,
-        spacing: spot::SPACING,
-        dt: 1.0 / spot::FPS,
-        frames: spot::FRAMES as usize,
-        mesh,
-        every: false,
-        particles: Box::new(at),
-    })
+    let sequence = Sequence::new("spot_drop", spot::SPACING, spot::FRAMES as usize, mesh, at);
+    Some(Sequence { first: 1, dt: 1.0 / spot::FPS, ..sequence })
 }
 
 /// `dambreak` with its particles' own surface at the first frame, if the data is there.
 pub fn dambreak(ctx: &Context) -> Option<Sequence> {
     let first = data("particles/dambreak/dambreak.0001.bgeo")?;
-    let at = move |frame: usize| cached(&first.with_file_name(format!("dambreak.{:04}.bgeo", frame + 1)));
-    Some(Sequence {
-        name: "dambreak",
-        first: 1,
-        spacing: DAM_SPACING,
-        dt: 1.0 / DAM_FPS,
-        frames: DAM_FRAMES,
-        mesh: own_surface(ctx, &at(0).positions, DAM_SPACING),
-        every: false,
-        particles: Box::new(at),
-    })
+    let at = move |frame: usize| spot::read(&first.with_file_name(format!("dambreak.{:04}.bgeo", frame + 1)));
+    let mesh = own_surface(ctx, &at(0).positions, DAM_SPACING);
+    let sequence = Sequence::new("dambreak", DAM_SPACING, DAM_FRAMES, mesh, at);
+    Some(Sequence { first: 1, dt: 1.0 / DAM_FPS, ..sequence })
 }
 
-/// The made sets, with their particles' own surface at the first frame: two balls, a dumbbell, a sheet, a bubble.
+/// The made sets: two balls, a dumbbell, a sheet, a bubble.
 pub fn made(ctx: &Context) -> Vec<Sequence> {
-    let one = |(set, frames): (Set, usize)| {
-        let Set { name, positions, motion } = set;
-        let at = move |frame: usize| {
-            numbered(positions.iter().map(|position| motion(*position, frame as f64) * SPACING).collect())
-        };
-        let mesh = own_surface(ctx, &at(0).positions, SPACING);
-        Sequence {
-            name,
-            first: 0,
-            spacing: SPACING,
-            dt: 1.0 / FPS,
-            frames,
-            mesh,
-            every: false,
-            particles: Box::new(at),
-        }
-    };
+    let one = |(set, frames)| Sequence::of(ctx, set, frames, usize::MAX);
     sets().into_iter().zip(FRAMES).map(one).collect()
 }
 
 /// The two balls of the made sets, which stay where they are when their particles have met: from then on they are one liquid.
 pub fn joined(ctx: &Context) -> Sequence {
-    let [Set { positions, motion, .. }, ..] = sets();
-    let at = move |frame: usize| {
-        let passed = frame.min(MET) as f64;
-        numbered(positions.iter().map(|position| motion(*position, passed) * SPACING).collect())
-    };
-    let mesh = own_surface(ctx, &at(0).positions, SPACING);
-    Sequence {
-        name: "two balls join",
-        first: 0,
-        spacing: SPACING,
-        dt: 1.0 / FPS,
-        frames: MET + 10,
-        mesh,
-        every: false,
-        particles: Box::new(at),
-    }
-}
-
-fn cached(path: &Path) -> Particles {
-    let cloud = particles::read(path).expect("particles");
-    let ids = match cloud.attribute("id") {
-        Some(Values::Long(column)) => (0..cloud.positions.len()).map(|n| column.get(n)).collect(),
-        Some(Values::Int(column)) => (0..cloud.positions.len()).map(|n| column.get(n).into()).collect(),
-        _ => panic!("the particles have no ids"),
-    };
-    Particles { ids, positions: cloud.positions, velocities: Vec::new() }
+    let [balls, ..] = sets();
+    Sequence::of(ctx, Set { name: "two balls join", ..balls }, MET + 10, MET)
 }
 
 /// A frame of a mesh that follows a liquid.

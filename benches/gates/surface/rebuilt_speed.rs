@@ -33,15 +33,17 @@ const COMPARED: usize = 20;
 const RESUMED: usize = 10;
 
 pub fn run(h: &mut Harness) {
-    rebuilding(h);
-    merge(h);
+    if h.wants("surface.rebuild_time") {
+        rebuilding(h);
+    }
+    h.measure("surface.frame_dragon", merge);
     threads(h);
 }
 
 /// A ball whose mesh is closed by index.
 fn closed_ball((radius, n, detail): (f64, usize, f64)) -> Ball {
-    let Ball { spacing, positions, mesh } = ball(radius, n, detail);
-    Ball { spacing, positions, mesh: welded(&mesh) }
+    let ball = ball(radius, n, detail);
+    Ball { mesh: welded(&ball.mesh), ..ball }
 }
 
 fn params(spacing: f64) -> Params {
@@ -50,39 +52,23 @@ fn params(spacing: f64) -> Params {
 
 /// The phases that rebuild and improve alone.
 fn rebuilding(h: &mut Harness) {
-    let names = ["surface.rebuild_time_0", "surface.rebuild_time_2", "surface.rebuild_time_20"];
-    if !names.iter().any(|name| h.wants(name)) {
-        return;
-    }
     let (ctx, dragon) = (context(1), closed_ball(DRAGON));
-    let note = format!(
-        "{} triangles, threads=1 cpu={:?} thesis=3.16 s",
-        dragon.mesh.triangles.len(),
-        frazil::numeric::cpu::cpu_level()
-    );
-    if h.wants(names[0]) {
-        let reports: Vec<StepReport> = steps_with(&ctx, &dragon, params(dragon.spacing), STEPS)
-            .into_iter()
-            .map(|(_, report)| report)
-            .collect();
-        let flagged: usize = reports
-            .iter()
-            .filter_map(|report| report.change.as_ref())
-            .map(|change| change.flagged_cells)
-            .sum();
-        let of_phases = of_phases(&reports);
-        h.gate(names[0], middle(&reports), &format!("{of_phases}; {flagged} cells flagged; {note}"));
-    }
-    for (name, share) in [(names[1], 0.02), (names[2], 0.2)] {
-        if h.wants(name) {
+    let triangles = dragon.mesh.triangles.len();
+    let cpu = frazil::numeric::cpu::cpu_level();
+    let note = format!("{triangles} triangles, threads=1 cpu={cpu:?} thesis=3.16 s");
+    h.measure("surface.rebuild_time_0", || {
+        let steps = steps_with(&ctx, &dragon, params(dragon.spacing), STEPS);
+        let reports: Vec<StepReport> = steps.into_iter().map(|(_, report)| report).collect();
+        let changes = reports.iter().filter_map(|report| report.change.as_ref());
+        let flagged: usize = changes.map(|change| change.flagged_cells).sum();
+        (middle(&reports), format!("{}; {flagged} cells flagged; {note}", of_phases(&reports)))
+    });
+    for (name, share) in [("surface.rebuild_time_2", 0.02), ("surface.rebuild_time_20", 0.2)] {
+        h.measure(name, || {
             let reports = without_a_layer(&ctx, &dragon, share);
-            let Some(change) = &reports[0].change else {
-                h.gate(name, f64::NAN, "nothing was flagged");
-                continue;
-            };
+            let Some(change) = &reports[0].change else { return (f64::NAN, "nothing was flagged".into()) };
             let all = cells(&dragon.mesh, CELL * dragon.spacing);
             let whole = change.sources.iter().filter(|source| matches!(source, Source::Whole(_))).count();
-            let triangles = dragon.mesh.triangles.len();
             let what = format!(
                 "{}; {:.1} % of {all} cells flagged, {} rebuilt, rung {}; {:.1} % of the triangles became {}; {note}",
                 of_phases(&reports),
@@ -92,8 +78,8 @@ fn rebuilding(h: &mut Harness) {
                 100.0 * (triangles - whole) as f64 / triangles as f64,
                 change.made_triangles()
             );
-            h.gate(name, middle(&reports), &what);
-        }
+            (middle(&reports), what)
+        });
     }
 }
 
@@ -151,11 +137,7 @@ fn cells(mesh: &TriMesh, edge: f64) -> usize {
 }
 
 /// The whole step, while a drop merges with a large ball.
-fn merge(h: &mut Harness) {
-    let name = "surface.frame_dragon";
-    if !h.wants(name) {
-        return;
-    }
+fn merge() -> (f64, String) {
     let (ctx, dragon, drop) = (context(1), closed_ball(DRAGON), closed_ball((DROP.0, DROP.1, 0.0)));
     let spacing = dragon.spacing;
     let by = |frame: usize| DVec3::new(0.0, (BEGIN - WAY * frame as f64) * spacing, 0.0);
@@ -183,7 +165,7 @@ fn merge(h: &mut Harness) {
         }
     }
     if seconds.is_empty() {
-        return h.gate(name, f64::NAN, "nothing merged");
+        return (f64::NAN, "nothing merged".into());
     }
     let note = format!(
         "{} steps of {FRAMES} with {} cells flagged each, rebuilding {:.2} s of it; {} particles, {} triangles, threads=1 cpu={:?} \
@@ -195,7 +177,7 @@ fn merge(h: &mut Harness) {
         mesh.triangles.len(),
         frazil::numeric::cpu::cpu_level()
     );
-    h.gate(name, median(seconds), &note);
+    (median(seconds), note)
 }
 
 /// The first frames of `spot_drop` on one and two threads, and resumed.
@@ -239,20 +221,20 @@ fn threads(h: &mut Harness) {
             resumed = Tracker::resume(sequence.params(), &sequence.mesh, &saved).ok();
         }
     }
-    if h.wants(gain) {
+    h.measure(gain, || {
         let [one, two] = seconds;
         let note = format!(
             "{one:.2} s and {two:.2} s, {} changes in {} steps alone, without easing, arrays and files",
             changes / 2,
             COMPARED - 1
         );
-        h.gate(gain, one / two, &note);
-    }
-    if h.wants(same) {
+        (one / two, note)
+    });
+    h.measure(same, || {
         let note = match others.first() {
             Some(first) => format!("{} differ, the first is {first}", others.len()),
             None => format!("{COMPARED} frames on 1 and 2 threads, and resumed after step {RESUMED}"),
         };
-        h.holds(same, others.is_empty() && resumed.is_some(), &note);
-    }
+        (others.is_empty() && resumed.is_some(), note)
+    });
 }

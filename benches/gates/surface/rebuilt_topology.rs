@@ -14,8 +14,6 @@ use crate::surface::rebuilt::unsound;
 use crate::surface::rebuilt_sequences::{Frame, made, walk};
 use crate::surface::windings::part_volume;
 
-const NAMES: [&str; 3] = ["surface.rebuilt_topology", "surface.rebuilt_late", "surface.rebuilt_edits"];
-const EVERY: &str = "surface.every_valid";
 /// For so many frames the particles' own surface must stay what it has become, so that the mesh must become it.
 const KEPT: usize = 3;
 
@@ -57,15 +55,13 @@ impl std::fmt::Display for Kind {
 }
 
 pub fn run(h: &mut Harness) {
-    followed(h);
-    matched_in_every_step(h);
+    let names = ["surface.rebuilt_topology", "surface.rebuilt_late", "surface.rebuilt_edits"];
+    h.measure_all(names, followed);
+    h.measure("surface.every_valid", matched_in_every_step);
 }
 
 /// The mesh as it is usually matched.
-fn followed(h: &mut Harness) {
-    if !NAMES.iter().any(|name| h.wants(name)) {
-        return;
-    }
+fn followed() -> [(f64, String); 3] {
     let ctx = context(2);
     let (mut are_true, mut latest, mut fault, mut changes, mut left) = (true, 0, None, 0, [0; 2]);
     for (sequence, truth) in made(&ctx).iter().zip(TRUTH) {
@@ -112,23 +108,20 @@ fn followed(h: &mut Harness) {
             latest = latest.max(sequence.frames);
         }
     }
-    if h.wants(NAMES[0]) {
-        h.holds(NAMES[0], are_true, "balls, dumbbell, sheet, bubble: parts, cavities and handles at the end");
-    }
-    if h.wants(NAMES[1]) {
-        h.gate(NAMES[1], latest as f64, "the worst of the made sets");
-    }
-    if h.wants(NAMES[2]) {
-        let [vertices, triangles] = left;
-        let is_right = fault.is_none() && changes > 0 && vertices > 0 && triangles > 0;
-        let note = fault.unwrap_or_else(|| {
-            format!(
-                "{changes} changes, one by one and together; at the end {vertices} vertices and {triangles} triangles are left, with the \
-                 numbers that they carried along"
-            )
-        });
-        h.holds(NAMES[2], is_right, &note);
-    }
+    let [vertices, triangles] = left;
+    let is_right = fault.is_none() && changes > 0 && vertices > 0 && triangles > 0;
+    let of_edits = fault.unwrap_or_else(|| {
+        format!(
+            "{changes} changes, one by one and together; at the end {vertices} vertices and {triangles} triangles are left, with the \
+             numbers that they carried along"
+        )
+    });
+    let of_ends = "balls, dumbbell, sheet, bubble: parts, cavities and handles at the end".into();
+    [
+        (f64::from(are_true), of_ends),
+        (latest as f64, "the worst of the made sets".into()),
+        (f64::from(is_right), of_edits),
+    ]
 }
 
 /// A mesh whose first vertices and triangles carry their own numbers.
@@ -171,10 +164,7 @@ impl Numbers {
 }
 
 /// The mesh with its topology matched all over it in every step.
-fn matched_in_every_step(h: &mut Harness) {
-    if !h.wants(EVERY) {
-        return;
-    }
+fn matched_in_every_step() -> (f64, String) {
     let ctx = context(2);
     let (mut frames, mut faults, mut ends) = (0, 0, Vec::new());
     for (mut sequence, truth) in made(&ctx).into_iter().zip(TRUTH) {
@@ -202,7 +192,7 @@ fn matched_in_every_step(h: &mut Harness) {
         ends.push(format!("{} {end}", sequence.name));
     }
     let note = format!("of {frames}; at the end: {}", ends.join("; "));
-    h.gate(EVERY, if frames > 0 { faults as f64 } else { f64::NAN }, &note);
+    (if frames > 0 { faults as f64 } else { f64::NAN }, note)
 }
 
 /// The frames at which a surface changes into what it stays for [`KEPT`] frames or more, and how many frames later the mesh is that:

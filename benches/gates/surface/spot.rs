@@ -13,9 +13,10 @@ use frazil::surface::{Params, Particles, Tracker};
 use crate::common::character::output;
 use crate::common::liquids::{context, surface_on};
 use crate::common::nearest::distances;
-use crate::common::spot::{self, FPS, FRAMES, SPACING, particles_at};
+use crate::common::spot::{FPS, FRAMES, SPACING, particles_at};
 use crate::harness::{Harness, timed};
 use crate::process::{frazil, quiet, works};
+use crate::scenes::wanted_data;
 use crate::snow::grains::passes::kill;
 
 /// Frames whose particles' surface is triangulated on a quarter of the spacing.
@@ -23,38 +24,23 @@ const LOOKED_AT: [i32; 6] = [1, 3, 4, 11, 26, 41];
 /// Rounds of smoothing that take the sculpted detail away.
 const ROUNDS: usize = 20;
 
-const NAMES: [&str; 10] = [
-    "surface.spot_off_surface",
-    "surface.spot_detail",
-    "surface.spot_gain",
-    "surface.spot_flagged_before",
-    "surface.spot_flagged",
-    "surface.spot_volume",
-    "surface.velocity",
-    "surface.arrays_kept",
-    "surface.same_bytes_kill",
-    "surface.same_bytes_cpu",
-];
-
 pub fn run(h: &mut Harness) {
-    if !NAMES.iter().any(|name| h.wants(name)) {
-        return;
-    }
-    let Some(first) = spot::first() else {
-        NAMES.into_iter().for_each(|name| h.skipped(name, "no data"));
-        return;
-    };
+    let of_shape = ["off_surface", "detail", "gain", "flagged_before", "flagged", "volume"];
+    let of_shape = of_shape.map(|name| format!("surface.spot_{name}"));
+    let of_arrays = ["surface.velocity", "surface.arrays_kept"];
+    let of_bytes @ [kill, cpu] = ["surface.same_bytes_kill", "surface.same_bytes_cpu"];
+    let names: Vec<&str> = of_shape.iter().map(String::as_str).chain(of_arrays).chain(of_bytes).collect();
+    let Some(first) = wanted_data(h, &names, "particles/spot_drop/spot.0001.bgeo") else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let spot = Spot { cache: first.with_file_name("spot.%04d.bgeo"), folder: folder.path().to_path_buf() };
     let own = spot.write_mesh(&first.with_file_name("spot_detail.ply"));
     let (took, noisy) = timed(|| works(&mut spot.pass("once", 2)));
     println!("# {FRAMES} frames in {took:.1} s, with files{noisy}");
-    if NAMES[..8].iter().any(|name| h.wants(name)) {
-        let frames: Vec<DetailedMesh> = (1..=FRAMES).map(|frame| spot.frame("once", frame)).collect();
-        shape(h, &spot, &frames);
-        carried(h, &own, &frames);
-    }
-    same_bytes(h, &spot, took);
+    let frames: Vec<DetailedMesh> = (1..=FRAMES).map(|frame| spot.frame("once", frame)).collect();
+    h.measure_all(of_shape, || shape(&spot, &frames));
+    h.measure_all(of_arrays, || carried(&own, &frames));
+    h.measure(kill, || spot.is_same_after_kills(took));
+    h.measure(cpu, || (spot.is_same_at_levels(&frames[..12]), "baseline and avx2, 12 frames"));
 }
 
 /// The cache, and where its shots go.
@@ -106,6 +92,26 @@ impl Spot {
         mesh::read_detailed(&path).expect("a frame")
     }
 
+    /// Whether files are the same after kills, on one and two threads, where a pass takes a time (s).
+    fn is_same_after_kills(&self, took: f64) -> (bool, String) {
+        let files = |out: &str| output(&self.folder.join(out));
+        let made = || std::fs::read_dir(self.folder.join("killed/surface")).map_or(0, |files| files.count());
+        let kills =
+            kill(|threads| self.pass("killed", threads), 0.25 * took, || Some(made()).filter(|n| *n > 0));
+        works(&mut self.pass("killed", 2));
+        let is_same = files("once") == files("killed") && kills.len() > 2;
+        (is_same, format!("after kills at frames {kills:?}; 1 and 2 threads"))
+    }
+
+    /// Whether other CPU levels make the same first frames.
+    fn is_same_at_levels(&self, once: &[DetailedMesh]) -> bool {
+        let frames = format!("1-{}", once.len());
+        ["baseline", "avx2"].iter().all(|level| {
+            works(self.pass(level, 2).env("FRAZIL_CPU", level).args(["--frames", &frames]));
+            (1..).zip(once).all(|(frame, own)| self.frame(level, frame) == *own)
+        })
+    }
+
     fn particles(&self, frame: i32) -> Particles {
         particles_at(&self.cache, frame)
     }
@@ -135,7 +141,7 @@ fn is_flagged(mesh: &DetailedMesh) -> Vec<bool> {
 }
 
 /// Distance to the surface, detail, flags and volume.
-fn shape(h: &mut Harness, spot: &Spot, frames: &[DetailedMesh]) {
+fn shape(spot: &Spot, frames: &[DetailedMesh]) -> [(f64, String); 6] {
     let ctx = context(2);
     let counts: Vec<usize> =
         frames.iter().map(|frame| is_flagged(frame).iter().filter(|flag| **flag).count()).collect();
@@ -162,7 +168,6 @@ fn shape(h: &mut Harness, spot: &Spot, frames: &[DetailedMesh]) {
         off.push(of_frame[of_frame.len() * 95 / 100]);
     }
     let worst = off.iter().copied().fold(0.0, f64::max);
-    h.gate(NAMES[0], worst, &format!("the worst of frames {LOOKED_AT:?}: {off:.4?}"));
 
     let around = neighbours(&frames[0].mesh);
     let before = detail(&frames[0].mesh, &around);
@@ -180,23 +185,27 @@ fn shape(h: &mut Harness, spot: &Spot, frames: &[DetailedMesh]) {
             gain = slope;
         }
     }
-    h.gate(NAMES[1], correlation, &format!("the worst of frames 2 to {last}"));
-    h.gate(NAMES[2], (gain - 1.0).abs(), &format!("a gain of {gain:.4} in the worst frame"));
 
     let share = |counts: &[usize]| {
         100.0 * counts.iter().sum::<usize>() as f64 / (counts.len() * frames[0].mesh.positions.len()) as f64
     };
-    h.gate(NAMES[3], share(&counts[..last as usize]), &format!("frames 1 to {last}"));
-    h.gate(NAMES[4], share(&counts), &format!("at most {} vertices", counts.iter().max().expect("frames")));
 
     let ratio = |frame: i32| frames[frame as usize - 1].mesh.volume() / spot.phi(&ctx, frame, 0.5).volume();
     let begin = ratio(1);
     let drift = (2..=first_flag).map(|frame| 100.0 * (ratio(frame) / begin - 1.0).abs()).fold(0.0, f64::max);
-    h.gate(NAMES[5], drift, &format!("frames 2 to {first_flag}, before the first flag"));
+    let flagged = counts.iter().max().expect("frames");
+    [
+        (worst, format!("the worst of frames {LOOKED_AT:?}: {off:.4?}")),
+        (correlation, format!("the worst of frames 2 to {last}")),
+        ((gain - 1.0).abs(), format!("a gain of {gain:.4} in the worst frame")),
+        (share(&counts[..last as usize]), format!("frames 1 to {last}")),
+        (share(&counts), format!("at most {flagged} vertices")),
+        (drift, format!("frames 2 to {first_flag}, before the first flag")),
+    ]
 }
 
 /// Velocities against the next frame's positions, and what the mesh carries.
-fn carried(h: &mut Harness, own: &DetailedMesh, frames: &[DetailedMesh]) {
+fn carried(own: &DetailedMesh, frames: &[DetailedMesh]) -> [(f64, &'static str); 2] {
     let mut most = 0.0f64;
     for pair in frames.windows(2) {
         let speed = ["vx", "vy", "vz"].map(|name| array(&pair[0], name));
@@ -206,42 +215,16 @@ fn carried(h: &mut Harness, own: &DetailedMesh, frames: &[DetailedMesh]) {
             most = most.max((position.cast::<f64>() + by - next).norm() / SPACING);
         }
     }
-    h.gate(NAMES[6], most, "all vertices of all frames, places and velocities in 32 bits");
     let is_kept = |frame: &DetailedMesh| {
         frame.uvs == own.uvs
             && frame.mesh.triangles == own.mesh.triangles
             && own.arrays.iter().all(|array| frame.arrays.contains(array))
     };
-    h.holds(
-        NAMES[7],
-        frames.iter().all(is_kept),
-        "texture coordinates with seams, arrays of vertices, faces and corners",
-    );
-}
-
-/// The same bytes after kills, on one and two threads, and at other CPU levels.
-fn same_bytes(h: &mut Harness, spot: &Spot, took: f64) {
-    let files = |out: &str| output(&spot.folder.join(out));
-    if h.wants(NAMES[8]) {
-        let made = || std::fs::read_dir(spot.folder.join("killed/surface")).map_or(0, |files| files.count());
-        let kills =
-            kill(|threads| spot.pass("killed", threads), 0.25 * took, || Some(made()).filter(|n| *n > 0));
-        works(&mut spot.pass("killed", 2));
-        let note = format!("after kills at frames {kills:?}; 1 and 2 threads");
-        h.holds(NAMES[8], files("once") == files("killed") && kills.len() > 2, &note);
-    }
-    if h.wants(NAMES[9]) {
-        let levels = ["baseline", "avx2"];
-        let all: Vec<_> = levels
-            .iter()
-            .map(|level| {
-                works(spot.pass(level, 2).env("FRAZIL_CPU", level).args(["--frames", "1-12"]));
-                (1..=12).map(|frame| spot.frame(level, frame)).collect::<Vec<_>>()
-            })
-            .collect();
-        let once: Vec<_> = (1..=12).map(|frame| spot.frame("once", frame)).collect();
-        h.holds(NAMES[9], all.iter().all(|frames| *frames == once), "baseline and avx2, 12 frames");
-    }
+    let are_kept = f64::from(frames.iter().all(is_kept));
+    [
+        (most, "all vertices of all frames, places and velocities in 32 bits"),
+        (are_kept, "texture coordinates with seams, arrays of vertices, faces and corners"),
+    ]
 }
 
 /// Vertices that share an edge with each.

@@ -148,6 +148,7 @@ impl Truth {
 }
 
 /// A mesh with a texture, as it goes on.
+#[derive(Default)]
 struct Sheet {
     name: &'static str,
     first: DetailedMesh,
@@ -188,13 +189,7 @@ impl Sheet {
             traced: first.clone(),
             before: first.clone(),
             first,
-            of_before: Sums::default(),
-            rebuilt: 0,
-            marked: 0,
-            frames: 0,
-            all: Sums::default(),
-            made: Sums::default(),
-            last: Sums::default(),
+            ..Self::default()
         }
     }
 

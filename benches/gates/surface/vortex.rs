@@ -11,7 +11,7 @@ use frazil::surface::{Params, Particles, Tracker};
 use crate::common::liquids::{context, numbered};
 use crate::common::made_sets::Vortex;
 use crate::common::shapes::welded;
-use crate::harness::Harness;
+use crate::harness::{Harness, spread};
 
 /// About as many particles: with 100,000 the gate would take some minutes on one thread, not one.
 const PARTICLES: usize = 16_000;
@@ -30,7 +30,7 @@ const THREADS: usize = 2;
 
 pub fn run(h: &mut Harness) {
     as_it_is(h);
-    rebuilt(h);
+    h.measure_all(["surface.vortex_rebuilt_volume", "surface.vortex_rebuilt_mean"], rebuilt);
 }
 
 /// The mesh keeps its triangles.
@@ -78,11 +78,7 @@ fn as_it_is(h: &mut Harness) {
 }
 
 /// The mesh is rebuilt where the sheet is too thin for its particles, and where it closes again.
-fn rebuilt(h: &mut Harness) {
-    let names @ [volume, mean] = ["surface.vortex_rebuilt_volume", "surface.vortex_rebuilt_mean"];
-    if !names.iter().any(|name| h.wants(name)) {
-        return;
-    }
+fn rebuilt() -> [(f64, String); 2] {
     let ctx = context(THREADS);
     let start = Instant::now();
     let Vortex { spacing, positions, mesh } = Vortex::new(PARTICLES, SQUARES);
@@ -99,7 +95,7 @@ fn rebuilt(h: &mut Harness) {
             Ok(report) => report,
             Err(error) => {
                 let note = format!("frame {frame} of {REBUILT_FRAMES}: {error}");
-                return names.into_iter().for_each(|name| h.gate(name, f64::NAN, &note));
+                return [(f64::NAN, note.clone()), (f64::NAN, note)];
             }
         };
         from = to;
@@ -132,14 +128,14 @@ fn rebuilt(h: &mut Harness) {
         start.elapsed().as_secs_f64()
     );
     let gone = lost(&last);
-    h.gate(volume, gone.abs(), &format!("{gone:.2} % lost; {note}"));
     let [to_mean, to_p95, to_most] = there;
     let [back_mean, back_p95, back_most] = back;
     let ways = format!(
         "the larger of both ways: to the ball {to_mean:.3} r, p95 {to_p95:.3}, at most {to_most:.2}; from it {back_mean:.3}, p95 \
          {back_p95:.3}, at most {back_most:.2}"
     );
-    h.gate(mean, to_mean.max(back_mean), &format!("{ways}; {note}"));
+    let of_volume = format!("{gone:.2} % lost; {note}");
+    [(gone.abs(), of_volume), (to_mean.max(back_mean), format!("{ways}; {note}"))]
 }
 
 /// The time (s) of a frame out of so many in a period.
@@ -170,9 +166,4 @@ fn apart(positions: &[DVec3], others: &[DVec3], spacing: f64) -> [f64; 3] {
 fn off_ball(positions: &[DVec3], others: &[DVec3], spacing: f64) -> [f64; 3] {
     let far = |position: &DVec3| (position - DVec3::repeat(Vortex::CENTRE)).norm();
     spread(positions.iter().zip(others).map(|(a, b)| (far(a) - far(b)).abs() / spacing).collect())
-}
-
-fn spread(mut off: Vec<f64>) -> [f64; 3] {
-    off.sort_unstable_by(f64::total_cmp);
-    [off.iter().sum::<f64>() / off.len() as f64, off[off.len() * 95 / 100], off[off.len() - 1]]
 }

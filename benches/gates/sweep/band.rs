@@ -15,9 +15,9 @@ use rayon::prelude::*;
 
 use crate::common::character::data;
 use crate::common::{hero, shapes};
-use crate::harness::Harness;
 use crate::scenes::{self, context};
 use crate::sweep::dense_union::Dense;
+use crate::worst::Worst;
 
 /// Cells from a body's middle to its farthest point.
 const CELLS: [f64; 3] = [6.0, 12.0, 24.0];
@@ -56,14 +56,10 @@ struct Course {
 }
 
 /// All of them.
-pub fn run(h: &mut Harness) {
-    if !h.wants("reliability.band") {
-        return;
-    }
-    let folder = std::env::temp_dir().join(format!("frazil-band-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
+pub fn measure() -> [(f64, String); 3] {
+    let folder = tempfile::tempdir().expect("a folder");
     let only = std::env::var("FRAZIL_BAND").ok();
-    let mut shapes = bodies(&folder);
+    let mut shapes = bodies(folder.path());
     shapes.retain(|shape| only.as_ref().is_none_or(|part| shape.name.contains(part.as_str())));
     let (mut found, mut in_snow) = (Found::default(), Found::default());
     for shape in &shapes {
@@ -74,13 +70,10 @@ pub fn run(h: &mut Harness) {
             }
         }
     }
-    std::fs::remove_dir_all(&folder).ok();
-    let note = format!("{} pairs, {}", found.pairs, found.worst_jump.1);
-    h.gate("reliability.band_jumps", found.jumps as f64, &note);
-    let note = format!("{} pairs, {}", in_snow.pairs, in_snow.worst_jump.1);
-    h.gate("reliability.band_snow", in_snow.jumps as f64, &note);
-    let note = format!("{} values of {} sweeps, {}", found.values, found.sweeps, found.worst.1);
-    h.gate("reliability.band_error", found.worst.0, &note);
+    let jumps =
+        |found: &Found| (found.jumps as f64, format!("{} pairs, {}", found.pairs, found.worst_jump.note()));
+    let of_values = format!("{} values of {} sweeps, {}", found.values, found.sweeps, found.worst.note());
+    [jumps(&found), jumps(&in_snow), (found.worst.value(), of_values)]
 }
 
 /// What was found, and where the worst of it.
@@ -89,9 +82,9 @@ struct Found {
     sweeps: usize,
     pairs: usize,
     jumps: usize,
-    worst_jump: (f64, String),
+    worst_jump: Worst,
     values: usize,
-    worst: (f64, String),
+    worst: Worst,
 }
 
 /// Sweeps one body along one course with each cell, and once through snow.
@@ -135,9 +128,7 @@ impl Found {
                 self.pairs += 1;
                 let jump = (value - other).abs();
                 self.jumps += usize::from(jump > JUMP);
-                if jump > self.worst_jump.0 {
-                    self.worst_jump = (jump, format!("{jump:.2} at {at:?} of {position}"));
-                }
+                self.worst_jump.see(jump, || format!("{jump:.2} at {at:?} of {position}"));
             }
         });
     }
@@ -167,9 +158,7 @@ impl Found {
         let worst = errors.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((truth, error, at, value)) = worst else { return String::new() };
         let what = format!("{value:.3} for {truth:.3} at {at:?}");
-        if error > self.worst.0 {
-            self.worst = (error, format!("{what} of {position}"));
-        }
+        self.worst.see(error, || format!("{what} of {position}"));
         if error > PRINTED { format!("{error:.3} ({what}) ") } else { format!("{error:.3} ") }
     }
 }
@@ -199,8 +188,7 @@ impl<'a> Leaves<'a> {
         origins.sort_unstable();
         for origin in origins {
             for (index, value) in self.leaves[origin].values.iter().enumerate() {
-                let at = [0, 1, 2].map(|axis| origin[axis] + (index >> (6 - 3 * axis) & 7) as i32);
-                see(at, f64::from(*value) / self.cell);
+                see(scenes::voxel(*origin, index), f64::from(*value) / self.cell);
             }
         }
     }

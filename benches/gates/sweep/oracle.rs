@@ -3,6 +3,8 @@
 use frazil::geometry::{DVec3, TriMesh};
 use nalgebra::Rotation3;
 
+use crate::bins::Bins;
+
 /// A box that moves rigidly, as in the keys of a motion.
 pub struct MovingBox {
     /// Half the edges (m).
@@ -72,15 +74,12 @@ pub fn away_from_creases(mesh: &TriMesh, near: impl Fn(DVec3) -> bool, reach: f6
             mesh.triangles[triangle].iter().for_each(|&index| normals[index as usize] += area);
         }
     }
-    let mut cells: std::collections::HashMap<[i64; 3], Vec<usize>> = std::collections::HashMap::new();
-    let cell = |p: DVec3| [0, 1, 2].map(|axis| (p[axis] / reach).floor() as i64);
-    flat.iter().enumerate().for_each(|(index, (p, _))| cells.entry(cell(*p)).or_default().push(index));
+    let (middles, flat): (Vec<DVec3>, Vec<DVec3>) = flat.into_iter().unzip();
+    let bins = Bins::new(&middles, reach);
     let smooth = |p: DVec3, normal: DVec3| {
-        let [x, y, z] = cell(p);
-        let around =
-            (-1..=1).flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [x + i, y + j, z + k])));
-        let mut close = around.filter_map(|key| cells.get(&key)).flatten();
-        close.all(|&index| (flat[index].0 - p).norm() > reach || flat[index].1.dot(&normal) > 0.99)
+        let mut is_smooth = true;
+        bins.near(&p, |index| is_smooth &= flat[index].dot(&normal) > 0.99);
+        is_smooth
     };
     let pairs = mesh.positions.iter().zip(&normals);
     pairs

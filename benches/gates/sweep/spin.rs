@@ -26,24 +26,20 @@ const FOLDED_POSES: usize = 193;
 
 /// All of them.
 pub fn run(h: &mut Harness) {
-    if h.wants("reliability.spin_missed") || h.wants("reliability.spin_fat") {
-        spin(h);
-    }
-    if h.wants("reliability.spin_folds") {
-        folds(h);
-    }
+    h.measure_all(["reliability.spin_missed", "reliability.spin_fat"], spin);
+    let names = ["missed", "fat", "steps"].map(|name| format!("reliability.spin_folds_{name}"));
+    h.measure_all(names, folds);
     for degrees in [45.0, 90.0, 360.0] {
-        let name = format!("reliability.spin_cost_{degrees}");
-        if h.wants(&name) {
+        h.measure(&format!("reliability.spin_cost_{degrees}"), || {
             let level = cpu::cpu_level();
             let note = format!("threads=2 cpu={level:?} globe of 48 x 24, r = 0.2 m, cells of 5 mm");
-            h.gate(&name, cost(degrees), &note);
-        }
+            (cost(degrees), note)
+        });
     }
 }
 
 /// A bar and a box that turn about y, against the poses of what they turn by, of one turn at most.
-fn spin(h: &mut Harness) {
+fn spin() -> [(f64, String); 2] {
     let ctx = context(2);
     let (mut missed, mut fat, mut voxels) = (0, 0, 0);
     for half in [DVec3::new(0.25, 0.04, 0.03), DVec3::repeat(0.1)] {
@@ -75,12 +71,11 @@ fn spin(h: &mut Harness) {
         }
     }
     let note = format!("{voxels} voxels; a bar and a box by 30 to 1440 degrees, cells of 5 and 20 mm");
-    h.gate("reliability.spin_missed", missed as f64, &note);
-    h.gate("reliability.spin_fat", fat as f64, &note);
+    [(missed as f64, note.clone()), (fat as f64, note)]
 }
 
 /// Skins that fold inside out: against where a pose winds around, and in sub-steps.
-fn folds(h: &mut Harness) {
+fn folds() -> [(f64, String); 3] {
     const CELL: f64 = 0.004;
     const HALF: f64 = 0.5 * CELL;
     let ctx = context(2);
@@ -120,11 +115,9 @@ fn folds(h: &mut Harness) {
     let note = format!(
         "{inside} voxels inside the bands; three bends of a tube, and a ball turned inside out and back"
     );
-    h.gate("reliability.spin_folds_missed", missed as f64, &note);
     let share = fat as f64 / inside as f64 * 100.0;
-    h.gate("reliability.spin_folds_fat", share, &note);
-    let note = "volume in one step against sixteen";
-    h.gate("reliability.spin_folds_steps", apart * 100.0, note);
+    let of_steps = "volume in one step against sixteen".into();
+    [(missed as f64, note.clone()), (share, note), (apart * 100.0, of_steps)]
 }
 
 /// Seconds that a sphere takes to turn about its axis.

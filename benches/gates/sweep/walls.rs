@@ -1,7 +1,6 @@
 //! Gates of the swept volume: walls, and distances against exact ones.
 
 use frazil::geometry::DVec3;
-use frazil::numeric::blocks::offset;
 use frazil::sweep::{self, Body, Settings};
 use frazil::vdb::{FloatGrid, level_set};
 
@@ -14,9 +13,12 @@ const CELL: f64 = 0.005;
 
 /// All of them.
 pub fn run(h: &mut Harness) {
-    wall(h);
+    for (name, spin) in [("translation", 0.0), ("turn", 0.3)] {
+        let names = ["max", "mean"].map(|part| format!("snow.base.wall_{name}_{part}"));
+        h.measure_all(names, || wall(spin));
+    }
     h.measure_all(["snow.base.cube_missed", "snow.base.cube_fat"], cube);
-    phi(h);
+    h.measure_all(["snow.base.phi_box", "snow.base.phi_ball"], phi);
     h.measure_all(["snow.base.boots_missed", "snow.base.boots_fat"], boots);
 }
 
@@ -26,37 +28,30 @@ pub fn moving_body(motion: &MovingBox) -> Body {
     scenes::body(cuboid(size.into()), motion.at, motion.turn, 1.0)
 }
 
-/// The walls that a box leaves, against the envelope of 1,024 poses.
-fn wall(h: &mut Harness) {
-    if !h.wants("snow.base.wall") {
-        return;
-    }
+/// The walls that a box leaves which turns by so much (rad), against the envelope of 1,024 poses.
+fn wall(spin: f64) -> [(f64, String); 2] {
     let ctx = context(2);
-    for (name, spin) in [("translation", 0.0), ("turn", 0.3)] {
-        let (mut most, mut sum, mut count) = (0.0f64, 0.0, 0usize);
-        for seed in 1..=3 {
-            let start = DVec3::new(0.7, 1.9, 3.1) * f64::from(seed);
-            let axis = DVec3::new(0.0, 0.0, spin);
-            let motion = MovingBox {
-                half: DVec3::repeat(0.1),
-                at: [DVec3::new(-0.2, 0.3, 0.0), DVec3::new(0.2, 0.3, 0.0)],
-                turn: [start, start + axis],
-            };
-            let mut base = scenes::snow(&ctx, 1.2, CELL, scenes::EXACT);
-            base.step(&ctx, &[moving_body(&motion)], 0.0, 1.0, 1).expect("step");
-            let mesh = level_set::to_mesh(&ctx, base.surface(), 0.0, 0.0).expect("mesh");
-            let poses = motion.poses(1024);
-            let below = |p: DVec3| p.y < 0.3 - 3.0 * CELL && p.y > 0.02 && p.x.abs() < 0.5 && p.z.abs() < 0.5;
-            for p in away_from_creases(&mesh, below, 3.0 * CELL).into_iter().filter(|p| below(*p)) {
-                let error = motion.distance(&poses, p).abs() / CELL;
-                (most, sum, count) = (most.max(error), sum + error, count + 1);
-            }
+    let (mut most, mut sum, mut count) = (0.0f64, 0.0, 0usize);
+    for seed in 1..=3 {
+        let start = DVec3::new(0.7, 1.9, 3.1) * f64::from(seed);
+        let axis = DVec3::new(0.0, 0.0, spin);
+        let motion = MovingBox {
+            half: DVec3::repeat(0.1),
+            at: [DVec3::new(-0.2, 0.3, 0.0), DVec3::new(0.2, 0.3, 0.0)],
+            turn: [start, start + axis],
+        };
+        let mut base = scenes::snow(&ctx, 1.2, CELL, scenes::EXACT);
+        base.step(&ctx, &[moving_body(&motion)], 0.0, 1.0, 1).expect("step");
+        let mesh = level_set::to_mesh(&ctx, base.surface(), 0.0, 0.0).expect("mesh");
+        let poses = motion.poses(1024);
+        let below = |p: DVec3| p.y < 0.3 - 3.0 * CELL && p.y > 0.02 && p.x.abs() < 0.5 && p.z.abs() < 0.5;
+        for p in away_from_creases(&mesh, below, 3.0 * CELL).into_iter().filter(|p| below(*p)) {
+            let error = motion.distance(&poses, p).abs() / CELL;
+            (most, sum, count) = (most.max(error), sum + error, count + 1);
         }
-        let note = format!("vertices={count}");
-        let (max, mean) = (format!("snow.base.wall_{name}_max"), format!("snow.base.wall_{name}_mean"));
-        h.gate(&max, most, &note);
-        h.gate(&mean, sum / count as f64, &note);
     }
+    let note = format!("vertices={count}");
+    [(most, note.clone()), (sum / count as f64, note)]
 }
 
 /// Calls `see` with each voxel of a grid's leaves: position (m) and value (cells).
@@ -64,10 +59,8 @@ pub fn each_voxel(grid: &FloatGrid, mut see: impl FnMut(DVec3, f64)) {
     let cell = grid.voxel_size();
     for leaf in grid.leaves().expect("leaves") {
         for index in 0..512 {
-            let (x, y, z) = (index >> 6, index >> 3 & 7, index & 7);
-            let at = [leaf.origin[0] + x as i32, leaf.origin[1] + y as i32, leaf.origin[2] + z as i32];
-            let value = f64::from(leaf.values[offset(x, y, z)]) / cell;
-            see(DVec3::from(at.map(f64::from)) * cell, value);
+            let position = DVec3::from(scenes::voxel(leaf.origin, index).map(f64::from)) * cell;
+            see(position, f64::from(leaf.values[index]) / cell);
         }
     }
 }
@@ -101,10 +94,7 @@ fn cube() -> [(f64, &'static str); 2] {
 }
 
 /// Distances in the band against exact ones, inside and outside: a box that does not turn, a ball that does.
-fn phi(h: &mut Harness) {
-    if !h.wants("snow.base.phi") {
-        return;
-    }
+fn phi() -> [(f64, &'static str); 2] {
     let ctx = context(2);
     let settings = Settings::new(CELL);
     let worst = |swept: &FloatGrid, truth: &dyn Fn(DVec3) -> f64| {
@@ -130,12 +120,11 @@ fn phi(h: &mut Harness) {
         };
         most = most.max(worst(&swept, &truth));
     }
-    h.gate("snow.base.phi_box", most, "all voxels in the band");
     let at = [DVec3::new(-0.2, 0.0, 0.0), DVec3::new(0.2, 0.0, 0.0)];
     let body = scenes::body(sphere(0.1, 64), at, [DVec3::zeros(), DVec3::new(0.1, 0.2, 0.2)], 1.0);
     let swept = sweep::chain(&ctx, &[body], 0.0, 1.0, &settings).expect("sweep");
-    let most = worst(&swept, &|p| capsule(p, at[0], at[1], 0.1));
-    h.gate("snow.base.phi_ball", most, "turns by 0.3 rad");
+    let of_ball = worst(&swept, &|p| capsule(p, at[0], at[1], 0.1));
+    [(most, "all voxels in the band"), (of_ball, "turns by 0.3 rad")]
 }
 
 /// The four fastest frames of the demonstration's walk against the union of 256 poses. A pose's distance is

@@ -40,7 +40,7 @@ fn a_gate_that_was_not_measured_is_reported() {
     // What was not asked for may be measured along with it.
     let mut h = harness(&["shot.wall"]).unwrap();
     h.gate("shot.wall", 1.0, "");
-    h.holds("shot.rebuilt", true, "");
+    h.gate("shot.rebuilt", true, "");
     assert_eq!(h.missing(), Vec::<&str>::new());
 }
 
@@ -73,9 +73,7 @@ fn the_names_in_the_code_are_declared() {
     }
     for path in files {
         let text = fs::read_to_string(&path).unwrap();
-        for (call, is_whole) in
-            [("measure", true), ("gate", true), ("holds", true), ("skipped", false), ("wants", false)]
-        {
+        for (call, is_whole) in [("measure", true), ("gate", true), ("skipped", false), ("wants", false)] {
             for rest in text.split(&format!("h.{call}(")).skip(1) {
                 // Names that are put together are looked up when they are measured.
                 let Some(name) = rest.trim_start().strip_prefix('"') else { continue };

@@ -62,12 +62,7 @@ fn step(
     (lost.removed_volume, grains.step(ctx, &around, [from, to], frame).expect("a step"))
 }
 
-/// Grains some frames after a plough started to move; some of them are at rest.
-pub fn ploughed(ctx: &Context, frames: i32) -> Grains {
-    ploughed_snow(ctx, frames).1
-}
-
-/// The layer and the grains some frames after a plough started to move.
+/// The layer and the grains some frames after a plough started to move; some of them are at rest.
 pub fn ploughed_snow(ctx: &Context, frames: i32) -> (BaseLayer, Grains) {
     let (mut base, body) = (snow(ctx), plough());
     let mut grains = Grains::new(Params::for_cell(CELL)).expect("grains");

@@ -7,9 +7,8 @@ use frazil::capi::snow::grains_params::*;
 use frazil::capi::snow::grains_points::*;
 use frazil::capi::{frz_status, frz_view};
 
-use crate::capi::cancel_latency::{Steps, measure};
+use crate::capi::cancel_latency;
 use crate::capi::host::{Threads, usual, view, works, written};
-use crate::harness::Harness;
 use crate::snow::grains::{FRAME, Random};
 
 /// Length (s) and sub-steps of a step: a part of a frame, as a whole one would take minutes to cancel so often.
@@ -42,12 +41,6 @@ impl Host {
         }
         host
     }
-}
-
-impl Steps for Host {
-    fn threads(&self) -> &Threads {
-        &self.threads
-    }
 
     fn step(&self) -> frz_status {
         // SAFETY: the pointers are valid.
@@ -69,14 +62,16 @@ impl Drop for Host {
     }
 }
 
-pub fn run(h: &mut Harness) {
-    let name = "snow.grains.cancel_p99";
-    if !h.wants(name) {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let mut random = Random(42);
     let host = Host::new(&mut random);
     // Until they lie on each other.
     (0..12).for_each(|_| works(host.step()));
-    measure(h, name, &host, &mut random, &format!("{} grains", SIDES.iter().product::<u32>()));
+    cancel_latency::measure(
+        &host.threads,
+        || host.step(),
+        || host.state(),
+        &mut random,
+        &format!("{} grains", SIDES.iter().product::<u32>()),
+    )
 }

@@ -22,9 +22,9 @@ const D: f64 = 0.005;
 const DEEP: f64 = 0.1;
 
 pub fn run(h: &mut Harness) {
-    plate(h);
-    blades(h);
-    sheet(h);
+    h.measure("snow.grains.deep_plate", || through(plate(), 6));
+    h.measure("snow.grains.deep_blades", || through(blades(), 24));
+    h.measure("snow.grains.deep_sheet", || through(sheet(), 24));
     walker(h);
 }
 
@@ -54,7 +54,7 @@ fn winding(position: DVec3, triangles: &[[u32; 3]], pose: &[DVec3]) -> f64 {
 }
 
 /// Moves an object through a heap of grains for some frames; counts grains that end one of them inside it but not trapped.
-fn through(h: &mut Harness, name: &str, motion: Box<dyn Motion>, frames: i32) {
+fn through(motion: Box<dyn Motion>, frames: i32) -> (f64, String) {
     let ctx = context(2);
     let mut grains = Grains::new(Params { radius: 0.5 * D, ..Params::for_cell(1.5 * D) }).expect("grains");
     let sites = (0..20).flat_map(|y| (0..30).flat_map(move |x| (0..30).map(move |z| [x, y, z])));
@@ -97,7 +97,7 @@ fn through(h: &mut Harness, name: &str, motion: Box<dyn Motion>, frames: i32) {
         }
         (bad, most, trapped) = (bad + now, most.max(now), trapped + report.trapped);
     }
-    h.gate(name, bad as f64, &format!("in {frames} frames, at most {most} in one; {trapped} times trapped"));
+    (bad as f64, format!("in {frames} frames, at most {most} in one; {trapped} times trapped"))
 }
 
 fn rigid(mesh: TriMesh, keys: &[(f64, [f64; 3], [f64; 3])]) -> Box<dyn Motion> {
@@ -110,24 +110,17 @@ fn rigid(mesh: TriMesh, keys: &[(f64, [f64; 3], [f64; 3])]) -> Box<dyn Motion> {
 }
 
 /// A plate 2 mm thick that moves through them at 10 m/s.
-fn plate(h: &mut Harness) {
-    if h.wants("snow.grains.deep_plate") {
-        let keys = [(0.0, [0.0, 0.06, -1.0], [0.0; 3]), (0.2, [0.0, 0.06, 1.0], [0.0; 3])];
-        through(h, "snow.grains.deep_plate", rigid(cuboid([0.1, 0.1, 0.002]), &keys), 6);
-    }
+fn plate() -> Box<dyn Motion> {
+    let keys = [(0.0, [0.0, 0.06, -1.0], [0.0; 3]), (0.2, [0.0, 0.06, 1.0], [0.0; 3])];
+    rigid(cuboid([0.1, 0.1, 0.002]), &keys)
 }
 
 /// Four blades 2 mm thick that rotate twice a second.
-fn blades(h: &mut Harness) {
-    if h.wants("snow.grains.deep_blades") {
-        let mut mesh = cuboid([0.12, 0.03, 0.002]);
-        mesh.append(&cuboid([0.002, 0.03, 0.12]));
-        let keys = [
-            (0.0, [0.0, 0.05, 0.0], [0.0; 3]),
-            (1.0, [0.0, 0.05, 0.0], [0.0, 4.0 * std::f64::consts::PI, 0.0]),
-        ];
-        through(h, "snow.grains.deep_blades", rigid(mesh, &keys), 24);
-    }
+fn blades() -> Box<dyn Motion> {
+    let mut mesh = cuboid([0.12, 0.03, 0.002]);
+    mesh.append(&cuboid([0.002, 0.03, 0.12]));
+    let (at, twice) = ([0.0, 0.05, 0.0], [0.0, 4.0 * std::f64::consts::PI, 0.0]);
+    rigid(mesh, &[(0.0, at, [0.0; 3]), (1.0, at, twice)])
 }
 
 /// An open sheet that waves.
@@ -161,12 +154,10 @@ impl Motion for Sheet {
     }
 }
 
-fn sheet(h: &mut Harness) {
-    if h.wants("snow.grains.deep_sheet") {
-        let cells = (0..EDGE - 1).flat_map(|z| (0..EDGE - 1).map(move |x| z * EDGE + x));
-        let triangles = cells.flat_map(|a| [[a, a + EDGE, a + 1], [a + 1, a + EDGE, a + EDGE + 1]]).collect();
-        through(h, "snow.grains.deep_sheet", Box::new(Sheet(triangles)), 24);
-    }
+fn sheet() -> Box<dyn Motion> {
+    let cells = (0..EDGE - 1).flat_map(|z| (0..EDGE - 1).map(move |x| z * EDGE + x));
+    let triangles = cells.flat_map(|a| [[a, a + EDGE, a + 1], [a + 1, a + EDGE, a + EDGE + 1]]).collect();
+    Box::new(Sheet(triangles))
 }
 
 /// A character that walks through snow: its soles press grains against the base.

@@ -7,6 +7,7 @@
 use frazil::geometry::DVec3;
 use frazil::snow::grain_friction::of_repose;
 
+use crate::bins::Bins;
 use crate::harness::Harness;
 use crate::snow::grains::{Experiment, walls};
 
@@ -106,27 +107,18 @@ fn collapse(aspect: f64) -> (f64, f64) {
 
 /// Radius (m) of the deposit of grains at some places.
 pub fn edge(positions: &[DVec3]) -> f64 {
-    let cell =
-        |position: &DVec3| [0, 1, 2].map(|axis: usize| (position[axis] / (TOUCHING * D)).floor() as i32);
-    let mut cells = std::collections::HashMap::<[i32; 3], Vec<usize>>::new();
-    for (index, position) in positions.iter().enumerate() {
-        cells.entry(cell(position)).or_default().push(index);
-    }
+    let bins = Bins::new(positions, TOUCHING * D);
     let mut is_part = vec![false; positions.len()];
     let mut open: Vec<usize> =
         (0..positions.len()).filter(|index| positions[*index].xz().norm() < 3.0 * D).collect();
     open.iter().for_each(|index| is_part[*index] = true);
     while let Some(index) = open.pop() {
-        let at = cell(&positions[index]);
-        for code in 0..27 {
-            let near = [at[0] + code / 9 - 1, at[1] + code / 3 % 3 - 1, at[2] + code % 3 - 1];
-            for &other in cells.get(&near).into_iter().flatten() {
-                if !is_part[other] && (positions[other] - positions[index]).norm() < TOUCHING * D {
-                    is_part[other] = true;
-                    open.push(other);
-                }
+        bins.near(&positions[index], |other| {
+            if !is_part[other] {
+                is_part[other] = true;
+                open.push(other);
             }
-        }
+        });
     }
     let mut sectors = [0.0f64; SECTORS];
     for (position, _) in positions.iter().zip(&is_part).filter(|(_, is_part)| **is_part) {

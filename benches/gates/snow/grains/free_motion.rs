@@ -7,8 +7,8 @@ use crate::harness::Harness;
 use crate::snow::grains::{Experiment, FRAME};
 
 pub fn run(h: &mut Harness) {
-    h.measure_all(["snow.grains.fall_speed", "snow.grains.fall_way", "snow.grains.air"], alone);
-    h.measure_all(["snow.grains.free_momentum", "snow.grains.free_energy"], heap_in_the_air);
+    h.measure_all(["snow.grains.fall_speed", "snow.grains.fall_distance", "snow.grains.air"], alone);
+    h.measure_all(["snow.grains.momentum", "snow.grains.energy"], heap_in_the_air);
 }
 
 /// A grain that nothing touches.

@@ -39,7 +39,7 @@ pub fn run(h: &mut Harness) {
     h.measure_all(["snow.grains.preview_volume", "snow.grains.preview_angle"], preview::measure);
     free_motion::run(h);
     beds::run(h);
-    h.measure_all(["snow.grains.turned_bed_least", "snow.grains.turned_bed_most"], turned_gravity::measure);
+    h.measure_all(["snow.grains.slide_angle_min", "snow.grains.slide_angle_max"], turned_gravity::measure);
     column_collapse::run(h);
     collapse::run(h);
     h.measure("snow.grains.behind_ground", behind_ground::measure);
@@ -53,7 +53,7 @@ pub fn run(h: &mut Harness) {
     distance_rule::run(h);
     passes::run(h);
     readers::run(h);
-    cancel::run(h);
+    h.measure("snow.grains.cancel_p99", cancel::measure);
     h.measure("snow.grains.speed", rate::measure);
     table_3_1::run(h);
     memory::run(h);

@@ -52,7 +52,7 @@ pub fn run(h: &mut Harness) {
             "{} files of a pass of {took:.1} s, after kills at frames {kills:?}; 1 and 2 threads",
             once.len()
         );
-        h.holds(same, once == alone && once == killed && kills.len() > 2, &note);
+        h.gate(same, once == alone && once == killed && kills.len() > 2, &note);
     }
     if h.wants(delta) {
         let (scene, full, _) = made(REPEATED, "full", 2);
@@ -60,7 +60,7 @@ pub fn run(h: &mut Harness) {
         works(pass(&scene, &changes, 2).args(["--set", "output.grains_mode=delta"]));
         let (same, sizes) = rebuilt(&changes, &full, REPEATED.0);
         let note = format!("{} frames, {:.0} % of the bytes", REPEATED.0, 100.0 * sizes[0] / sizes[1]);
-        h.holds(delta, same, &note);
+        h.gate(delta, same, &note);
     }
 }
 
@@ -106,7 +106,7 @@ fn parts(grains: &Points) {
 /// each had written: what it says of those that were running.
 pub fn kill<T>(pass: impl Fn(usize) -> Command, within: f64, seen: impl Fn() -> Option<T>) -> Vec<T> {
     let mut kills = Vec::new();
-    for (round, moment) in character::moments(8).into_iter().enumerate() {
+    for (round, moment) in character::moments(10).into_iter().enumerate() {
         let start = Instant::now();
         let mut child = pass(1 + round % 2).spawn().expect("frazil");
         let limit = Duration::from_secs_f64(0.1 + within * moment);

@@ -15,7 +15,7 @@ pub fn run(h: &mut Harness) {
 
 /// Skipping resting grains changes nothing; rest itself changes the angle of a pile little.
 fn changes(h: &mut Harness) {
-    if h.wants("snow.grains.rest_bytes") {
+    h.measure("snow.grains.rest_bytes", || {
         let run = |visits_all: bool| {
             let mut pile = Experiment::new(2, 0.005, of_repose(32.0, false), 2);
             pile.visits_all = visits_all;
@@ -23,10 +23,9 @@ fn changes(h: &mut Harness) {
             (pile.state(), pile.heap.resting())
         };
         let (skipped, all) = (run(false), run(true));
-        let note = format!("{} of 3000 grains rest", all.1);
-        h.holds("snow.grains.rest_bytes", skipped == all && all.1 > 1_000, &note);
-    }
-    if h.wants("snow.grains.rest_angle") {
+        (skipped == all && all.1 > 1_000, format!("{} of 3000 grains rest", all.1))
+    });
+    h.measure("snow.grains.rest_angle", || {
         const SEEDS: u64 = 16;
         let slope = |rests: bool| {
             let one = |seed: u64| {
@@ -39,8 +38,8 @@ fn changes(h: &mut Harness) {
         };
         let (with, without) = (slope(true), slope(false));
         let note = format!("{with:.2} and {without:.2} degrees, mean of {SEEDS} seeds");
-        h.gate("snow.grains.rest_angle", (with - without).abs(), &note);
-    }
+        ((with - without).abs(), note)
+    });
 }
 
 /// A walker of 96 frames: time of the grains' motion in the last 48 without rest, over that with it.

@@ -8,10 +8,9 @@ use frazil::capi::snow::mist_params::*;
 use frazil::capi::snow::mist_points::*;
 use frazil::capi::{frz_status, frz_view};
 
-use crate::capi::cancel_latency::{Steps, measure};
+use crate::capi::cancel_latency;
 use crate::capi::host::{Threads, body_between, sized, usual, view, works, written};
 use crate::common::shapes::sphere;
-use crate::harness::Harness;
 use crate::snow::grains::{FRAME, Random};
 
 /// Edge of a cell (m), and of the cube in which points raise mist.
@@ -54,12 +53,6 @@ impl Host {
         unsafe { works(frz_mist_create(host.threads.ctx, &params, null(), 0, &mut host.mist)) };
         host
     }
-}
-
-impl Steps for Host {
-    fn threads(&self) -> &Threads {
-        &self.threads
-    }
 
     fn step(&self) -> frz_status {
         let body = body_between(self.ball.each_ref().map(Vec::as_slice), &self.corners);
@@ -101,14 +94,10 @@ impl Drop for Host {
     }
 }
 
-pub fn run(h: &mut Harness) {
-    let name = "snow.mist.cancel_p99";
-    if !h.wants(name) {
-        return;
-    }
+pub fn measure() -> (f64, String) {
     let mut random = Random(42);
     let host = Host::new(&mut random);
     (0..3).for_each(|_| works(host.step()));
     let what = format!("{:.1} million cells of air", host.cells.get() as f64 / 1e6);
-    measure(h, name, &host, &mut random, &what);
+    cancel_latency::measure(&host.threads, || host.step(), || host.state(), &mut random, &what)
 }

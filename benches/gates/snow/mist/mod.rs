@@ -16,7 +16,7 @@ use frazil::snow::mist::{Around, Boundary, Mist, Params, Source, StepReport};
 
 use crate::harness::Harness;
 use crate::process::kilobytes;
-use crate::scenes::context;
+use crate::scenes::{context, voxel};
 use crate::snow::grains::memory::of_a_step;
 
 /// Length of a frame (s).
@@ -114,12 +114,12 @@ fn ball(tiles: &Tiles, cell: f32, position: [f32; 3], radius: f32, speed: f32) -
         }
         let mut tile = Faces::open();
         for cell in 0..512usize {
-            let at = [cell >> 6, cell >> 3 & 7, cell & 7];
+            let at = voxel(coord.map(|x| 8 * x), cell);
             for axis in 0..3 {
                 let square: f32 = (0..3)
                     .map(|other| {
                         let half = if other == axis { 0.0 } else { 0.5 };
-                        ((coord[other] * 8 + at[other] as i32) as f32 + half - position[other]).powi(2)
+                        (at[other] as f32 + half - position[other]).powi(2)
                     })
                     .sum();
                 tile.open[axis][cell] = (0.5 + square.sqrt() - radius).clamp(0.0, 1.0);
@@ -160,8 +160,7 @@ pub fn walled(
     let faces = |coord: &Coord| {
         let mut faces = Faces::open();
         for cell in 0..512usize {
-            let at = [cell >> 6, cell >> 3 & 7, cell & 7];
-            let at = [0, 1, 2].map(|axis| coord[axis] * 8 + at[axis] as i32);
+            let at = voxel(coord.map(|x| 8 * x), cell);
             for axis in 0..3 {
                 let below = shifted(at, axis, -1);
                 faces.open[axis][cell] = f32::from(u8::from(is_inside(at) && is_inside(below)));
@@ -263,26 +262,24 @@ fn vortex_error(ctx: &Context, tiles: i32) -> f64 {
 /// Half of the mist after its half-life, and all of it without one.
 fn mass(h: &mut Harness) {
     let ctx = context(2);
-    let name = "snow.mist.half_life";
-    if h.wants(name) {
+    h.measure("snow.mist.half_life", || {
         let mut mist = puff(Params { half_life: 0.5, gravity: 0.0, ..air() }, 8.0, 0.0);
         let before = mist.mass();
         (0..12).for_each(|frame| drop(step(&mut mist, &ctx, &[], &open, frame)));
-        h.gate(name, (2.0 * mist.mass() / before - 1.0).abs(), "after 0.5 s");
-    }
-    let name = "snow.mist.mass_drift";
-    if h.wants(name) {
+        ((2.0 * mist.mass() / before - 1.0).abs(), "after 0.5 s")
+    });
+    h.measure("snow.mist.mass_drift", || {
         let mut mist = puff(air(), 8.0, 1.0);
         let before = mist.mass();
-        let mut note = String::new();
+        let mut note = "every 12 frames:".to_string();
         for frame in 1..=48 {
             step(&mut mist, &ctx, &[], &open, frame);
             if frame % 12 == 0 {
                 note += &format!(" {:.2} %", (mist.mass() / before - 1.0) * 100.0);
             }
         }
-        h.gate(name, (mist.mass() / before - 1.0).abs() * 100.0, &format!("every 12 frames:{note}"));
-    }
+        ((mist.mass() / before - 1.0).abs() * 100.0, note)
+    });
 }
 
 /// The same puff with one tile of air around it and with three.

@@ -12,6 +12,7 @@ use crate::harness::{Harness, timed};
 use crate::process::works;
 use crate::scenes::{MAN, wanted_data};
 use crate::snow::grains::passes::{kill, pass, walk};
+use crate::snow::shot::answered;
 
 /// Frames of the pass, and its cell (m).
 const FRAMES: i32 = 24;
@@ -53,20 +54,16 @@ pub fn run(h: &mut Harness) {
         let note =
             format!("{mist} files of mist in a pass of {took:.1} s; kills in {kills:?}; others: {others:?}");
         let is_whole = mist == FRAMES as usize && STAGES.iter().all(|stage| kills.contains(stage));
-        h.holds(same, others.is_empty() && is_whole, &note);
+        h.gate(same, others.is_empty() && is_whole, &note);
     }
     if h.wants(blender) {
-        match clients::blender() {
-            Some(program) => {
-                works(run("parts", 2).args(["--set", "output.grains=[\"vdb\",\"ply\"]"]));
-                let picture = folder.path().join("frame.png");
-                let answer = clients::blender_renders(&program, &out("parts"), FRAMES, &picture);
-                let is_whole = answer.as_ref().is_ok_and(|said| said.ends_with("with base, grains, mist"));
-                let said = answer.unwrap_or_else(|error| error);
-                h.holds(blender, is_whole, said.lines().last().unwrap_or_default());
-            }
-            None => h.skipped(blender, "not installed: make test-clients"),
-        }
+        let answer = clients::blender().map(|program| {
+            works(run("parts", 2).args(["--set", "output.grains=[\"vdb\",\"ply\"]"]));
+            let picture = folder.path().join("frame.png");
+            let said = clients::blender_renders(&program, &out("parts"), FRAMES, &picture)?;
+            if said.ends_with("with base, grains, mist") { Ok(said) } else { Err(said) }
+        });
+        answered(h, blender, answer);
     }
     if h.wants(apart) {
         let before = written(&out("once"));
@@ -77,7 +74,7 @@ pub fn run(h: &mut Harness) {
         let made = after.iter().filter(|(file, time)| before.get(*file) != Some(*time));
         let made: Vec<&PathBuf> = made.map(|(file, _)| file).collect();
         let others: Vec<&&PathBuf> = made.iter().filter(|file| !is_mist(file)).collect();
-        h.holds(
+        h.gate(
             apart,
             others.is_empty() && !made.is_empty(),
             &format!("{} files made again, of others {others:?}", made.len()),

@@ -9,7 +9,7 @@ use frazil::sweep::Body;
 
 use crate::common::shapes::cuboid;
 use crate::harness::Harness;
-use crate::scenes::context;
+use crate::scenes::{context, voxel};
 use crate::snow::mist::walled;
 
 /// Length of a frame (s), and edge of a cell (m).
@@ -74,8 +74,7 @@ fn inside(mist: &Mist, way: f64) -> f64 {
     let mut sum = 0.0;
     for (coord, tile) in mist.flow().tiles().coords().iter().zip(mist.flow().density()) {
         for (cell, density) in tile.iter().enumerate() {
-            let at = [cell >> 6, cell >> 3 & 7, cell & 7];
-            let position = [0, 1, 2].map(|axis| (f64::from(coord[axis] * 8 + at[axis] as i32) + 0.5) * CELL);
+            let position = voxel(coord.map(|x| 8 * x), cell).map(|at| (f64::from(at) + 0.5) * CELL);
             if (position[0] - way).abs() < half && position[1..].iter().all(|x| x.abs() < half) {
                 sum += f64::from(*density);
             }
