@@ -38,7 +38,7 @@ use self::prepare::{Closed, prepare};
 use self::region::grow;
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use crate::geometry::check::topology::Topology;
 use crate::geometry::{Coord, DVec3, TriMesh, Vec3};
 pub use source::Source;
@@ -105,9 +105,7 @@ const HALVINGS: u32 = 6;
 /// the context allows; cancel.
 pub fn repair(ctx: &Context, mesh: &TriMesh, cell: f64) -> Result<Repaired> {
     mesh.validate()?;
-    if !(cell > 0.0 && cell.is_finite()) {
-        return Err(Error::argument(format!("cell = {cell} is not over 0 m")));
-    }
+    fail_if(!(cell > 0.0 && cell.is_finite()), || Error::argument(format!("cell = {cell} is not over 0 m")))?;
     let closed = ctx.phase("prepare", || Ok(prepare(mesh)))?;
     let mut lost = None;
     let area = closed.mesh.area();

@@ -4,6 +4,7 @@ use std::io::Write;
 
 use super::stl_solids::{HEADER, Joined};
 use super::stl_text;
+use crate::error::fail_if;
 use crate::geometry::{PolygonMesh, TriMesh};
 use crate::io::files::{source, text};
 
@@ -26,12 +27,9 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMes
             return Err("not an .stl file: a text one begins with \"solid\"".into());
         }
     }
-    if bytes.len() < length {
-        return Err(format!(
-            "the .stl file is cut short: {count} triangles need {length} bytes, not {}",
-            bytes.len()
-        ));
-    }
+    fail_if(bytes.len() < length, || {
+        format!("the .stl file is cut short: {count} triangles need {length} bytes, not {}", bytes.len())
+    })?;
     let mut joined = Joined::default();
     for (number, triangle) in bytes[HEADER..length].chunks_exact(TRIANGLE).enumerate() {
         source::go_on(number, PIECE)?;

@@ -26,7 +26,7 @@ use std::path::Path;
 use super::files::caught::caught;
 use super::files::numbers::{Kind, Numbers};
 use super::files::{atomic, source};
-use crate::error::{Error, Result, one_line};
+use crate::error::{Error, Result, fail_if, one_line};
 use crate::geometry::DVec3;
 use crate::geometry::mesh::spacing;
 use crate::geometry::points::{Attribute, Column, Points, Values};
@@ -139,9 +139,7 @@ pub fn read(path: &Path) -> Result<ParticleData> {
 /// # Errors
 /// As [`read`].
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<ParticleData> {
-    if bytes.is_empty() {
-        return Err(Error::file(path, "the file is empty"));
-    }
+    fail_if(bytes.is_empty(), || Error::file(path, "the file is empty"))?;
     let found = |parse: fn(&[u8]) -> std::result::Result<ParticleColumns, String>| {
         parse(bytes).map(ParticleColumns::into_parts)
     };

@@ -8,7 +8,7 @@ use std::io::Write;
 use std::path::Path;
 
 use super::{ParticleData, scalars, vectors, whole};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use crate::geometry::DVec3;
 use crate::geometry::mesh::spacing;
 use crate::geometry::points::{Attribute, Points, Values};
@@ -52,9 +52,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> std::result::Result<ParticleData, St
     let mut body = ply::open(bytes)?;
     let at = body.elements.iter().position(|element| element.name == "vertex").expect("open looks for it");
     let vertices = body.elements.swap_remove(at);
-    if at > 0 {
-        return Err("the .ply file has something before its vertices".into());
-    }
+    fail_if(at > 0, || "the .ply file has something before its vertices".to_string())?;
     // A damaged count must not allocate more than the file could fill.
     let names: Vec<String> = vertices.properties.iter().map(|property| property.name.clone()).collect();
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];

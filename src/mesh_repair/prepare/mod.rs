@@ -129,10 +129,8 @@ pub(super) mod tests {
 
     /// A copy of a mesh in which each triangle has its own vertices.
     pub fn soup(mesh: &TriMesh) -> TriMesh {
-        let positions: Vec<Vec3> =
-            mesh.triangles.as_flattened().iter().map(|&vertex| mesh.positions[vertex as usize]).collect();
-        let triangles = (0..mesh.triangles.len() as u32).map(|at| [3 * at, 3 * at + 1, 3 * at + 2]).collect();
-        TriMesh { positions, triangles }
+        let corners = mesh.triangles.as_flattened().iter().map(|&vertex| mesh.positions[vertex as usize]);
+        TriMesh::soup(corners.collect())
     }
 
     #[test]
