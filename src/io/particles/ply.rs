@@ -13,6 +13,7 @@ use crate::geometry::DVec3;
 use crate::geometry::mesh::spacing;
 use crate::geometry::points::{Attribute, Points, Values};
 use crate::io::files::numbers::Numbers;
+use crate::io::files::source::Parsed;
 use crate::io::files::{atomic, source};
 use crate::io::mesh::ply;
 use crate::io::mesh::ply::Element;
@@ -48,7 +49,7 @@ pub fn read(path: &Path) -> Result<ParticleData> {
 }
 
 /// As [`read`], from the bytes of the file.
-pub(in crate::io) fn parse(bytes: &[u8]) -> std::result::Result<ParticleData, String> {
+pub(in crate::io) fn parse(bytes: &[u8]) -> Parsed<ParticleData> {
     let mut body = ply::open(bytes)?;
     let at = body.elements.iter().position(|element| element.name == "vertex").expect("open looks for it");
     let vertices = body.elements.swap_remove(at);
@@ -68,11 +69,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> std::result::Result<ParticleData, St
     Ok(ParticleData { positions, attributes, voxel_size })
 }
 
-fn attributes(
-    vertices: &Element,
-    names: &[String],
-    columns: &[Vec<f64>],
-) -> std::result::Result<Vec<Attribute>, String> {
+fn attributes(vertices: &Element, names: &[String], columns: &[Vec<f64>]) -> Parsed<Vec<Attribute>> {
     let mut out = Vec::new();
     let index = |name: &str| names.iter().position(|other| other == name);
     for (n, (name, property)) in names.iter().zip(&vertices.properties).enumerate() {
@@ -140,7 +137,7 @@ pub fn to_bytes(points: &Points) -> Result<Vec<u8>> {
     Ok(out)
 }
 
-fn all_plain(points: &Points) -> std::result::Result<Vec<Plain<'_>>, String> {
+fn all_plain(points: &Points) -> Parsed<Vec<Plain<'_>>> {
     points.attributes.iter().map(plain).collect()
 }
 
@@ -152,7 +149,7 @@ struct Plain<'a> {
     values: &'a Values,
 }
 
-fn plain(attribute: &Attribute) -> std::result::Result<Plain<'_>, String> {
+fn plain(attribute: &Attribute) -> Parsed<Plain<'_>> {
     let Attribute { name, values } = attribute;
     let kind = match values {
         Values::Float(_) | Values::Vector(_) => "float",

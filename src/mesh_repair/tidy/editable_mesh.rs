@@ -23,7 +23,7 @@ pub(in crate::mesh_repair) struct VertexRings<'a> {
 
 impl<'a> VertexRings<'a> {
     /// Takes three passes over all triangles, and memory for those near created ones.
-    pub(in crate::mesh_repair) fn of(draft: &'a mut Draft) -> Self {
+    pub fn of(draft: &'a mut Draft) -> Self {
         let mut is_used = vec![false; draft.positions.len()];
         let created = draft.triangles.iter().zip(&draft.sources);
         for (corners, _) in created.filter(|(_, source)| !matches!(source, Source::Whole(_))) {
@@ -34,17 +34,17 @@ impl<'a> VertexRings<'a> {
     }
 
     /// Whether a triangle exists, and was made or changed by the repair; whole ones stay as they are.
-    pub(in crate::mesh_repair) fn is_created(&self, triangle: u32) -> bool {
+    pub fn is_created(&self, triangle: u32) -> bool {
         !self.fans.are_dead()[triangle as usize] && !matches!(self.source(triangle), Source::Whole(_))
     }
 
     /// Vertices of a triangle.
-    pub(in crate::mesh_repair) fn corners(&self, triangle: u32) -> [u32; 3] {
+    pub fn corners(&self, triangle: u32) -> [u32; 3] {
         self.draft.triangles[triangle as usize]
     }
 
     /// The position of a vertex (cells).
-    pub(in crate::mesh_repair) fn position(&self, vertex: u32) -> DVec3 {
+    pub fn position(&self, vertex: u32) -> DVec3 {
         self.draft.positions[vertex as usize]
     }
 
@@ -57,7 +57,7 @@ impl<'a> VertexRings<'a> {
     }
 
     /// Collapses and flips of a triangle's edges that keep the mesh a closed 2-manifold, wherever its vertices lie.
-    pub(in crate::mesh_repair) fn changes(&self, triangle: u32) -> Vec<Change> {
+    pub fn changes(&self, triangle: u32) -> Vec<Change> {
         let corners = self.corners(triangle);
         let mut out = Vec::with_capacity(12);
         for first in 0..3 {
@@ -91,12 +91,7 @@ impl<'a> VertexRings<'a> {
     }
 
     /// Triangles with a corner that a collapse moves or renames.
-    pub(in crate::mesh_repair) fn moving(
-        &self,
-        from: u32,
-        to: u32,
-        position: DVec3,
-    ) -> impl Iterator<Item = u32> {
+    pub fn moving(&self, from: u32, to: u32, position: DVec3) -> impl Iterator<Item = u32> {
         self.fans.moving(&self.draft.triangles, [from, to], position != self.position(to))
     }
 
@@ -108,7 +103,7 @@ impl<'a> VertexRings<'a> {
 
     /// Makes a change, one of [`VertexRings::changes`] whose moving triangles are all created; returns the triangles that it touched, and whole
     /// ones around the same vertex.
-    pub(in crate::mesh_repair) fn make(&mut self, change: Change) -> Vec<u32> {
+    pub fn make(&mut self, change: Change) -> Vec<u32> {
         match change {
             Change::Collapse { from, to, position } => self.collapse(from, to, position),
             Change::Flip { triangles, corners } => {
@@ -137,7 +132,7 @@ impl<'a> VertexRings<'a> {
     }
 
     /// Drops removed triangles, and new vertices that no triangle uses. All others keep their order.
-    pub(in crate::mesh_repair) fn finish(self) {
+    pub fn finish(self) {
         let Self { draft, fans } = self;
         drop_marked(&mut draft.triangles, fans.are_dead());
         drop_marked(&mut draft.sources, fans.are_dead());
