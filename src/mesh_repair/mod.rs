@@ -313,7 +313,7 @@ mod tests {
     use super::*;
     use crate::context::Pool;
     use crate::geometry::check::faults::Faults;
-    use crate::geometry::test_meshes;
+    use crate::geometry::test_meshes::{self, both};
 
     /// A sphere of 2048 triangles.
     fn sphere(centre: [f32; 3], radius: f32) -> TriMesh {
@@ -323,16 +323,10 @@ mod tests {
         TriMesh { positions, triangles }
     }
 
-    fn both(a: &TriMesh, b: &TriMesh) -> TriMesh {
-        let mut mesh = a.clone();
-        mesh.append(b);
-        mesh
-    }
-
     #[test]
     fn spheres_that_overlap_become_one_and_keep_what_they_had() {
         let ctx = Context::new(Pool::new(2).unwrap());
-        let mesh = both(&sphere([0.0; 3], 1.0), &sphere([1.2, 0.1, 0.05], 0.8));
+        let mesh = both(sphere([0.0; 3], 1.0), &sphere([1.2, 0.1, 0.05], 0.8));
         let repaired = repair(&ctx, &mesh, 0.06).unwrap();
         let faults = Faults::of(&repaired.mesh);
         assert!(faults.by_index.is_watertight() && faults.is_embedded(), "{faults:?}");

@@ -268,13 +268,7 @@ pub(super) fn validate<'a>(positions: &[Vec3], faces: impl Iterator<Item = &'a [
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn tetrahedron() -> TriMesh {
-        TriMesh {
-            positions: vec![Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()],
-            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
-        }
-    }
+    use crate::geometry::test_meshes::tetrahedron;
 
     #[test]
     fn a_cuboid_is_closed_and_faces_outward() {
@@ -285,7 +279,7 @@ mod tests {
 
     #[test]
     fn a_tetrahedron_has_its_volume_area_and_genus() {
-        let mesh = tetrahedron();
+        let mesh = tetrahedron(0.0);
         assert!((mesh.volume() - 1.0 / 6.0).abs() < 1e-12);
         assert!((mesh.area() - (1.5 + 0.75f64.sqrt())).abs() < 1e-7);
         assert!(mesh.is_manifold());
@@ -303,7 +297,7 @@ mod tests {
 
     #[test]
     fn a_missing_face_and_bad_numbers_are_seen() {
-        let mut mesh = tetrahedron();
+        let mut mesh = tetrahedron(0.0);
         mesh.triangles.pop();
         assert!(!mesh.is_closed());
         mesh.positions[2].y = f32::NAN;

@@ -74,7 +74,7 @@ pub(in crate::io) fn write(out: &mut dyn Write, mesh: &TriMesh) -> std::io::Resu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vec3;
+    use crate::geometry::test_meshes::tetrahedron;
 
     fn read(bytes: &[u8]) -> Result<TriMesh, String> {
         parse(bytes, [0.0; 3]).map(|(mesh, _)| mesh.into_triangles())
@@ -82,12 +82,8 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_and_a_cut_file_is_refused() {
-        let mesh = TriMesh {
-            positions: vec![Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()],
-            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
-        };
         let mut bytes = Vec::new();
-        write(&mut bytes, &mesh).unwrap();
+        write(&mut bytes, &tetrahedron(0.0)).unwrap();
         let mesh = read(&bytes).unwrap();
         assert_eq!(mesh.positions.len(), 4);
         assert!(mesh.is_manifold() && (mesh.volume() - 1.0 / 6.0).abs() < 1e-7);

@@ -249,9 +249,7 @@ mod tests {
             for point in 0..3 {
                 assert!((back.position(point) - points.position(point)).norm() < 1e-3 * 0.5);
             }
-            for length in 0..bytes.len() {
-                assert!(parse(&bytes[..length]).is_err(), "{length} of {} bytes were accepted", bytes.len());
-            }
+            (0..bytes.len()).for_each(|cut| assert!(parse(&bytes[..cut]).is_err(), "{cut} bytes"));
         }
     }
 }

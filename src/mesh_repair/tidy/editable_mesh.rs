@@ -146,32 +146,16 @@ impl<'a> VertexRings<'a> {
 
 #[cfg(test)]
 pub(in crate::mesh_repair) mod tests {
-    use std::f64::consts::TAU;
-
     use super::*;
     use crate::geometry::check::topology::Topology;
+    use crate::geometry::test_meshes;
 
-    /// Quads of a torus around its axis, and across its tube.
-    const AROUND: u32 = 80;
-    const ACROSS: u32 = 24;
-
-    /// A torus of whole triangles with edges of 0.3 to 0.9 sizes (cells). Triangles 2n and 2n + 1 share their first edge.
+    /// A torus of whole triangles with edges of 0.3 to 0.9 sizes (cells).
     pub fn torus(size: f64) -> Draft {
-        let position = |n: u32| {
-            let turn = |n: u32, of: u32| TAU * f64::from(n) / f64::from(of);
-            let (u, v) = (turn(n / ACROSS, AROUND), turn(n % ACROSS, ACROSS));
-            let far = 6.0 + 2.0 * libm::cos(v);
-            DVec3::new(far * libm::cos(u), 2.0 * libm::sin(v), far * libm::sin(u)) * size
-        };
-        let quad = |n: u32| {
-            let at = |i: u32, j: u32| (n / ACROSS + i) % AROUND * ACROSS + (n % ACROSS + j) % ACROSS;
-            let [a, b, c, d] = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)];
-            [[a, c, b], [c, a, d]]
-        };
-        let triangles: Vec<[u32; 3]> = (0..AROUND * ACROSS).flat_map(quad).collect();
+        let (positions, triangles) = test_meshes::torus();
         Draft {
-            positions: (0..AROUND * ACROSS).map(position).collect(),
-            is_made: vec![false; (AROUND * ACROSS) as usize],
+            is_made: vec![false; positions.len()],
+            positions: positions.into_iter().map(|position| position * size).collect(),
             sources: (0..triangles.len() as u32).map(Source::Whole).collect(),
             triangles,
         }

@@ -275,8 +275,7 @@ fn flagged(unfit: &Unfit<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
 mod tests {
     use super::*;
     use crate::geometry::check::faults::Faults;
-    use crate::surface::test_particles::{context, own_surface, two_balls};
-    use crate::surface::{Params, Tracker};
+    use crate::surface::test_particles::{context, rebuilt, two_balls};
 
     #[test]
     fn two_balls_become_one_and_part_again() {
@@ -285,9 +284,7 @@ mod tests {
         let away = |frame: i32| 9.0 - 0.25 * f64::from(if frame < 24 { frame } else { 48 - frame });
         let at = |frame: i32| two_balls(5.5, DVec3::new(away(frame), 0.1, 0.2));
         let mut from = at(0);
-        let mesh = own_surface(&ctx, &from.positions);
-        let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
-        let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
+        let mut tracker = rebuilt(&ctx, &from);
         let mut parts = Vec::new();
         for frame in 1..=48 {
             let to = at(frame);
