@@ -91,6 +91,14 @@ impl Error {
     }
 }
 
+/// Fails if something is wrong, with an error that is made only then.
+///
+/// # Errors
+/// That one.
+pub fn fail_if<E>(is_wrong: bool, error: impl FnOnce() -> E) -> std::result::Result<(), E> {
+    if is_wrong { Err(error()) } else { Ok(()) }
+}
+
 /// Letters of a text from outside that a message repeats.
 const LONGEST: usize = 400;
 

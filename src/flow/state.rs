@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::Flow;
 use super::scratch::first;
 use super::tiles::{Coord, Field, Tile, Tiles};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use crate::numeric::bytes::{Reader, Writer};
 
 /// What a flow carries from step to step.
@@ -99,9 +99,7 @@ impl Flow {
             return Err(Error::Bytes("has tiles out of order, or too far from the origin".into()));
         }
         // All fields of active tiles must be present before memory for them is allocated.
-        if from.rest().len() / TILE < 5 * count {
-            return Err(Error::Bytes("the state is cut short".into()));
-        }
+        fail_if(from.rest().len() / TILE < 5 * count, || Error::Bytes("the state is cut short".into()))?;
         let tiles = Tiles::new(&coords);
         let mut field = |count: usize| (0..count).map(|_| from.f32s()).collect::<Result<Vec<Tile>>>();
         let all = tiles.count();

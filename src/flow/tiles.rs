@@ -148,17 +148,21 @@ pub fn shifted(mut coord: Coord, axis: usize, by: i32) -> Coord {
     coord
 }
 
+/// Sorted runs of coordinates, merged: each once.
+fn merged(mut runs: Vec<Coord>) -> Vec<Coord> {
+    // A stable sort recognises runs.
+    runs.sort();
+    runs.dedup();
+    runs
+}
+
 /// Sorted coordinates of the tiles within `padding` tiles of any of these, in all 26 directions.
 pub fn padded(tiles: &[Coord], padding: i32) -> Vec<Coord> {
     let mut out = tiles.to_vec();
     for axis in 0..3 {
-        // Sorted runs, which a stable sort merges.
         let wider =
             (-padding..=padding).flat_map(|by| out.iter().map(move |coord| shifted(*coord, axis, by)));
-        let mut wider: Vec<Coord> = wider.collect();
-        wider.sort();
-        wider.dedup();
-        out = wider;
+        out = merged(wider.collect());
     }
     out
 }
@@ -173,11 +177,7 @@ pub fn bordered(tiles: &[Coord], steps: usize) -> Vec<Coord> {
             let out = &out;
             ways.flat_map(move |(i, j)| out.iter().map(move |coord| shifted(shifted(*coord, a, i), b, j)))
         });
-        let mut wider: Vec<Coord> = pairs.collect();
-        // Sorted runs, which a stable sort merges.
-        wider.sort();
-        wider.dedup();
-        out = wider;
+        out = merged(pairs.collect());
     }
     out
 }

@@ -257,22 +257,22 @@ fn interpolate(corners: &[Lanes; 8], [x, y, z]: &Weights) -> Lanes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flow::tiles::{Tiles, padded};
+    use crate::flow::tiles::{Coord, Tiles, padded};
 
     #[test]
     fn a_linear_field_is_interpolated_exactly() {
         let tiles = Tiles::new(&padded(&[[0, 0, 0]], 1));
-        let field: Vec<Tile> = tiles
-            .coords()
-            .iter()
-            .map(|coord| {
+        let field_of = |value: &dyn Fn(f32, f32, f32) -> f32| -> Vec<Tile> {
+            let tile = |coord: &Coord| {
                 std::array::from_fn(|at| {
                     let cell = [at >> 6, at >> 3 & 7, at & 7];
                     let [x, y, z] = [0, 1, 2].map(|axis| (coord[axis] * 8 + cell[axis] as i32) as f32);
-                    x + 2.0 * y - 3.0 * z
+                    value(x, y, z)
                 })
-            })
-            .collect();
+            };
+            tiles.coords().iter().map(tile).collect()
+        };
+        let field = field_of(&|x, y, z| x + 2.0 * y - 3.0 * z);
         let middle = tiles.find([0, 0, 0]).unwrap() as usize;
         let fill = |span: Span| {
             // Values that a window does not cover must not be read.
@@ -297,17 +297,7 @@ mod tests {
         }
         // Cubic interpolation is exact for cubic functions, up to five cells away.
         let cube = |x: f32, y: f32, z: f32| 0.01 * x * x * x + 0.1 * x * y - 0.2 * y * y * z + z;
-        let cubic: Vec<Tile> = tiles
-            .coords()
-            .iter()
-            .map(|coord| {
-                std::array::from_fn(|at| {
-                    let cell = [at >> 6, at >> 3 & 7, at & 7];
-                    let [x, y, z] = [0, 1, 2].map(|axis| (coord[axis] * 8 + cell[axis] as i32) as f32);
-                    cube(x, y, z)
-                })
-            })
-            .collect();
+        let cubic = field_of(&cube);
         for ways in [[-4.9f32, 4.9, 0.3], [0.25, -0.5, -4.75], [0.0, 1.0, 2.5]] {
             let mut window = Window::default();
             window.values.fill(f32::NAN);

@@ -1,7 +1,7 @@
 //! Point clouds: snow grains and other particles.
 
 use super::DVec3;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 
 /// A point cloud. Positions are split into a voxel and an offset within it, as VDB Points stores them: they keep the same
 /// resolution however far they lie from the origin, and pass through a file bit by bit.
@@ -307,10 +307,9 @@ impl Points {
     pub fn validate(&self) -> Result<()> {
         check_voxel(self.voxel_size)?;
         let count = self.count();
-        if self.offsets.len() != count {
-            let what = format!("there are {count} voxels of points, but {} offsets", self.offsets.len());
-            return Err(Error::argument(what));
-        }
+        fail_if(self.offsets.len() != count, || {
+            Error::argument(format!("there are {count} voxels of points, but {} offsets", self.offsets.len()))
+        })?;
         // NaN is outside too.
         let is_outside = |offset: &[f32; 3]| !offset.iter().all(|part| (-0.5..=0.5).contains(part));
         if let Some(point) = self.offsets.iter().position(is_outside) {
@@ -325,10 +324,9 @@ impl Points {
                 return Err(Error::argument(format!("two attributes have the name \"{name}\"")));
             }
             let there = each_type!(values, column => column.count()).unwrap_or(count);
-            if there != count {
-                let what = format!("attribute \"{name}\" has {there} values for {count} points");
-                return Err(Error::argument(what));
-            }
+            fail_if(there != count, || {
+                Error::argument(format!("attribute \"{name}\" has {there} values for {count} points"))
+            })?;
             if let Some(point) = values.first_wild() {
                 let what = format!("attribute \"{name}\" of point {} is not finite", point + 1);
                 return Err(Error::argument(what));

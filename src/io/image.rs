@@ -6,7 +6,7 @@ use std::path::Path;
 use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 
 use super::files::caught::caught;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 
 /// Maximum size (bytes) of an image when unpacked: 16,384 x 16,384 pixels with four channels of 16 bits.
 const MOST_BYTES: usize = 1 << 31;
@@ -27,9 +27,7 @@ pub struct Grey {
 /// # Errors
 /// A file that is not a PNG, is cut short or damaged, is over 2 GB when unpacked, or has colours.
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<Grey> {
-    if bytes.is_empty() {
-        return Err(Error::file(path, "the file is empty"));
-    }
+    fail_if(bytes.is_empty(), || Error::file(path, "the file is empty"))?;
     caught(path, || decode(bytes).map_err(|what| Error::file(path, what)))
 }
 

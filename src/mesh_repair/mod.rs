@@ -38,7 +38,7 @@ use self::prepare::{Closed, prepare};
 use self::region::grow;
 use crate::context::Context;
 use crate::distance::lattice::Lattice;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use crate::geometry::check::topology::Topology;
 use crate::geometry::{Coord, DVec3, TriMesh, Vec3};
 pub use source::Source;
@@ -105,9 +105,7 @@ const HALVINGS: u32 = 6;
 /// the context allows; cancel.
 pub fn repair(ctx: &Context, mesh: &TriMesh, cell: f64) -> Result<Repaired> {
     mesh.validate()?;
-    if !(cell > 0.0 && cell.is_finite()) {
-        return Err(Error::argument(format!("cell = {cell} is not over 0 m")));
-    }
+    fail_if(!(cell > 0.0 && cell.is_finite()), || Error::argument(format!("cell = {cell} is not over 0 m")))?;
     let closed = ctx.phase("prepare", || Ok(prepare(mesh)))?;
     let mut lost = None;
     let area = closed.mesh.area();
@@ -315,7 +313,7 @@ mod tests {
     use super::*;
     use crate::context::Pool;
     use crate::geometry::check::faults::Faults;
-    use crate::geometry::test_meshes;
+    use crate::geometry::test_meshes::{self, both};
 
     /// A sphere of 2048 triangles.
     fn sphere(centre: [f32; 3], radius: f32) -> TriMesh {
@@ -325,16 +323,10 @@ mod tests {
         TriMesh { positions, triangles }
     }
 
-    fn both(a: &TriMesh, b: &TriMesh) -> TriMesh {
-        let mut mesh = a.clone();
-        mesh.append(b);
-        mesh
-    }
-
     #[test]
     fn spheres_that_overlap_become_one_and_keep_what_they_had() {
         let ctx = Context::new(Pool::new(2).unwrap());
-        let mesh = both(&sphere([0.0; 3], 1.0), &sphere([1.2, 0.1, 0.05], 0.8));
+        let mesh = both(sphere([0.0; 3], 1.0), &sphere([1.2, 0.1, 0.05], 0.8));
         let repaired = repair(&ctx, &mesh, 0.06).unwrap();
         let faults = Faults::of(&repaired.mesh);
         assert!(faults.by_index.is_watertight() && faults.is_embedded(), "{faults:?}");

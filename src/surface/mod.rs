@@ -51,10 +51,10 @@ pub use level_set::isosurface::Isosurface;
 #[doc(hidden)]
 #[cfg(feature = "vdb")]
 pub use level_set::openvdb::{HALF_WIDTH, level_set};
+#[cfg(feature = "vdb")]
+pub use level_set::openvdb::{is_sphere_radius, spheres};
 pub use level_set::sampler::Sampler;
 pub use level_set::smooth::smooth;
-#[cfg(feature = "vdb")]
-pub use level_set::spheres::{is_sphere_radius, spheres};
 pub use params::Params;
 pub use particles::agreement::disagreement;
 pub use particles::grid::TOO_FAR;

@@ -1,6 +1,6 @@
 //! Parameters of a mesh that follows particles.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 
 /// Parameters of a mesh that follows particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,11 +52,9 @@ impl Params {
             ("min_drop", self.min_drop as f64, 0.0, 1e6, "particles"),
         ];
         for (name, value, low, high, unit) in ranges {
-            if !(low..=high).contains(&value) {
-                return Err(Error::argument(format!(
-                    "{name} = {value} is not within {low} to {high} {unit}"
-                )));
-            }
+            fail_if(!(low..=high).contains(&value), || {
+                Error::argument(format!("{name} = {value} is not within {low} to {high} {unit}"))
+            })?;
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use super::params::Params;
 use super::remesh::drift::{Drift, WINDOW};
 use super::remesh::sizes;
 use super::tracked_mesh::Tracker;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use crate::geometry::{DVec3, TriMesh};
 use crate::numeric::bytes::{Reader, Writer};
 use crate::numeric::packed;
@@ -59,64 +59,50 @@ impl Tracker {
         mesh.validate()?;
         let bytes = packed::unpack(bytes, MAGIC, NOUN)?;
         let mut from = Reader::new(&bytes);
-        let wrong = |what: String| Err(Error::Bytes(what));
+        let wrong = |what: &str| Error::Bytes(what.into());
         for (name, own) in [("spacing", params.spacing), ("cell", params.cell)] {
             let there = from.f64()?;
-            if there != own {
-                return wrong(format!("has a {name} of {there}, not {own}"));
-            }
+            fail_if(there != own, || wrong(&format!("has a {name} of {there}, not {own}")))?;
         }
         let reach = from.f64()?;
         // No valid state has more, and a band that wide would exhaust memory.
-        if !(0.0..=100.0).contains(&reach) {
-            return wrong(format!("has a band of {reach} spacings"));
-        }
+        fail_if(!(0.0..=100.0).contains(&reach), || wrong(&format!("has a band of {reach} spacings")))?;
         let drift = drift(&mut from)?;
         let is_rebuilt = from.u32()? != 0;
-        let (mut triangles, mut detail_retention) = (mesh.triangles.clone(), Vec::new());
-        let (mut is_other, mut own) = (false, Vec::new());
+        let (mut is_other, mut made) = (false, (mesh.triangles.clone(), Vec::new(), Vec::new()));
         if is_rebuilt {
-            let count = from.count(3 * 4)?;
-            triangles =
-                (0..count).map(|_| Ok([from.u32()?, from.u32()?, from.u32()?])).collect::<Result<_>>()?;
-            let count = from.count(4)?;
-            detail_retention = (0..count).map(|_| Ok(from.f32s::<1>()?[0])).collect::<Result<Vec<f32>>>()?;
-            let count = from.count(8)?;
-            own = (0..count).map(|_| from.f32s::<2>()).collect::<Result<_>>()?;
+            made = (
+                list(&mut from, 3 * 4, |from| Ok([from.u32()?, from.u32()?, from.u32()?]))?,
+                list(&mut from, 4, |from| Ok(from.f32s::<1>()?[0]))?,
+                list(&mut from, 8, |from| from.f32s::<2>())?,
+            );
         } else {
             is_other = from.take::<16>()? != seal(&mesh.triangles);
         }
+        let (triangles, detail_retention, own) = made;
         let count = from.count(3 * 8 + 4 + 1)?;
-        if !is_rebuilt && count != mesh.positions.len() {
-            return wrong(format!("is of a mesh of {count} vertices, not {}", mesh.positions.len()));
-        }
-        if is_other {
-            return wrong("is of a mesh of other triangles".into());
-        }
-        if triangles.as_flattened().iter().any(|corner| *corner as usize >= count) {
-            return wrong("has a triangle without a vertex".into());
-        }
-        if !(detail_retention.is_empty() || detail_retention.len() == count)
-            || !detail_retention.iter().all(|share| (0.0..=1.0).contains(share))
-        {
-            return wrong("has shares of detail that do not fit".into());
-        }
-        let mut vertices = Vec::with_capacity(count);
-        for _ in 0..count {
-            vertices.push(DVec3::new(from.f64()?, from.f64()?, from.f64()?));
-        }
+        fail_if(!is_rebuilt && count != mesh.positions.len(), || {
+            wrong(&format!("is of a mesh of {count} vertices, not {}", mesh.positions.len()))
+        })?;
+        fail_if(is_other, || wrong("is of a mesh of other triangles"))?;
+        let is_wild = triangles.as_flattened().iter().any(|corner| *corner as usize >= count);
+        fail_if(is_wild, || wrong("has a triangle without a vertex"))?;
+        let is_share = |share: &f32| (0.0..=1.0).contains(share);
+        let fits = [0, count].contains(&detail_retention.len()) && detail_retention.iter().all(is_share);
+        fail_if(!fits, || wrong("has shares of detail that do not fit"))?;
+        let vertex = |_| Ok(DVec3::new(from.f64()?, from.f64()?, from.f64()?));
+        let vertices = (0..count).map(vertex).collect::<Result<Vec<_>>>()?;
         // NaN for a vertex without a distance.
         let delta = (0..count).map(|_| Ok(f32::from_le_bytes(from.take()?))).collect::<Result<Vec<f32>>>()?;
-        if delta.iter().any(|delta| delta.is_infinite()) {
-            return wrong("has a distance that is not finite".into());
-        }
+        let is_wild = delta.iter().any(|delta| delta.is_infinite());
+        fail_if(is_wild, || wrong("has a distance that is not finite"))?;
         let bits = from.bytes(count)?;
         from.end()?;
         let [flags, bare] = [1, 2].map(|bit| bits.iter().map(|bits| bits & bit != 0).collect());
         let sizes = match (params.rebuild, is_rebuilt) {
             (false, _) => Vec::new(),
             (true, true) if own.len() == count => own,
-            (true, true) => return wrong("has sizes that do not fit".into()),
+            (true, true) => return Err(wrong("has sizes that do not fit")),
             (true, false) => {
                 let positions: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
                 sizes(&positions, &mesh.triangles)
@@ -126,18 +112,27 @@ impl Tracker {
             (false, _) => Drift::default(),
             (true, 0) => Drift::at_reference(count),
             (true, own) if own == count => drift,
-            (true, _) => return wrong("has displacements that do not fit".into()),
+            (true, _) => return Err(wrong("has displacements that do not fit")),
         };
         let own = Self::of(params, vertices, triangles);
         Ok(Self { delta, detail_retention, flags, bare, reach, is_rebuilt, sizes, drift, ..own })
     }
 }
 
+/// A list whose items take this many bytes each, after its length.
+fn list<T>(
+    from: &mut Reader<'_>,
+    bytes: usize,
+    item: impl Fn(&mut Reader<'_>) -> Result<T>,
+) -> Result<Vec<T>> {
+    let count = from.count(bytes)?;
+    (0..count).map(|_| item(from)).collect()
+}
+
 /// The drift of a state.
 fn drift(from: &mut Reader<'_>) -> Result<Drift> {
     let steps = from.u32()?;
-    let count = from.count(12)?;
-    let vertices = (0..count).map(|_| from.f32s::<3>()).collect::<Result<Vec<_>>>()?;
+    let vertices = list(from, 12, |from| from.f32s::<3>())?;
     if steps >= WINDOW {
         return Err(Error::Bytes(format!("has displacements over {steps} steps, not under {WINDOW}")));
     }

@@ -1,6 +1,6 @@
 //! Helpers shared by unit tests: balls of particles one spacing apart, which is 1 m, and their surface.
 
-use super::{Implicit, Isosurface, Particles};
+use super::{Implicit, Isosurface, Params, Particles, Tracker};
 use crate::context::{Context, Pool};
 use crate::geometry::{DVec3, TriMesh};
 
@@ -31,4 +31,10 @@ pub fn two_balls(radius: f64, apart: DVec3) -> Particles {
 pub fn own_surface(ctx: &Context, positions: &[DVec3]) -> TriMesh {
     let phi = Implicit::new(ctx, positions, 1.0, 0.5).unwrap();
     Isosurface::new(&phi).mesh(&phi)
+}
+
+/// A tracker of the particles' own surface, which is rebuilt where it no longer fits.
+pub fn rebuilt(ctx: &Context, particles: &Particles) -> Tracker {
+    let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
+    Tracker::new(ctx, params, &own_surface(ctx, &particles.positions), particles).unwrap()
 }

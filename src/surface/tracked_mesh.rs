@@ -4,7 +4,7 @@ use super::params::Params;
 use super::remesh::Size;
 use super::remesh::drift::Drift;
 use super::track::ahead::Ahead;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use crate::geometry::{DVec3, TriMesh};
 
 /// Minimum reach of the band, and the maximum that is tried at the first frame (r).
@@ -73,9 +73,7 @@ impl Tracker {
         for (name, old, new) in
             [("spacing", self.params.spacing, params.spacing), ("cell", self.params.cell, params.cell)]
         {
-            if old != new {
-                return Err(Error::argument(format!("{name} = {new} cannot change, it is {old}")));
-            }
+            fail_if(old != new, || Error::argument(format!("{name} = {new} cannot change, it is {old}")))?;
         }
         if self.params.rebuild != params.rebuild {
             return Err(Error::argument("whether the mesh is rebuilt cannot change"));
@@ -90,12 +88,9 @@ impl Tracker {
     /// A count other than that of the vertices; a share out of range, reported with its vertex, counted from 1.
     pub fn set_detail_retention(&mut self, shares: Vec<f32>) -> Result<()> {
         let count = self.vertices.len();
-        if !shares.is_empty() && shares.len() != count {
-            return Err(Error::argument(format!(
-                "there are {count} vertices, but {} shares of detail",
-                shares.len()
-            )));
-        }
+        fail_if(!shares.is_empty() && shares.len() != count, || {
+            Error::argument(format!("there are {count} vertices, but {} shares of detail", shares.len()))
+        })?;
         if let Some(at) = shares.iter().position(|share| !(0.0..=1.0).contains(share)) {
             let what = format!("detail of vertex {} is {}, not within 0 to 1", at + 1, shares[at]);
             return Err(Error::argument(what));

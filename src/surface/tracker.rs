@@ -26,7 +26,7 @@ use super::track::fade::fade;
 use super::track::project::foot;
 use super::tracked_mesh::{REACH, Tracker};
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use crate::geometry::check::topology::Topology;
 use crate::geometry::coords::cell_of;
 use crate::geometry::{DVec3, TriMesh};
@@ -68,14 +68,11 @@ impl Tracker {
         params.validate()?;
         mesh.validate()?;
         particles.validate()?;
-        if particles.positions.is_empty() {
-            return Err(Error::argument("there are no particles"));
-        }
-        if params.rebuild && !Topology::of(mesh.positions.len(), &mesh.triangles).is_watertight() {
-            return Err(Error::argument(
-                "the mesh is not closed and 2-manifold by index, as it must be to be rebuilt",
-            ));
-        }
+        fail_if(particles.positions.is_empty(), || Error::argument("there are no particles"))?;
+        fail_if(
+            params.rebuild && !Topology::of(mesh.positions.len(), &mesh.triangles).is_watertight(),
+            || Error::argument("the mesh is not closed and 2-manifold by index, as it must be to be rebuilt"),
+        )?;
         let vertices: Vec<DVec3> = mesh.positions.iter().map(|position| position.cast()).collect();
         let mut tracker = Self::of(params, vertices, mesh.triangles.clone());
         tracker.flags = vec![false; mesh.positions.len()];
@@ -135,81 +132,86 @@ impl Tracker {
         if to.positions.is_empty() {
             return self.dry_up(ctx, from, dt);
         }
-        let (next, phases) = ctx.step(10, || {
+        let ((next, ahead), phases) = ctx.step(10, || {
             let paths = Paths::between(from, to, dt)?;
             let (carried, parts) = ctx.phase("advect", || self.carried(ctx, &paths))?;
             let surface = match self.ahead.ready(&to.positions) {
                 Some(surface) => surface,
                 None => Arc::new(ctx.phase("phi", || self.surface_of(ctx, to))?),
             };
-            let distances = ctx.phase("distance", || {
-                let deep = self.deep(&carried, 0.0);
-                self.distances(ctx, &surface, deep)
-            })?;
-            let delta = fade(self, &carried, dt);
-            // Strain is measured on the carried vertices: on a thin sheet projection moves them much farther than the particles jitter.
-            let drifts = self.drift.after(&self.vertices, &carried);
-            let (mut vertices, flags) =
-                ctx.phase("project", || self.projected(ctx, carried, &delta, &distances))?;
-            if self.params.rebuild {
-                let is_lost: Vec<bool> = flags
-                    .iter()
-                    .zip(&delta)
-                    .map(|(flag, delta)| *flag == Flag::Lost && !delta.is_nan())
-                    .collect();
-                gather(&self.vertices, &self.triangles, &is_lost, &mut vertices);
-            }
-            let feet: Vec<Option<DVec3>> = flags.iter().map(Flag::foot).collect();
+            let distances =
+                ctx.phase("distance", || self.distances(ctx, &surface, self.deep(&carried, 0.0)))?;
+            let (mut next, kinds) = self.placed(ctx, carried, dt, &distances)?;
+            let feet: Vec<Option<DVec3>> = kinds.iter().map(Flag::foot).collect();
             let mut covered =
                 ctx.phase("cover", || self.cover(ctx, &surface, &feet, (&to.positions, false)))?;
             covered.bare.iter_mut().zip(&self.bare).for_each(|(now, ever)| *now &= !ever);
-            let count = |kind: Flag| flags.iter().filter(|flag| **flag == kind).count();
-            let is_flagged = |(flag, is_bare): (&Flag, &bool)| flag.foot().is_none() || *is_bare;
-            let mut next = Next {
-                flags: flags.iter().zip(&covered.bare).map(is_flagged).collect(),
-                report: StepReport {
-                    jumped: count(Flag::Jumped),
-                    lost: count(Flag::Lost),
-                    uncovered: covered.bare.iter().filter(|is| **is).count(),
-                    parts,
-                    born: paths.born,
-                    died: paths.died,
-                    triangles: surface.1.count(),
-                    particle_warning: paths
-                        .mismatch
-                        .and_then(|mismatch| mismatch.sentence(self.params.spacing)),
-                    ..StepReport::default()
-                },
-                drifts,
-                vertices,
-                delta,
-            };
+            let is_flagged = |(kind, is_bare): (&Flag, &bool)| kind.foot().is_none() || *is_bare;
+            next.flags = kinds.iter().zip(&covered.bare).map(is_flagged).collect();
+            let told = self.told(&kinds, &covered.bare, &paths);
+            next.report = StepReport { parts, triangles: surface.1.count(), ..told };
             let mut ahead = Ahead::default();
             if self.params.rebuild {
                 let change =
                     || self.changed(ctx, &next, &feet, &covered, (&surface.0, &distances), &to.positions);
-                let (change, ready) = self.with_next(ctx, change)?;
-                (next.report.change, ahead) = (change, ready);
+                (next.report.change, ahead) = self.with_next(ctx, change)?;
             }
             next.report.apart = covered.apart;
-            let is_torn = |(flag, delta): &(&Flag, &f32)| **flag == Flag::Lost && !delta.is_nan();
-            let lost = flags.iter().zip(&self.delta).filter(is_torn).count();
-            warn_of_tears(&mut next.report, (lost, flags.len()), (from, to, dt), self.params.spacing)?;
+            let lost = kinds.iter().zip(&self.delta).filter(|(kind, delta)| kind.is_torn(**delta)).count();
+            warn_of_tears(&mut next.report, (lost, kinds.len()), (from, to, dt), self.params.spacing)?;
             Ok((next, ahead))
         })?;
-        let (next, ahead) = next;
-        let mut report = StepReport { phases, ..next.report };
-        (self.vertices, self.delta, self.flags) = (next.vertices, next.delta, next.flags);
         self.ahead = ahead;
+        Ok(StepReport { phases, ..self.adopt(next) })
+    }
+
+    /// The mesh after a step as far as it follows from where the particles have carried its vertices, and what became of each of these.
+    fn placed(
+        &self,
+        ctx: &Context,
+        carried: Vec<DVec3>,
+        dt: f64,
+        distances: &Distances,
+    ) -> Result<(Next, Vec<Flag>)> {
+        let delta = fade(self, &carried, dt);
+        // Strain is measured on the carried vertices: on a thin sheet projection moves them much farther than the particles jitter.
+        let drifts = self.drift.after(&self.vertices, &carried);
+        let (mut vertices, kinds) =
+            ctx.phase("project", || self.projected(ctx, carried, &delta, distances))?;
+        if self.params.rebuild {
+            let is_lost: Vec<bool> =
+                kinds.iter().zip(&delta).map(|(kind, delta)| kind.is_torn(*delta)).collect();
+            gather(&self.vertices, &self.triangles, &is_lost, &mut vertices);
+        }
+        Ok((Next { vertices, delta, drifts, ..Next::default() }, kinds))
+    }
+
+    /// What a step reports of vertices and particles.
+    fn told(&self, kinds: &[Flag], bare: &[bool], paths: &Paths) -> StepReport {
+        let count = |kind: Flag| kinds.iter().filter(|other| **other == kind).count();
+        StepReport {
+            jumped: count(Flag::Jumped),
+            lost: count(Flag::Lost),
+            uncovered: bare.iter().filter(|is| **is).count(),
+            born: paths.born,
+            died: paths.died,
+            particle_warning: paths.mismatch.and_then(|mismatch| mismatch.sentence(self.params.spacing)),
+            ..StepReport::default()
+        }
+    }
+
+    /// Takes over the mesh after a step.
+    fn adopt(&mut self, next: Next) -> StepReport {
+        (self.vertices, self.delta, self.flags) = (next.vertices, next.delta, next.flags);
         self.drift.vertices = next.drifts;
-        if let Some(change) = &mut report.change {
+        if let Some(change) = &next.report.change {
             self.take(change);
         }
         if self.params.rebuild {
             let drifts = std::mem::take(&mut self.drift.vertices);
             self.drift = self.drift.next(drifts);
         }
-        Ok(report)
+        next.report
     }
 
     /// Prefetches the particles of the step after next: while the mesh is rebuilt, their surface is computed on idle threads. The result is
@@ -350,6 +352,7 @@ impl Tracker {
 }
 
 /// The mesh after a step, before it is rebuilt.
+#[derive(Default)]
 pub(super) struct Next {
     pub vertices: Vec<DVec3>,
     pub delta: Vec<f32>,
@@ -383,6 +386,11 @@ enum Flag {
 }
 
 impl Flag {
+    /// Whether it has lost the surface, though it had a distance to keep.
+    fn is_torn(&self, delta: f32) -> bool {
+        *self == Self::Lost && !delta.is_nan()
+    }
+
     /// Its foot (cells); none if it could not be projected.
     fn foot(&self) -> Option<DVec3> {
         if let Self::Placed(foot) = self { Some(*foot) } else { None }

@@ -49,7 +49,7 @@ pub use chain::{Weights, boundary};
 pub use moving_mesh::topology::Topology;
 pub use signed_distance::voxelise::{ALL, Band, Piece, Scratch, Voxeliser};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 
 /// Default of [`Settings::tolerance`] (cells): the error of a sweep is far below what a level set can represent.
 pub const TOLERANCE: f64 = 0.02;
@@ -82,11 +82,9 @@ impl Settings {
             ("tolerance", self.tolerance, 0.001, 1.0, "cells"),
         ];
         for (name, value, low, high, unit) in ranges {
-            if !(low..=high).contains(&value) {
-                return Err(Error::argument(format!(
-                    "{name} = {value} is not within {low} to {high} {unit}"
-                )));
-            }
+            fail_if(!(low..=high).contains(&value), || {
+                Error::argument(format!("{name} = {value} is not within {low} to {high} {unit}"))
+            })?;
         }
         Ok(())
     }

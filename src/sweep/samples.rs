@@ -3,7 +3,7 @@
 
 use super::Body;
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use crate::geometry::{TriMesh, Vec3};
 use crate::vdb::{FloatGrid, level_set};
 
@@ -52,9 +52,7 @@ pub fn samples(
     to: f64,
     settings: &SamplesSettings,
 ) -> Result<FloatGrid> {
-    if settings.samples == 0 {
-        return Err(Error::argument("samples = 0: a sampled sweep needs at least 1"));
-    }
+    fail_if(settings.samples == 0, || Error::argument("samples = 0: a sampled sweep needs at least 1"))?;
     let mut union: Option<FloatGrid> = None;
     for body in bodies {
         let mut pose = Vec::new();

@@ -134,7 +134,8 @@ fn carry_faces(
         let Some(live) = paths.live(slot, at) else { return Ok(()) };
         window.fill(hat, &paths.tiles.neighbours()[slot], &paths.ahead_span(slot, at), outside);
         let bounds = is_bounded.then(|| [&below[slot], &above[slot]]);
-        correct_tile(&live, &paths.ways(slot, at, &paths.ahead), window, &hat[slot], bounds, values);
+        let guess = Guess { hat: &hat[slot], bounds };
+        correct_tile(&live, &paths.ways(slot, at, &paths.ahead), window, &guess, values);
         Ok(())
     })
 }
@@ -189,19 +190,16 @@ fn density_rows(ways: &Ways<'_>, window: &Window, scheme: Scheme, to: &mut Tile)
     }
 }
 
-fn guess_tile(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: Option<[&mut Tile; 2]>) {
-    dispatch!(guess_rows(
-        live: &Live,
-        ways: &Ways<'_>,
-        window: &Window,
-        hat: &mut Tile,
-        bounds: Option<[&mut Tile; 2]>
-    ))
+fn guess_tile(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: Bounds<&mut Tile>) {
+    dispatch!(guess_rows(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: Bounds<&mut Tile>))
 }
+
+/// The distances of values from their bounds, if they have any: from the lower ones, and from the upper ones.
+type Bounds<T> = Option<[T; 2]>;
 
 /// First guesses, and their bounds.
 #[inline(always)]
-fn guess_rows(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: Option<[&mut Tile; 2]>) {
+fn guess_rows(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bounds: Bounds<&mut Tile>) {
     let Some([below, above]) = bounds else {
         for row in live.rows() {
             let values = window.sample(row, &ways.row(row));
@@ -217,43 +215,28 @@ fn guess_rows(live: &Live, ways: &Ways<'_>, window: &Window, hat: &mut Tile, bou
     }
 }
 
-fn correct_tile(
-    live: &Live,
-    ways: &Ways<'_>,
-    window: &Window,
-    hat: &Tile,
-    bounds: Option<[&Tile; 2]>,
-    values: &mut Tile,
-) {
-    dispatch!(correct_rows(
-        live: &Live,
-        ways: &Ways<'_>,
-        window: &Window,
-        hat: &Tile,
-        bounds: Option<[&Tile; 2]>,
-        values: &mut Tile
-    ))
+/// First guesses, and their bounds.
+struct Guess<'a> {
+    hat: &'a Tile,
+    bounds: Bounds<&'a Tile>,
+}
+
+fn correct_tile(live: &Live, ways: &Ways<'_>, window: &Window, guess: &Guess<'_>, values: &mut Tile) {
+    dispatch!(correct_rows(live: &Live, ways: &Ways<'_>, window: &Window, guess: &Guess<'_>, values: &mut Tile))
 }
 
 /// Corrects first guesses by half of the error of the round trip, forward and back.
 #[inline(always)]
-fn correct_rows(
-    live: &Live,
-    ways: &Ways<'_>,
-    window: &Window,
-    hat: &Tile,
-    bounds: Option<[&Tile; 2]>,
-    values: &mut Tile,
-) {
+fn correct_rows(live: &Live, ways: &Ways<'_>, window: &Window, guess: &Guess<'_>, values: &mut Tile) {
     let rows = |tile: &Tile, row: usize| Lanes(row_of(tile, row));
     for row in live.rows() {
         let there = window.sample(row, &ways.row(row));
-        let guess = rows(hat, row);
+        let first = rows(guess.hat, row);
         let mut change = Lanes::all(0.5) * (rows(values, row) - there);
-        if let Some([below, above]) = bounds {
+        if let Some([below, above]) = guess.bounds {
             change = limited(change, rows(below, row), rows(above, row));
         }
-        values[row * 8..][..live.lanes()].copy_from_slice(&(guess + change).0[..live.lanes()]);
+        values[row * 8..][..live.lanes()].copy_from_slice(&(first + change).0[..live.lanes()]);
     }
 }
 

@@ -163,7 +163,7 @@ pub fn fastest_but(velocity: &[Field; 3], share: f64) -> f32 {
 pub fn divergence(tiles: &Tiles, solids: &Solids, velocity: &[Field; 3], out: &mut [Tile]) {
     out.par_iter_mut().enumerate().with_min_len(16).for_each(|(slot, out)| {
         for (row, out) in out.chunks_exact_mut(8).enumerate() {
-            let sides = [0, 1, 2].map(|axis| fluxes(tiles, solids, velocity, axis, slot, row));
+            let sides = [0, 1, 2].map(|axis| fluxes(tiles, solids, velocity, axis, [slot, row]));
             let [[left, right], [down, up], [back, front]] = &sides;
             for (lane, out) in out.iter_mut().enumerate() {
                 *out = (left[lane] - right[lane]) + (down[lane] - up[lane]) + (back[lane] - front[lane]);
@@ -178,8 +178,7 @@ fn fluxes(
     solids: &Solids,
     velocity: &[Field; 3],
     axis: usize,
-    slot: usize,
-    row: usize,
+    [slot, row]: [usize; 2],
 ) -> [[f32; 8]; 2] {
     let above = tiles.neighbours()[slot][FACES[2 * axis + 1]] as usize;
     let flux = |slot: usize, row: usize| {

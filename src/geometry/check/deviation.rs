@@ -371,8 +371,7 @@ mod tests {
             let c = [b * 0.5 + c * 1e-5, b * 2.0, b * 0.0, c, c, c, c][n % 7];
             [a, a + b, a + c]
         };
-        let positions = (0..count).flat_map(triangle).collect();
-        TriMesh { positions, triangles: (0..count as u32).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect() }
+        TriMesh::soup((0..count).flat_map(triangle).collect())
     }
 
     #[test]

@@ -295,23 +295,14 @@ impl Pairs {
 mod tests {
     use super::*;
     use crate::geometry::Vec3;
-
-    fn tetrahedron(at: f32) -> TriMesh {
-        let shift = Vec3::new(at, at, at);
-        TriMesh {
-            positions: [Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()].map(|p| p + shift).to_vec(),
-            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
-        }
-    }
+    use crate::geometry::test_meshes::{both, tetrahedron};
 
     #[test]
     fn a_tetrahedron_has_no_fault_and_two_that_overlap_cross() {
         let whole = Faults::of(&tetrahedron(0.0));
         assert!(whole.is_solid() && whole.is_embedded() && whole.by_index.is_watertight());
         assert_eq!((whole.parts, whole.genus, whole.crossings), (1, Some(0), 0));
-        let mut two = tetrahedron(0.0);
-        two.append(&tetrahedron(0.1));
-        let two = Faults::of(&two);
+        let two = Faults::of(&both(tetrahedron(0.0), &tetrahedron(0.1)));
         assert_eq!((two.parts, two.genus), (2, Some(0)));
         assert!(two.crossings > 0 && two.is_solid());
     }

@@ -95,10 +95,7 @@ impl DetailedMesh {
             corners: uvs.corners.as_ref().map(|_| Vec::new()),
             missing: 0,
         });
-        let arrays = self.arrays.iter().map(|array| {
-            let (name, on, number) = (array.name.clone(), array.on, array.number);
-            MeshArray { name, on, number, values: Vec::new() }
-        });
+        let arrays = self.arrays.iter().map(|array| array.with(Vec::new()));
         Self { mesh: TriMesh::default(), uvs, arrays: arrays.collect() }
     }
 
@@ -141,6 +138,11 @@ impl DetailedMesh {
 }
 
 impl MeshArray {
+    /// The same array with other numbers.
+    pub fn with(&self, values: Vec<f64>) -> Self {
+        Self { name: self.name.clone(), on: self.on, number: self.number, values }
+    }
+
     /// The same for triangles: `corners` are their corners among those of the faces, `faces` the faces that they come from.
     pub(in crate::geometry) fn of_triangles(self, corners: &[[usize; 3]], faces: &[usize]) -> Self {
         let values = match self.on {

@@ -6,9 +6,9 @@ pub mod uvs;
 pub mod weld;
 
 use super::check::edges::{Use, edge_uses, imbalance, is_same_edge};
-use super::shape::six_volumes;
+use super::shape::{normal, six_volumes};
 use super::{DVec3, Vec3};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 
 /// A triangle mesh: positions in metres, counter-clockwise triangles seen from outside.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -30,6 +30,12 @@ impl TriMesh {
         let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
         Self { positions: (0..8).map(position).collect(), triangles }
+    }
+
+    /// Triangles of three consecutive positions each.
+    pub fn soup(positions: Vec<Vec3>) -> Self {
+        let triangles = (0..positions.len() as u32 / 3).map(|at| [3 * at, 3 * at + 1, 3 * at + 2]).collect();
+        Self { positions, triangles }
     }
 
     /// Checks that there is a triangle, that positions are finite and indices in range.
@@ -64,8 +70,7 @@ impl TriMesh {
     pub fn normals(&self) -> Vec<Vec3> {
         let mut sums = vec![DVec3::zeros(); self.positions.len()];
         for (triangle, corners) in self.triangles.iter().enumerate() {
-            let [a, b, c] = self.corners(triangle);
-            let doubled = (b - a).cross(&(c - a));
+            let doubled = normal(&self.corners(triangle));
             corners.iter().for_each(|&corner| sums[corner as usize] += doubled);
         }
         let unit = |sum: &DVec3| sum.try_normalize(0.0).unwrap_or_default().cast();
@@ -82,11 +87,8 @@ impl TriMesh {
 
     /// Surface area (m2).
     pub fn area(&self) -> f64 {
-        let twice = |triangle: usize| {
-            let [a, b, c] = self.corners(triangle);
-            (b - a).cross(&(c - a)).norm()
-        };
-        (0..self.triangles.len()).map(twice).sum::<f64>() / 2.0 + 0.0
+        let twice = (0..self.triangles.len()).map(|triangle| normal(&self.corners(triangle)).norm());
+        twice.sum::<f64>() / 2.0 + 0.0
     }
 
     fn edge_uses(&self) -> Vec<Use> {
@@ -249,9 +251,7 @@ fn home(key: &[u64; 3], bits: u32) -> usize {
 /// Checks the vertices and faces of a mesh.
 pub(super) fn validate<'a>(positions: &[Vec3], faces: impl Iterator<Item = &'a [u32]>) -> Result<()> {
     let mut faces = faces.peekable();
-    if faces.peek().is_none() {
-        return Err(Error::argument("the mesh has no faces"));
-    }
+    fail_if(faces.peek().is_none(), || Error::argument("the mesh has no faces"))?;
     let finite = |p: &Vec3| p.iter().all(|value| value.is_finite());
     if let Some(vertex) = positions.iter().position(|p| !finite(p)) {
         return Err(Error::argument(format!("vertex {} is not finite", vertex + 1)));
@@ -268,13 +268,7 @@ pub(super) fn validate<'a>(positions: &[Vec3], faces: impl Iterator<Item = &'a [
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn tetrahedron() -> TriMesh {
-        TriMesh {
-            positions: vec![Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()],
-            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
-        }
-    }
+    use crate::geometry::test_meshes::tetrahedron;
 
     #[test]
     fn a_cuboid_is_closed_and_faces_outward() {
@@ -285,7 +279,7 @@ mod tests {
 
     #[test]
     fn a_tetrahedron_has_its_volume_area_and_genus() {
-        let mesh = tetrahedron();
+        let mesh = tetrahedron(0.0);
         assert!((mesh.volume() - 1.0 / 6.0).abs() < 1e-12);
         assert!((mesh.area() - (1.5 + 0.75f64.sqrt())).abs() < 1e-7);
         assert!(mesh.is_manifold());
@@ -303,7 +297,7 @@ mod tests {
 
     #[test]
     fn a_missing_face_and_bad_numbers_are_seen() {
-        let mut mesh = tetrahedron();
+        let mut mesh = tetrahedron(0.0);
         mesh.triangles.pop();
         assert!(!mesh.is_closed());
         mesh.positions[2].y = f32::NAN;

@@ -8,6 +8,9 @@ use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
 
+/// What is read from a file; an error says what is wrong with it, without its name.
+pub type Parsed<T> = std::result::Result<T, String>;
+
 /// Bytes between two checks of the flag.
 const PIECE: usize = 1 << 20;
 
@@ -37,7 +40,7 @@ pub fn check() -> Result<()> {
 ///
 /// # Errors
 /// A text that nobody sees: the flag tells.
-pub fn go_on(item: usize, piece: usize) -> std::result::Result<(), String> {
+pub fn go_on(item: usize, piece: usize) -> Parsed<()> {
     if item.is_multiple_of(piece) && is_stopped() { Err("stopped".into()) } else { Ok(()) }
 }
 

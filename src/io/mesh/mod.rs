@@ -14,7 +14,7 @@ use std::path::Path;
 
 use super::files::caught::caught;
 use super::files::{atomic, source};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use crate::geometry::{DVec3, DetailedMesh, PolygonMesh, TriMesh};
 
 pub use ply_write::Carried;
@@ -90,9 +90,7 @@ pub fn read_any_from(path: &Path, origin: DVec3) -> Result<PolygonMesh> {
 
 /// The mesh as it is in the file; it may be empty or invalid.
 fn parse(path: &Path, bytes: &[u8], origin: DVec3) -> Result<PolygonMesh> {
-    if bytes.is_empty() {
-        return Err(Error::file(path, "the file is empty"));
-    }
+    fail_if(bytes.is_empty(), || Error::file(path, "the file is empty"))?;
     let origin = origin.into();
     let parse = || match extension(path).as_str() {
         "obj" => obj::parse(bytes, origin).map(|mesh| (mesh, None)),

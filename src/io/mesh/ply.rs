@@ -344,13 +344,7 @@ mod tests {
         let mut bytes = Vec::new();
         write(&mut bytes, &mesh, &Carried::default()).unwrap();
         assert_eq!(parse(&bytes, [0.0; 3]).unwrap().into_triangles(), mesh);
-        for length in 0..bytes.len() {
-            assert!(
-                parse(&bytes[..length], [0.0; 3]).is_err(),
-                "{length} of {} bytes were accepted",
-                bytes.len()
-            );
-        }
+        (0..bytes.len()).for_each(|cut| assert!(parse(&bytes[..cut], [0.0; 3]).is_err(), "{cut} bytes"));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::io::Write;
 
 use super::stl_solids::{HEADER, Joined};
 use super::stl_text;
+use crate::error::fail_if;
 use crate::geometry::{PolygonMesh, TriMesh};
 use crate::io::files::{source, text};
 
@@ -26,12 +27,9 @@ pub(in crate::io) fn parse(bytes: &[u8], origin: [f64; 3]) -> Result<(PolygonMes
             return Err("not an .stl file: a text one begins with \"solid\"".into());
         }
     }
-    if bytes.len() < length {
-        return Err(format!(
-            "the .stl file is cut short: {count} triangles need {length} bytes, not {}",
-            bytes.len()
-        ));
-    }
+    fail_if(bytes.len() < length, || {
+        format!("the .stl file is cut short: {count} triangles need {length} bytes, not {}", bytes.len())
+    })?;
     let mut joined = Joined::default();
     for (number, triangle) in bytes[HEADER..length].chunks_exact(TRIANGLE).enumerate() {
         source::go_on(number, PIECE)?;
@@ -76,7 +74,7 @@ pub(in crate::io) fn write(out: &mut dyn Write, mesh: &TriMesh) -> std::io::Resu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vec3;
+    use crate::geometry::test_meshes::tetrahedron;
 
     fn read(bytes: &[u8]) -> Result<TriMesh, String> {
         parse(bytes, [0.0; 3]).map(|(mesh, _)| mesh.into_triangles())
@@ -84,12 +82,8 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_and_a_cut_file_is_refused() {
-        let mesh = TriMesh {
-            positions: vec![Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()],
-            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
-        };
         let mut bytes = Vec::new();
-        write(&mut bytes, &mesh).unwrap();
+        write(&mut bytes, &tetrahedron(0.0)).unwrap();
         let mesh = read(&bytes).unwrap();
         assert_eq!(mesh.positions.len(), 4);
         assert!(mesh.is_manifold() && (mesh.volume() - 1.0 / 6.0).abs() < 1e-7);

@@ -5,6 +5,7 @@
 //! caller then warns that the file may be cut short.
 
 use super::stl_solids::Joined;
+use crate::error::fail_if;
 use crate::geometry::PolygonMesh;
 use crate::io::files::text::Words;
 use crate::io::files::{source, text};
@@ -95,13 +96,9 @@ impl<'a> Reader<'a> {
             }
             word = self.next()?;
         }
-        if !is(word, "outer") {
-            return Err(self.unexpected(word, "\"outer loop\""));
-        }
+        fail_if(!is(word, "outer"), || self.unexpected(word, "\"outer loop\""))?;
         let word = self.next()?;
-        if !is(word, "loop") {
-            return Err(self.unexpected(word, "\"loop\""));
-        }
+        fail_if(!is(word, "loop"), || self.unexpected(word, "\"loop\""))?;
         let begin = self.joined.mesh.corners.len();
         loop {
             let word = self.next()?;
@@ -116,14 +113,10 @@ impl<'a> Reader<'a> {
             }
         }
         let word = self.next()?;
-        if !self.ends(word, "facet") {
-            return Err(self.unexpected(word, "\"endfacet\""));
-        }
+        fail_if(!self.ends(word, "facet"), || self.unexpected(word, "\"endfacet\""))?;
         let mesh = &mut self.joined.mesh;
         let count = mesh.corners.len() - begin;
-        if count < 3 {
-            return Err(format!("line {}: a facet of {count} corners", self.words.line));
-        }
+        fail_if(count < 3, || format!("line {}: a facet of {count} corners", self.words.line))?;
         mesh.ends.push(mesh.corners.len() as u32);
         self.facets += 1;
         Ok(())

@@ -11,6 +11,7 @@ use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 
 use super::ParticleColumns;
+use crate::error::fail_if;
 use crate::geometry::points::{Points, Values};
 use crate::io::files::numbers::{Kind, Numbers, Order, most_inflated};
 use crate::io::files::source;
@@ -133,11 +134,9 @@ impl Head {
             *count = word(reader)?;
         }
         let [points, _, _, _, attributes, ..] = counts;
-        if points > i32::MAX as u32 || attributes > MOST {
-            return Err(format!(
-                "the file is damaged: it has {points} particles with {attributes} attributes"
-            ));
-        }
+        fail_if(points > i32::MAX as u32 || attributes > MOST, || {
+            format!("the file is damaged: it has {points} particles with {attributes} attributes")
+        })?;
         Ok(Self { points: points as usize, attributes })
     }
 }
@@ -147,9 +146,7 @@ impl Field {
         let name = text(reader)?;
         let size = u32::from(u16::from_be_bytes(take(reader)?));
         let number = word(reader)?;
-        if size > MOST {
-            return Err(format!("the file is damaged: attribute \"{name}\" has {size} components"));
-        }
+        fail_if(size > MOST, || format!("the file is damaged: attribute \"{name}\" has {size} components"))?;
         let kind = match number {
             // Floats, and vectors, which rotate with their owner.
             0 | 5 => Some(Kind::F32),

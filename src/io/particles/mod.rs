@@ -25,8 +25,9 @@ use std::path::Path;
 
 use super::files::caught::caught;
 use super::files::numbers::{Kind, Numbers};
+use super::files::source::Parsed;
 use super::files::{atomic, source};
-use crate::error::{Error, Result, one_line};
+use crate::error::{Error, Result, fail_if, one_line};
 use crate::geometry::DVec3;
 use crate::geometry::mesh::spacing;
 use crate::geometry::points::{Attribute, Column, Points, Values};
@@ -139,12 +140,8 @@ pub fn read(path: &Path) -> Result<ParticleData> {
 /// # Errors
 /// As [`read`].
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<ParticleData> {
-    if bytes.is_empty() {
-        return Err(Error::file(path, "the file is empty"));
-    }
-    let found = |parse: fn(&[u8]) -> std::result::Result<ParticleColumns, String>| {
-        parse(bytes).map(ParticleColumns::into_parts)
-    };
+    fail_if(bytes.is_empty(), || Error::file(path, "the file is empty"))?;
+    let found = |parse: fn(&[u8]) -> Parsed<ParticleColumns>| parse(bytes).map(ParticleColumns::into_parts);
     let parse = || match format(path) {
         Some(Format::Bgeo) => found(bgeo::parse),
         Some(Format::BgeoSc) => Err(bgeo::HOUDINIS.into()),
@@ -237,13 +234,7 @@ impl ParticleColumns {
     ///
     /// # Errors
     /// Another number of values; an `id` that is not an integer.
-    pub fn add(
-        &mut self,
-        name: &str,
-        kind: Kind,
-        components: usize,
-        numbers: Numbers,
-    ) -> std::result::Result<(), String> {
+    pub fn add(&mut self, name: &str, kind: Kind, components: usize, numbers: Numbers) -> Parsed<()> {
         if self.count().checked_mul(components) != Some(numbers.count()) {
             let count = self.count();
             return Err(format!(
@@ -281,7 +272,7 @@ fn vectors(all: impl Iterator<Item = [f32; 3]>) -> Values {
 }
 
 /// An attribute of one number for each particle: its type depends on its name, on that of the numbers, and on whether integers fit 32 bits.
-fn scalars(name: &str, numbers: Numbers, fits_int: bool) -> std::result::Result<Values, String> {
+fn scalars(name: &str, numbers: Numbers, fits_int: bool) -> Parsed<Values> {
     Ok(match (name, numbers) {
         ("id", Numbers::Real(numbers)) => Values::Long(shared(whole(name, &numbers)?, |&id| id)),
         ("active" | "trapped", numbers) => {
@@ -301,7 +292,7 @@ fn scalars(name: &str, numbers: Numbers, fits_int: bool) -> std::result::Result<
 }
 
 /// Numbers as 64-bit integers.
-fn whole(name: &str, column: &[f64]) -> std::result::Result<Vec<i64>, String> {
+fn whole(name: &str, column: &[f64]) -> Parsed<Vec<i64>> {
     let exact = |(row, &value): (usize, &f64)| {
         let is_whole = value.fract() == 0.0 && value.abs() <= (1u64 << 53) as f64;
         is_whole

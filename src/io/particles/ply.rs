@@ -8,11 +8,12 @@ use std::io::Write;
 use std::path::Path;
 
 use super::{ParticleData, scalars, vectors, whole};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use crate::geometry::DVec3;
 use crate::geometry::mesh::spacing;
 use crate::geometry::points::{Attribute, Points, Values};
 use crate::io::files::numbers::Numbers;
+use crate::io::files::source::Parsed;
 use crate::io::files::{atomic, source};
 use crate::io::mesh::ply;
 use crate::io::mesh::ply::Element;
@@ -48,13 +49,11 @@ pub fn read(path: &Path) -> Result<ParticleData> {
 }
 
 /// As [`read`], from the bytes of the file.
-pub(in crate::io) fn parse(bytes: &[u8]) -> std::result::Result<ParticleData, String> {
+pub(in crate::io) fn parse(bytes: &[u8]) -> Parsed<ParticleData> {
     let mut body = ply::open(bytes)?;
     let at = body.elements.iter().position(|element| element.name == "vertex").expect("open looks for it");
     let vertices = body.elements.swap_remove(at);
-    if at > 0 {
-        return Err("the .ply file has something before its vertices".into());
-    }
+    fail_if(at > 0, || "the .ply file has something before its vertices".to_string())?;
     // A damaged count must not allocate more than the file could fill.
     let names: Vec<String> = vertices.properties.iter().map(|property| property.name.clone()).collect();
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
@@ -70,11 +69,7 @@ pub(in crate::io) fn parse(bytes: &[u8]) -> std::result::Result<ParticleData, St
     Ok(ParticleData { positions, attributes, voxel_size })
 }
 
-fn attributes(
-    vertices: &Element,
-    names: &[String],
-    columns: &[Vec<f64>],
-) -> std::result::Result<Vec<Attribute>, String> {
+fn attributes(vertices: &Element, names: &[String], columns: &[Vec<f64>]) -> Parsed<Vec<Attribute>> {
     let mut out = Vec::new();
     let index = |name: &str| names.iter().position(|other| other == name);
     for (n, (name, property)) in names.iter().zip(&vertices.properties).enumerate() {
@@ -142,7 +137,7 @@ pub fn to_bytes(points: &Points) -> Result<Vec<u8>> {
     Ok(out)
 }
 
-fn all_plain(points: &Points) -> std::result::Result<Vec<Plain<'_>>, String> {
+fn all_plain(points: &Points) -> Parsed<Vec<Plain<'_>>> {
     points.attributes.iter().map(plain).collect()
 }
 
@@ -154,7 +149,7 @@ struct Plain<'a> {
     values: &'a Values,
 }
 
-fn plain(attribute: &Attribute) -> std::result::Result<Plain<'_>, String> {
+fn plain(attribute: &Attribute) -> Parsed<Plain<'_>> {
     let Attribute { name, values } = attribute;
     let kind = match values {
         Values::Float(_) | Values::Vector(_) => "float",
@@ -254,9 +249,7 @@ mod tests {
             for point in 0..3 {
                 assert!((back.position(point) - points.position(point)).norm() < 1e-3 * 0.5);
             }
-            for length in 0..bytes.len() {
-                assert!(parse(&bytes[..length]).is_err(), "{length} of {} bytes were accepted", bytes.len());
-            }
+            (0..bytes.len()).for_each(|cut| assert!(parse(&bytes[..cut]).is_err(), "{cut} bytes"));
         }
     }
 }

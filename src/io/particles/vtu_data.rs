@@ -6,6 +6,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::read::ZlibDecoder;
 
+use crate::error::fail_if;
 use crate::io::files::numbers::{Kind, Numbers, Order, most_inflated};
 use crate::io::files::source;
 
@@ -81,9 +82,7 @@ impl<'a> File<'a> {
         match inflate {
             None => {
                 let said = self.head(&mut stream)?;
-                if said != size {
-                    return Err(other_size(said, "bytes", size));
-                }
+                fail_if(said != size, || other_size(said, "bytes", size))?;
                 kind.decode(&stream.take(size)?, order, &mut out)?;
             }
             Some(inflate) => kind.decode(&self.inflated(inflate, size, &mut stream)?, order, &mut out)?,
@@ -99,12 +98,8 @@ impl<'a> File<'a> {
         let said = blocks
             .checked_sub(1)
             .map_or(Some(0), |before| before.checked_mul(whole)?.checked_add(of_block(before)));
-        if said != Some(size) {
-            return Err(other_size(said.unwrap_or(usize::MAX), "bytes", size));
-        }
-        if blocks > stream.room() {
-            return Err(cut());
-        }
+        fail_if(said != Some(size), || other_size(said.unwrap_or(usize::MAX), "bytes", size))?;
+        fail_if(blocks > stream.room(), cut)?;
         let packed = (0..blocks).map(|_| self.head(stream)).collect::<Result<Vec<_>, _>>()?;
         let mut out = Vec::new();
         for (block, packed) in packed.into_iter().enumerate() {

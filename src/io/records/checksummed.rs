@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use crate::io::files::{atomic, hash};
 
 /// The format that this version writes, and the newest that it reads.
@@ -81,13 +81,9 @@ pub fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
         Some(_) => {}
     }
     let content = &file["content"];
-    if file["check"].as_str() != Some(&hash::of_bytes(content.to_string().as_bytes())) {
-        return Err(damaged());
-    }
+    fail_if(file["check"].as_str() != Some(&hash::of_bytes(content.to_string().as_bytes())), damaged)?;
     // What this version wrote must read back byte for byte.
-    if file["format"].as_u64() == Some(FORMAT) && text_of(&file).as_bytes() != bytes {
-        return Err(damaged());
-    }
+    fail_if(file["format"].as_u64() == Some(FORMAT) && text_of(&file).as_bytes() != bytes, damaged)?;
     serde_json::from_value(content.clone()).map(Some).map_err(|_| damaged())
 }
 

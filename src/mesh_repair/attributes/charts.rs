@@ -123,21 +123,18 @@ impl<'a> Charts<'a> {
         let arrays = &self.first.arrays;
         let own = arrays.get(n).filter(is_same).or_else(|| arrays.iter().find(is_same));
         let Some(own) = own else { return };
-        let values = &mut array.values;
+        let (values, triangles) = (&mut array.values, &self.first.mesh.triangles);
         match own.on {
             On::Vertices => {
                 let made = self.names.iter().zip(&self.spots).zip(is_kept).filter(|(_, is_kept)| !**is_kept);
                 for ((name, spot), _) in made {
-                    let corners = self.first.mesh.triangles[spot.triangle];
-                    let numbers = corners.map(|vertex| own.values[vertex as usize]);
-                    values[*name as usize] = blended(own, numbers, &spot.weights);
+                    values[*name as usize] = blended(own, triangles, spot.triangle, &spot.weights);
                 }
             }
             On::Corners => {
                 for chart in &self.list {
-                    let numbers = [0, 1, 2].map(|corner| own.values[3 * chart.triangle + corner]);
                     for (corner, weights) in chart.corners.iter().enumerate() {
-                        values[3 * chart.number + corner] = blended(own, numbers, weights);
+                        values[3 * chart.number + corner] = blended(own, triangles, chart.triangle, weights);
                     }
                 }
             }

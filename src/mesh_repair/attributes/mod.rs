@@ -79,15 +79,13 @@ fn of_mask(mask: &MeshArray, mesh: TriMesh, sources: &[Source]) -> DetailedMesh 
         Source::New => 1.0,
     };
     let values = sources.iter().map(value).collect();
-    let arrays = vec![MeshArray { name: mask.name.clone(), on: mask.on, number: mask.number, values }];
-    DetailedMesh { mesh, uvs: None, arrays }
+    DetailedMesh { mesh, uvs: None, arrays: vec![mask.with(values)] }
 }
 
 /// Attributes of a mesh that has no old mesh to take them from: zeros.
 fn of_nothing(detail: &DetailedMesh, mesh: TriMesh) -> DetailedMesh {
     let [vertices, faces] = [mesh.positions.len(), mesh.triangles.len()];
-    let array =
-        |array: &MeshArray| MeshArray { values: vec![0.0; array.on.count(vertices, faces)], ..array.clone() };
+    let array = |array: &MeshArray| array.with(vec![0.0; array.on.count(vertices, faces)]);
     let uvs = |uvs: &Uvs| Uvs::nothing(uvs.corners.is_some(), vertices, faces);
     let (arrays, uvs) = (detail.arrays.iter().map(array).collect(), detail.uvs.as_ref().map(uvs));
     DetailedMesh { mesh, uvs, arrays }
@@ -151,20 +149,17 @@ impl<'a> Origins<'a> {
     fn array(&self, array: &MeshArray) -> MeshArray {
         let of_vertex = |origin: &Origin| match origin {
             Origin::Vertex(vertex) => array.values[*vertex as usize],
-            Origin::Place(triangle, weights) => {
-                blended(array, self.old[*triangle].map(|vertex| array.values[vertex as usize]), weights)
-            }
+            Origin::Place(triangle, weights) => blended(array, self.old, *triangle, weights),
         };
         let of_corners = |(chart, weights): &(usize, [Weights; 3])| {
-            let numbers = [0, 1, 2].map(|corner| array.values[3 * chart + corner]);
-            weights.map(|weights| blended(array, numbers, &weights))
+            weights.map(|weights| blended(array, self.old, *chart, &weights))
         };
         let values = match array.on {
             On::Vertices => self.vertices.iter().map(of_vertex).collect(),
             On::Corners => self.triangles.iter().flat_map(of_corners).collect(),
             On::Faces => self.triangles.iter().map(|(chart, _)| array.values[*chart]).collect(),
         };
-        MeshArray { name: array.name.clone(), on: array.on, number: array.number, values }
+        array.with(values)
     }
 
     /// Texture coordinates for these triangles of the new mesh, with their sources.

@@ -1,7 +1,7 @@
 //! Values at a position on a triangle, interpolated from those of its corners.
 
 use crate::geometry::DVec3;
-use crate::geometry::mesh::attributes::{MeshArray, Number};
+use crate::geometry::mesh::attributes::{MeshArray, Number, On};
 
 /// Arrays whose 8-bit integers are colour components: they are interpolated, as floats are.
 const COLOURS: [&str; 4] = ["red", "green", "blue", "alpha"];
@@ -63,8 +63,17 @@ pub fn weights(corners: &[DVec3; 3], position: DVec3) -> Weights {
     best.1
 }
 
-/// An array's value at a position, from those of the corners.
-pub(in crate::mesh_repair) fn blended(array: &MeshArray, numbers: [f64; 3], weights: &Weights) -> f64 {
+/// The value of an array of vertices or corners at a position on a triangle, from those of its corners.
+pub(in crate::mesh_repair) fn blended(
+    array: &MeshArray,
+    triangles: &[[u32; 3]],
+    triangle: usize,
+    weights: &Weights,
+) -> f64 {
+    let numbers = match array.on {
+        On::Corners => [0, 1, 2].map(|corner| array.values[3 * triangle + corner]),
+        _ => triangles[triangle].map(|vertex| array.values[vertex as usize]),
+    };
     let most = heaviest(weights);
     if weights[most] == 1.0 {
         return numbers[most];

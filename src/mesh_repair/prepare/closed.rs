@@ -3,7 +3,7 @@
 use crate::geometry::check::edges::{Use, agree};
 use crate::geometry::mesh::drop_marked;
 use crate::geometry::mesh::weld::Weld;
-use crate::geometry::shape::six_volumes;
+use crate::geometry::shape::{normal, six_volumes};
 use crate::geometry::{DVec3, TriMesh};
 
 /// Triangles that are closed as a chain and turned outward: along every edge as many run in one direction as in the other.
@@ -45,10 +45,7 @@ impl Closed {
 
     /// Turns triangles round so that two that share an edge with no third agree.
     pub fn make_agree(&mut self, uses: &[Use]) {
-        let area = |at: usize| {
-            let [a, b, c] = self.mesh.corners(at);
-            (b - a).cross(&(c - a)).norm()
-        };
+        let area = |at: usize| normal(&self.mesh.corners(at)).norm();
         let turned = agree(&self.mesh.triangles, uses, area).turned;
         for (triangle, _) in self.mesh.triangles.iter_mut().zip(&turned).filter(|(_, turned)| **turned) {
             triangle.swap(1, 2);

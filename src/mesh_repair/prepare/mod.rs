@@ -104,6 +104,7 @@ fn loose_needles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<bool> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::geometry::test_meshes::{both, tetrahedron};
 
     /// Prepares a mesh and checks what holds for any; returns the result and how it was prepared.
     pub fn checked(mesh: &TriMesh) -> (TriMesh, Prepared) {
@@ -122,17 +123,10 @@ pub(super) mod tests {
         TriMesh::cuboid([at, 0.0, 0.0], [at + 1.0, 1.0, 1.0])
     }
 
-    pub fn both(mut first: TriMesh, second: &TriMesh) -> TriMesh {
-        first.append(second);
-        first
-    }
-
     /// A copy of a mesh in which each triangle has its own vertices.
     pub fn soup(mesh: &TriMesh) -> TriMesh {
-        let positions: Vec<Vec3> =
-            mesh.triangles.as_flattened().iter().map(|&vertex| mesh.positions[vertex as usize]).collect();
-        let triangles = (0..mesh.triangles.len() as u32).map(|at| [3 * at, 3 * at + 1, 3 * at + 2]).collect();
-        TriMesh { positions, triangles }
+        let corners = mesh.triangles.as_flattened().iter().map(|&vertex| mesh.positions[vertex as usize]);
+        TriMesh::soup(corners.collect())
     }
 
     #[test]
@@ -151,11 +145,7 @@ pub(super) mod tests {
 
     #[test]
     fn loose_triangles_are_joined() {
-        let tetrahedron = TriMesh {
-            positions: vec![Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()],
-            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
-        };
-        let (out, prepared) = checked(&soup(&tetrahedron));
+        let (out, prepared) = checked(&soup(&tetrahedron(0.0)));
         assert_eq!(prepared, Prepared { joined_vertices: 8, ..Prepared::default() });
         assert!(out.is_manifold() && out.triangles.len() == 4 && out.volume() > 0.16);
     }

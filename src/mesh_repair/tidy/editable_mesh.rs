@@ -23,7 +23,7 @@ pub(in crate::mesh_repair) struct VertexRings<'a> {
 
 impl<'a> VertexRings<'a> {
     /// Takes three passes over all triangles, and memory for those near created ones.
-    pub(in crate::mesh_repair) fn of(draft: &'a mut Draft) -> Self {
+    pub fn of(draft: &'a mut Draft) -> Self {
         let mut is_used = vec![false; draft.positions.len()];
         let created = draft.triangles.iter().zip(&draft.sources);
         for (corners, _) in created.filter(|(_, source)| !matches!(source, Source::Whole(_))) {
@@ -34,17 +34,17 @@ impl<'a> VertexRings<'a> {
     }
 
     /// Whether a triangle exists, and was made or changed by the repair; whole ones stay as they are.
-    pub(in crate::mesh_repair) fn is_created(&self, triangle: u32) -> bool {
+    pub fn is_created(&self, triangle: u32) -> bool {
         !self.fans.are_dead()[triangle as usize] && !matches!(self.source(triangle), Source::Whole(_))
     }
 
     /// Vertices of a triangle.
-    pub(in crate::mesh_repair) fn corners(&self, triangle: u32) -> [u32; 3] {
+    pub fn corners(&self, triangle: u32) -> [u32; 3] {
         self.draft.triangles[triangle as usize]
     }
 
     /// The position of a vertex (cells).
-    pub(in crate::mesh_repair) fn position(&self, vertex: u32) -> DVec3 {
+    pub fn position(&self, vertex: u32) -> DVec3 {
         self.draft.positions[vertex as usize]
     }
 
@@ -57,7 +57,7 @@ impl<'a> VertexRings<'a> {
     }
 
     /// Collapses and flips of a triangle's edges that keep the mesh a closed 2-manifold, wherever its vertices lie.
-    pub(in crate::mesh_repair) fn changes(&self, triangle: u32) -> Vec<Change> {
+    pub fn changes(&self, triangle: u32) -> Vec<Change> {
         let corners = self.corners(triangle);
         let mut out = Vec::with_capacity(12);
         for first in 0..3 {
@@ -91,12 +91,7 @@ impl<'a> VertexRings<'a> {
     }
 
     /// Triangles with a corner that a collapse moves or renames.
-    pub(in crate::mesh_repair) fn moving(
-        &self,
-        from: u32,
-        to: u32,
-        position: DVec3,
-    ) -> impl Iterator<Item = u32> {
+    pub fn moving(&self, from: u32, to: u32, position: DVec3) -> impl Iterator<Item = u32> {
         self.fans.moving(&self.draft.triangles, [from, to], position != self.position(to))
     }
 
@@ -108,7 +103,7 @@ impl<'a> VertexRings<'a> {
 
     /// Makes a change, one of [`VertexRings::changes`] whose moving triangles are all created; returns the triangles that it touched, and whole
     /// ones around the same vertex.
-    pub(in crate::mesh_repair) fn make(&mut self, change: Change) -> Vec<u32> {
+    pub fn make(&mut self, change: Change) -> Vec<u32> {
         match change {
             Change::Collapse { from, to, position } => self.collapse(from, to, position),
             Change::Flip { triangles, corners } => {
@@ -137,7 +132,7 @@ impl<'a> VertexRings<'a> {
     }
 
     /// Drops removed triangles, and new vertices that no triangle uses. All others keep their order.
-    pub(in crate::mesh_repair) fn finish(self) {
+    pub fn finish(self) {
         let Self { draft, fans } = self;
         drop_marked(&mut draft.triangles, fans.are_dead());
         drop_marked(&mut draft.sources, fans.are_dead());
@@ -151,32 +146,16 @@ impl<'a> VertexRings<'a> {
 
 #[cfg(test)]
 pub(in crate::mesh_repair) mod tests {
-    use std::f64::consts::TAU;
-
     use super::*;
     use crate::geometry::check::topology::Topology;
+    use crate::geometry::test_meshes;
 
-    /// Quads of a torus around its axis, and across its tube.
-    const AROUND: u32 = 80;
-    const ACROSS: u32 = 24;
-
-    /// A torus of whole triangles with edges of 0.3 to 0.9 sizes (cells). Triangles 2n and 2n + 1 share their first edge.
+    /// A torus of whole triangles with edges of 0.3 to 0.9 sizes (cells).
     pub fn torus(size: f64) -> Draft {
-        let position = |n: u32| {
-            let turn = |n: u32, of: u32| TAU * f64::from(n) / f64::from(of);
-            let (u, v) = (turn(n / ACROSS, AROUND), turn(n % ACROSS, ACROSS));
-            let far = 6.0 + 2.0 * libm::cos(v);
-            DVec3::new(far * libm::cos(u), 2.0 * libm::sin(v), far * libm::sin(u)) * size
-        };
-        let quad = |n: u32| {
-            let at = |i: u32, j: u32| (n / ACROSS + i) % AROUND * ACROSS + (n % ACROSS + j) % ACROSS;
-            let [a, b, c, d] = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)];
-            [[a, c, b], [c, a, d]]
-        };
-        let triangles: Vec<[u32; 3]> = (0..AROUND * ACROSS).flat_map(quad).collect();
+        let (positions, triangles) = test_meshes::torus();
         Draft {
-            positions: (0..AROUND * ACROSS).map(position).collect(),
-            is_made: vec![false; (AROUND * ACROSS) as usize],
+            is_made: vec![false; positions.len()],
+            positions: positions.into_iter().map(|position| position * size).collect(),
             sources: (0..triangles.len() as u32).map(Source::Whole).collect(),
             triangles,
         }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::SUPPORT;
 use super::kernel::{Near, values};
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use crate::geometry::coords::between;
 use crate::geometry::{Coord, DVec3};
 use crate::numeric::lanes::LANES;
@@ -55,16 +55,12 @@ impl Implicit {
     /// A spacing that is not positive, a cell that is not within 1/8 to 2 spacings; particles too far apart; more memory than the context
     /// allows; cancel.
     pub fn new(ctx: &Context, positions: &[DVec3], spacing: f64, cell: f64) -> Result<Self> {
-        if !(spacing > 0.0 && spacing.is_finite()) {
-            return Err(Error::argument(format!(
-                "the spacing of particles must be above 0, not {spacing} m"
-            )));
-        }
-        if !(0.125..=2.0).contains(&(cell / spacing)) {
-            return Err(Error::argument(format!(
-                "a cell of {cell} m is not within 1/8 to 2 spacings of {spacing} m"
-            )));
-        }
+        fail_if(!(spacing > 0.0 && spacing.is_finite()), || {
+            Error::argument(format!("the spacing of particles must be above 0, not {spacing} m"))
+        })?;
+        fail_if(!(0.125..=2.0).contains(&(cell / spacing)), || {
+            Error::argument(format!("a cell of {cell} m is not within 1/8 to 2 spacings of {spacing} m"))
+        })?;
         let cells = Cells::new(positions, 2.0 * spacing, |_| 0)?;
         let mut implicit = Self { cell, patches: Vec::new(), values: Vec::new(), states: HashMap::new() };
         let around = Around { cells: &cells, spacing, cell };

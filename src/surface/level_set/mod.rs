@@ -8,8 +8,6 @@ mod kernel;
 pub(in crate::surface) mod openvdb;
 pub(in crate::surface) mod sampler;
 pub(in crate::surface) mod smooth;
-#[cfg(feature = "vdb")]
-pub(in crate::surface) mod spheres;
 mod thickness;
 
 /// Radius within which particles count (spacings).

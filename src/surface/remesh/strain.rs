@@ -67,16 +67,20 @@ mod tests {
         assert_eq!([2.1, 2.49, 2.51, 0.31, 0.29].map(|length| limits(length, AT_REST)), [0, 0, 1, 0, 1]);
     }
 
+    /// Whether an edge of this length (targets) is strained between two vertices with these drifts.
+    fn is_strained_by(length: f64, drifts: [[f32; 3]; 2], tremble: f64) -> bool {
+        let mut body = Body::of(vec![DVec3::zeros(), DVec3::x() * length, DVec3::y()], vec![[0, 1, 2]]);
+        body.sizes = vec![[1.0; 2]; 3];
+        body.drifts = vec![drifts[0], drifts[1], [0.0; 3]];
+        body.tremble = tremble;
+        body.improvable().is_strained([0, 1])
+    }
+
     #[test]
     fn an_edge_rests_until_it_changes_or_creeps_far_out() {
         // Two vertices 1.6 targets apart, of which the second was this much nearer before.
         let is_strained = |length: f64, nearer: f32, tremble: f64| {
-            let positions = vec![DVec3::zeros(), DVec3::x() * length, DVec3::y()];
-            let mut body = Body::of(positions, vec![[0, 1, 2]]);
-            body.sizes = vec![[1.0; 2]; 3];
-            body.drifts = vec![[100.0, 7.0, 0.0], [100.0 + nearer, 7.0, 0.0], [0.0; 3]];
-            body.tremble = tremble;
-            body.improvable().is_strained([0, 1])
+            is_strained_by(length, [[100.0, 7.0, 0.0], [100.0 + nearer, 7.0, 0.0]], tremble)
         };
         assert!(!is_strained(1.6, 0.0, 0.0) && !is_strained(1.6, 0.03, 0.0) && !is_strained(1.6, -0.03, 0.0));
         assert!(is_strained(1.6, 0.05, 0.0) && is_strained(1.6, -0.05, 0.0) && !is_strained(1.6, 0.05, 0.1));
@@ -88,14 +92,7 @@ mod tests {
 
     #[test]
     fn ends_that_are_where_they_were_do_not_strain_an_edge_before_it_creeps_far_out() {
-        let is_strained = |length: f64, by: f32| {
-            let positions = vec![DVec3::zeros(), DVec3::x() * length, DVec3::y()];
-            let mut body = Body::of(positions, vec![[0, 1, 2]]);
-            body.sizes = vec![[1.0; 2]; 3];
-            body.drifts = vec![[0.0; 3], [by, 0.0, 0.0], [0.0; 3]];
-            body.tremble = 0.01;
-            body.improvable().is_strained([0, 1])
-        };
+        let is_strained = |length: f64, by: f32| is_strained_by(length, [[0.0; 3], [by, 0.0, 0.0]], 0.01);
         assert!(!is_strained(1.6, 0.29) && !is_strained(1.6, -0.29));
         assert!(is_strained(1.6, 0.31) && is_strained(1.6, -0.31));
         // An edge that only jitters about a limit of moving edges does not cross the one at rest.

@@ -1,7 +1,6 @@
 //! Improvement of stretched and squeezed meshes.
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 
 use super::shape::least_angle;
 use super::*;
@@ -144,20 +143,8 @@ pub(super) fn sphere(levels: u32) -> Body {
 
 /// A torus with edges of different lengths.
 fn torus() -> Body {
-    const AROUND: u32 = 80;
-    const ACROSS: u32 = 24;
-    let position = |n: u32| {
-        let turn = |n: u32, of: u32| TAU * f64::from(n) / f64::from(of);
-        let (u, v) = (turn(n / ACROSS, AROUND), turn(n % ACROSS, ACROSS));
-        let far = 6.0 + 2.0 * libm::cos(v);
-        DVec3::new(far * libm::cos(u), 2.0 * libm::sin(v), far * libm::sin(u))
-    };
-    let quad = |n: u32| {
-        let at = |i: u32, j: u32| (n / ACROSS + i) % AROUND * ACROSS + (n % ACROSS + j) % ACROSS;
-        let [a, b, c, d] = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)];
-        [[a, c, b], [c, a, d]]
-    };
-    Body::of((0..AROUND * ACROSS).map(position).collect(), (0..AROUND * ACROSS).flat_map(quad).collect())
+    let (positions, triangles) = test_meshes::torus();
+    Body::of(positions, triangles)
 }
 
 #[test]

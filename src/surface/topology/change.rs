@@ -11,6 +11,7 @@ use crate::geometry::DVec3;
 use crate::geometry::check::topology::around;
 use crate::geometry::coords::{cell_of, cells_at, plus};
 use crate::geometry::mesh::compact;
+use crate::geometry::shape::normal;
 use crate::mesh_repair::{CellSet, Pierces, Rebuilt, Shape, Source, ladder, overlaps};
 use crate::surface::level_set::band::Distances;
 use crate::surface::level_set::implicit::Implicit;
@@ -92,6 +93,26 @@ impl Change {
         }
     }
 
+    /// The change of a mesh of which cells were rebuilt.
+    fn of(unfit: &Unfit<'_>, Rebuilt { draft, cells, rung, .. }: Rebuilt, lattice: &Lattice) -> Self {
+        let own = unfit.vertices.len();
+        let (names, triangles) = compact(draft.positions.len(), &draft.triangles);
+        let origin = DVec3::from(lattice.origin.map(f64::from));
+        let position = |name: &u32| match unfit.vertices.get(*name as usize) {
+            Some(position) => *position,
+            None => (draft.positions[*name as usize] + origin) * lattice.voxel,
+        };
+        Self {
+            vertices: names.iter().map(position).collect(),
+            triangles,
+            origins: names.iter().map(|name| ((*name as usize) < own).then_some(*name)).collect(),
+            sources: draft.sources,
+            rebuilt_cells: cells,
+            rung,
+            ..Self::to_nothing(unfit)
+        }
+    }
+
     /// Carries shares (0..=1) over from the vertices before the change to those after it. A new vertex gets the mean of its neighbours that
     /// stayed, 0 if there are none.
     pub(in crate::surface) fn carried_shares(&self, values: &[f32]) -> Vec<f32> {
@@ -146,22 +167,8 @@ pub fn change(
     let high = unfit.vertices.iter().fold(first, |high, position| high.sup(position));
     let lattice = Lattice::near(cell, 0.5 * (low + high))?;
     let in_cells: Vec<DVec3> = unfit.vertices.iter().map(|position| lattice.to_cells(*position)).collect();
-    let fixed = in_cells.iter().map(|position| lattice.fix(*position)).collect::<Result<Vec<_>>>()?;
-    let (shape, flagged) = ctx.phase("flag", || {
-        // Some 100 bytes for each edge of the grid that the mesh pierces: up to 1.7 per unit of its area, in cell faces.
-        let edges = |[a, b, c]: [DVec3; 3]| (b - a).cross(&(c - a)).norm() / 2.0;
-        let faces: f64 =
-            unfit.triangles.iter().map(|names| edges(names.map(|name| in_cells[name as usize]))).sum();
-        ctx.allow("the mesh's cells (larger ones need less)", (170.0 * faces).min(1e18) as u64)?;
-        let pierces = Pierces::of(&fixed, unfit.triangles);
-        let shape = Shape { fixed, triangles: unfit.triangles.to_vec(), pierces };
-        ctx.check()?;
-        let mut flagged = flagged(unfit, &shape, &lattice);
-        if let Some(everywhere) = &unfit.everywhere {
-            everywhere.flag(ctx, &shape, (&in_cells, &lattice), (phi, distances), &mut flagged)?;
-        }
-        Ok((shape, flagged))
-    })?;
+    let (shape, flagged) =
+        ctx.phase("flag", || surveyed(ctx, unfit, (&in_cells, &lattice), (phi, distances)))?;
     if flagged.count() == 0 {
         return Ok(None);
     }
@@ -172,27 +179,30 @@ pub fn change(
         cells_at(node).into_iter().for_each(|cell| _ = set.add(cell));
     }
     let rebuilt = ctx.phase("rebuild", || ladder(ctx, &shape, (&in_cells, &lattice), &set, &gamma))?;
-    let Rebuilt { draft, cells, rung, .. } = rebuilt;
-    let own = unfit.vertices.len();
-    let (names, triangles) = compact(draft.positions.len(), &draft.triangles);
-    let origin = DVec3::from(lattice.origin.map(f64::from));
-    let position = |name: &u32| match unfit.vertices.get(*name as usize) {
-        Some(position) => *position,
-        None => (draft.positions[*name as usize] + origin) * cell,
-    };
-    let vertices = names.iter().map(position).collect();
-    Ok(Some(Change {
-        vertices,
-        triangles,
-        origins: names.iter().map(|name| ((*name as usize) < own).then_some(*name)).collect(),
-        sources: draft.sources,
-        before: unfit.vertices.to_vec(),
-        flagged_cells: flagged.count(),
-        rebuilt_cells: cells,
-        rung,
-        iterations: gamma.iterations,
-        ..Change::default()
-    }))
+    let (flagged_cells, iterations) = (flagged.count(), gamma.iterations);
+    Ok(Some(Change { flagged_cells, iterations, ..Change::of(unfit, rebuilt, &lattice) }))
+}
+
+/// A mesh in the grid, at these positions (cells), and the cells in which it does not fit.
+fn surveyed(
+    ctx: &Context,
+    unfit: &Unfit<'_>,
+    (in_cells, lattice): (&[DVec3], &Lattice),
+    (phi, distances): (&Implicit, &Distances),
+) -> Result<(Shape, CellSet)> {
+    let fixed = in_cells.iter().map(|position| lattice.fix(*position)).collect::<Result<Vec<_>>>()?;
+    // Some 100 bytes for each edge of the grid that the mesh pierces: up to 1.7 per unit of its area, in cell faces.
+    let area = |names: &[u32; 3]| normal(&names.map(|name| in_cells[name as usize])).norm() / 2.0;
+    let faces: f64 = unfit.triangles.iter().map(area).sum();
+    ctx.allow("the mesh's cells (larger ones need less)", (170.0 * faces).min(1e18) as u64)?;
+    let pierces = Pierces::of(&fixed, unfit.triangles);
+    let shape = Shape { fixed, triangles: unfit.triangles.to_vec(), pierces };
+    ctx.check()?;
+    let mut flagged = flagged(unfit, &shape, lattice);
+    if let Some(everywhere) = &unfit.everywhere {
+        everywhere.flag(ctx, &shape, (in_cells, lattice), (phi, distances), &mut flagged)?;
+    }
+    Ok((shape, flagged))
 }
 
 /// Removes parts with too few particles, improves a mesh (thesis 2.6), including where it was changed, and measures the new vertices.
@@ -265,8 +275,7 @@ fn flagged(unfit: &Unfit<'_>, shape: &Shape, lattice: &Lattice) -> CellSet {
 mod tests {
     use super::*;
     use crate::geometry::check::faults::Faults;
-    use crate::surface::test_particles::{context, own_surface, two_balls};
-    use crate::surface::{Params, Tracker};
+    use crate::surface::test_particles::{context, rebuilt, two_balls};
 
     #[test]
     fn two_balls_become_one_and_part_again() {
@@ -275,9 +284,7 @@ mod tests {
         let away = |frame: i32| 9.0 - 0.25 * f64::from(if frame < 24 { frame } else { 48 - frame });
         let at = |frame: i32| two_balls(5.5, DVec3::new(away(frame), 0.1, 0.2));
         let mut from = at(0);
-        let mesh = own_surface(&ctx, &from.positions);
-        let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
-        let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
+        let mut tracker = rebuilt(&ctx, &from);
         let mut parts = Vec::new();
         for frame in 1..=48 {
             let to = at(frame);

@@ -164,9 +164,7 @@ pub fn is_within([low, high]: &Bounds, position: &DVec3) -> bool {
 
 /// Triangles as a mesh, with positions relative to another; each has its own corners.
 pub fn seen_from(position: DVec3, triangles: &[[DVec3; 3]]) -> TriMesh {
-    let positions = triangles.as_flattened().iter().map(|corner| (corner - position).cast()).collect();
-    let triangles = (0..triangles.len() as u32).map(|at| [3 * at, 3 * at + 1, 3 * at + 2]).collect();
-    TriMesh { positions, triangles }
+    TriMesh::soup(triangles.as_flattened().iter().map(|corner| (corner - position).cast()).collect())
 }
 
 #[cfg(test)]

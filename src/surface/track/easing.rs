@@ -249,17 +249,14 @@ impl Patch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::test_particles::{context, own_surface, two_balls};
-    use crate::surface::{Params, Tracker};
+    use crate::surface::test_particles::{context, rebuilt, two_balls};
 
     #[test]
     fn the_old_surface_leads_to_the_bridge_that_comes() {
         let ctx = context(2);
         let balls = |away: f64| two_balls(4.2, DVec3::new(away, 0.1, 0.0));
         let mut from = balls(6.5);
-        let mesh = own_surface(&ctx, &from.positions);
-        let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
-        let mut tracker = Tracker::new(&ctx, params, &mesh, &from).unwrap();
+        let mut tracker = rebuilt(&ctx, &from);
         let farthest = |places: &[DVec3], triangles: &[[u32; 3]], change: &Change| {
             let positions = places.iter().map(|place| place.cast()).collect();
             let tree = NearestTree::new(&TriMesh { positions, triangles: triangles.to_vec() });

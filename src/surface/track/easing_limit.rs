@@ -183,8 +183,8 @@ impl Bins {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::test_particles::{context, own_surface, two_balls};
-    use crate::surface::{Outlook, Params, Tracker};
+    use crate::surface::Outlook;
+    use crate::surface::test_particles::{context, rebuilt, two_balls};
 
     /// Two cubes with a gap of 1 between them.
     fn cubes() -> (Vec<DVec3>, Vec<[u32; 3]>) {
@@ -228,9 +228,7 @@ mod tests {
         const AHEAD: usize = 4;
         let ctx = context(2);
         let balls = |frame: usize| two_balls(4.2, DVec3::new(6.5 - 0.2 * frame as f64, 0.1, 0.0));
-        let mesh = own_surface(&ctx, &balls(0).positions);
-        let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
-        let mut tracker = Tracker::new(&ctx, params, &mesh, &balls(0)).unwrap();
+        let mut tracker = rebuilt(&ctx, &balls(0));
         let (mut outlook, mut moved) = (Outlook::default(), 0);
         for frame in 0..14 {
             let coming = (1..=AHEAD + 1).map(|ahead| balls(frame + ahead)).collect();

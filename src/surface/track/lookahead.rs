@@ -106,8 +106,7 @@ pub fn displaced(eased: &[Eased]) -> Vec<Displaced> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::Params;
-    use crate::surface::test_particles::{context, own_surface, two_balls};
+    use crate::surface::test_particles::{context, rebuilt, two_balls};
 
     const DT: f64 = 0.04;
 
@@ -120,9 +119,7 @@ mod tests {
     fn steps_that_were_made_ahead_are_those_that_come_and_only_what_goes_is_moved() {
         let ctx = context(2);
         let first = balls(0);
-        let mesh = own_surface(&ctx, &first.positions);
-        let params = Params { rebuild: true, ..Params::for_spacing(1.0) };
-        let mut tracker = Tracker::new(&ctx, params, &mesh, &first).unwrap();
+        let mut tracker = rebuilt(&ctx, &first);
         let mut plain = tracker.clone();
         let (mut outlook, mut moved) = (Outlook::default(), 0);
         for frame in 0..16 {

@@ -30,6 +30,9 @@ const GRAIN: usize = 4096;
 /// Passages or points per task.
 const FEW: usize = 64;
 
+/// Some blocks.
+type Blocks = HashSet<[i32; 3]>;
+
 /// Clears the bits (see [`crate::sweep::chain`]) of tetrahedra in which the surface only returns from being inside out.
 ///
 /// # Errors
@@ -63,7 +66,7 @@ enum Folded {
     /// All poses are rigid motions of the first one; the triangles near its negative winding numbers.
     Rigid(Vec<u32>),
     /// For each pose the blocks near negative winding numbers.
-    Blocks(Vec<HashSet<[i32; 3]>>),
+    Blocks(Vec<Blocks>),
 }
 
 impl Folded {
@@ -77,11 +80,11 @@ impl Folded {
         let rigid = is_rigid(topology, levels);
         let (levels_to_scan, window) =
             if rigid { (&levels[..1], &grown(window, levels)) } else { (levels, window) };
-        let blocks: Vec<HashSet<[i32; 3]>> = levels_to_scan
+        let blocks: Vec<Blocks> = levels_to_scan
             .par_iter()
             .map(|level| folded_blocks(ctx, topology, level, window))
             .collect::<Result<_>>()?;
-        if blocks.iter().all(HashSet::is_empty) {
+        if blocks.iter().all(Blocks::is_empty) {
             return Ok(None);
         }
         Ok(Some(if rigid {
@@ -124,7 +127,7 @@ fn grown(window: &Window, levels: &[Vec<Fixed>]) -> Window {
 }
 
 /// The triangles of a pose that touch these blocks, ascending.
-fn touching(topology: &Topology, level: &[Fixed], blocks: &HashSet<[i32; 3]>) -> Vec<u32> {
+fn touching(topology: &Topology, level: &[Fixed], blocks: &Blocks) -> Vec<u32> {
     if blocks.is_empty() {
         return Vec::new();
     }
@@ -137,12 +140,7 @@ fn touching(topology: &Topology, level: &[Fixed], blocks: &HashSet<[i32; 3]>) ->
 }
 
 /// The blocks of a pose with negative winding numbers, and those around them.
-fn folded_blocks(
-    ctx: &Context,
-    topology: &Topology,
-    level: &[Fixed],
-    window: &Window,
-) -> Result<HashSet<[i32; 3]>> {
+fn folded_blocks(ctx: &Context, topology: &Topology, level: &[Fixed], window: &Window) -> Result<Blocks> {
     ctx.check()?;
     let wanted = |face: &Face| {
         let [a, b, c] = face.v;

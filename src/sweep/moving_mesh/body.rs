@@ -10,7 +10,7 @@ use super::topology::{Simplex, Topology};
 use crate::context::Context;
 use crate::distance::Face;
 use crate::distance::lattice::{Fixed, Lattice, UNITS};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use crate::geometry::DVec3;
 use crate::geometry::check::orientation::{Closing, Orientation};
 use crate::geometry::mesh::weld::{Boundary, STEPS, Weld};
@@ -83,9 +83,7 @@ impl Body {
     /// # Errors
     /// As [`Body::new`].
     pub fn shaped(motion: Box<dyn Motion>, time: f64, known: Option<Arc<Shape>>) -> Result<Self> {
-        if motion.triangles().is_empty() {
-            return Err(Error::argument("an object has no triangles"));
-        }
+        fail_if(motion.triangles().is_empty(), || Error::argument("an object has no triangles"))?;
         let mut pose = Vec::new();
         motion.pose(time, &mut pose)?;
         let triangles = hash_of(motion.triangles());

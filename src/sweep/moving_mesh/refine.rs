@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::topology::{Derived, Simplex, Topology};
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use crate::geometry::DVec3;
 
 /// Maximum number of pieces of an edge in one round.
@@ -63,9 +63,7 @@ pub fn refine(
         let added: u64 = pieces.iter().map(|&pieces| u64::from(pieces - 1)).sum();
         let needed = added * (poses.len() as u64 * BYTES_PER_POSITION + BYTES_PER_VERTEX);
         ctx.allow(WHAT, needed)?;
-        if needed > MOST_BYTES {
-            return Err(Error::Memory { what: WHAT.into(), needed, limit: MOST_BYTES });
-        }
+        fail_if(needed > MOST_BYTES, || Error::Memory { what: WHAT.into(), needed, limit: MOST_BYTES })?;
         let split = Split::new(current, &pieces);
         let simplices = split.triangles(current);
         let mut derived = current.derived.clone();

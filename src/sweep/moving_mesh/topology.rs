@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use crate::geometry::DVec3;
 use crate::geometry::check::topology::Sets;
 use crate::geometry::lists::Lists;
+use crate::geometry::shape::normal;
 
 /// A triangle with its vertices in ascending order: this order determines how prisms are split.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,8 +28,7 @@ impl Simplex {
 
     /// Twice its area (m2) at a pose.
     pub fn doubled_area(&self, pose: &[DVec3]) -> f64 {
-        let [a, b, c] = self.v.map(|vertex| pose[vertex as usize]);
-        (b - a).cross(&(c - a)).norm()
+        normal(&self.v.map(|vertex| pose[vertex as usize])).norm()
     }
 
     /// A counter-clockwise triangle; none if two corners are the same.

@@ -5,6 +5,8 @@
 
 use std::io::{Read, Seek, SeekFrom};
 
+use crate::error::fail_if;
+
 /// OpenVDB's magic number, the first bytes of every file.
 pub(in crate::vdb) const MAGIC: [u8; 8] = [0x20, 0x42, 0x44, 0x56, 0, 0, 0, 0];
 /// Versions of the format whose structure is known here; OpenVDB 10 writes the newest one.
@@ -83,9 +85,7 @@ pub fn read(source: impl Read + Seek) -> Result<Layout, Fault> {
     let Some(has_offsets) = has_offsets else { return Ok(Layout { version, grids: None }) };
     walk.metadata(walk.length, "metadata of the file")?;
     let count = walk.u32("number of grids")? as i32;
-    if count < 0 {
-        return Err(damaged(format_args!("it says that it holds {count} grids")));
-    }
+    fail_if(count < 0, || damaged(format_args!("it says that it holds {count} grids")))?;
     if !has_offsets {
         return Ok(Layout { version, grids: None });
     }
@@ -174,9 +174,7 @@ impl<R: Read + Seek> Walk<R> {
     fn name(&mut self, part: &str) -> Result<String, Fault> {
         let length = u64::from(self.u32(part)?);
         self.expect(length, part)?;
-        if length > LONGEST_NAME {
-            return Err(damaged(format_args!("a name of {length} bytes in its {part}")));
-        }
+        fail_if(length > LONGEST_NAME, || damaged(format_args!("a name of {length} bytes in its {part}")))?;
         let mut text = vec![0; length as usize];
         self.fill(&mut text, part)?;
         Ok(String::from_utf8_lossy(&text).into_owned())
@@ -216,9 +214,7 @@ impl<R: Read + Seek> Walk<R> {
         for _ in 0..count {
             let (_, _, size) = self.entry(part)?;
             self.skip(size, part)?;
-            if self.at > before {
-                return Err(damaged(format_args!("the {part} reaches beyond its bounds")));
-            }
+            fail_if(self.at > before, || damaged(format_args!("the {part} reaches beyond its bounds")))?;
         }
         Ok(())
     }

@@ -143,9 +143,7 @@ impl<'a> Space<'a> {
             corners.extend(shape.triangles.iter().map(|corners| corners.map(|p| (p - low).cast::<f32>())));
             owner.resize(corners.len(), part);
         }
-        let positions = corners.as_flattened().to_vec();
-        let triangles = (0..corners.len() as u32).map(|at| [3 * at, 3 * at + 1, 3 * at + 2]).collect();
-        let tree = Bvh::new(&TriMesh { positions, triangles });
+        let tree = Bvh::new(&TriMesh::soup(corners.as_flattened().to_vec()));
         Self { shapes, low, near: ON * (high - low).norm(), corners, tree, owner }
     }
 

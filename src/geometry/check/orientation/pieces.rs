@@ -7,7 +7,7 @@ use crate::geometry::check::edges::{
     Agreement, Use, agree, edge_uses, imbalance, is_same_edge, parts_of, sound,
 };
 use crate::geometry::check::topology::Sets;
-use crate::geometry::shape::{bounds, six_volumes};
+use crate::geometry::shape::{bounds, normal, six_volumes};
 use crate::geometry::spatial::bvh::Bvh;
 use crate::geometry::{DVec3, TriMesh};
 
@@ -54,8 +54,7 @@ impl<'a> Pieces<'a> {
     }
 
     fn area(&self, triangle: usize) -> f64 {
-        let [a, b, c] = self.corners(triangle);
-        (b - a).cross(&(c - a)).norm()
+        normal(&self.corners(triangle)).norm()
     }
 
     /// Leaves triangles out.
@@ -170,9 +169,7 @@ impl<'a> Pieces<'a> {
             let (volume, low, size) = self.volume(part);
             let way = if volume < 0.0 { -1 } else { 1 };
             let local = |at: &u32| self.corners(*at as usize).map(|p| (p - low).cast::<f32>());
-            let positions = part.iter().flat_map(local).collect();
-            let triangles = (0..part.len() as u32).map(|at| [3 * at, 3 * at + 1, 3 * at + 2]).collect();
-            let tree = Bvh::new(&TriMesh { positions, triangles });
+            let tree = Bvh::new(&TriMesh::soup(part.iter().flat_map(local).collect()));
             let mut largest: Vec<(u32, f64, u32)> =
                 part.iter().map(|at| (patch[*at as usize], self.area(*at as usize), *at)).collect();
             largest.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
@@ -206,10 +203,10 @@ impl<'a> Pieces<'a> {
         };
         for at in (0..count).filter(|at| is_it(self, *at)) {
             let first = self.corners(self.part[at] as usize)[0];
-            let [a, b, c] = self.corners(at);
+            let corners = self.corners(at);
             sums[self.part[at] as usize] += match closing {
-                Closing::Below => (b - a).cross(&(c - a)).y,
-                Closing::Caps => (a - first).dot(&(b - first).cross(&(c - first))),
+                Closing::Below => normal(&corners).y,
+                Closing::Caps => six_volumes(&corners, &first),
             };
         }
         for at in 0..count {
@@ -277,8 +274,8 @@ impl<'a> Pieces<'a> {
             if closing == Closing::Caps {
                 shape.triangles = self.caps(part);
                 let own: f64 = part.iter().map(|at| self.area(*at as usize)).sum();
-                let of_caps = |[a, b, c]: &[DVec3; 3]| (b - a).cross(&(c - a)).norm();
-                shape.can_turn = shape.triangles.iter().map(of_caps).sum::<f64>() <= CAPS * own;
+                let of_caps: f64 = shape.triangles.iter().map(|corners| normal(corners).norm()).sum();
+                shape.can_turn = of_caps <= CAPS * own;
                 let six =
                     part.iter().map(|at| self.corners(*at as usize)).chain(shape.triangles.iter().copied());
                 shape.volume =

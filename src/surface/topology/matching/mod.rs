@@ -24,7 +24,7 @@ pub(in crate::surface) mod nodes;
 mod solve;
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, fail_if};
 use nodes::Free;
 pub use nodes::Node;
 use solve::System;
@@ -119,12 +119,9 @@ impl Matching {
                 self.tolerance
             )));
         }
-        if self.reach < 1 {
-            return Err(Error::argument(format!(
-                "the reach of the matching, {}, is not 1 or more",
-                self.reach
-            )));
-        }
+        fail_if(self.reach < 1, || {
+            Error::argument(format!("the reach of the matching, {}, is not 1 or more", self.reach))
+        })?;
         if let Some(omega) = self.omega.filter(|omega| !(1.0..2.0).contains(omega)) {
             return Err(Error::argument(format!(
                 "the relaxation factor of the matching, {omega}, is not at least 1 and less than 2"
