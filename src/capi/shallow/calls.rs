@@ -1,8 +1,6 @@
 //! Shapes of calls: what they change, and what they report.
 
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{HandleType, change, required};
-use crate::capi::ffi::views::{Sized32, fill};
+use crate::capi::ffi::*;
 use crate::capi::runtime::context::{enter_light, frz_context};
 use crate::context::Context;
 

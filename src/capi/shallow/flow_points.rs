@@ -1,8 +1,7 @@
 //! Flow points of a host, and the triangles that they move with.
 
 use super::ground::Terrain;
-use crate::capi::ffi::guard::{Outcome, refuse};
-use crate::capi::ffi::views::{Sized32, meaning};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::shallow::sources::{FlowPoint, Kind, Pulse};
 

@@ -3,9 +3,7 @@
 use super::calls::informs;
 use super::lists::numbers;
 use super::spill::frz_shallow;
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{answer, read};
-use crate::capi::ffi::views::{Plain, Sized32, frz_span, frz_view, meaning};
+use crate::capi::ffi::*;
 use crate::shallow::View;
 
 /// Layer of a volume: all layers.

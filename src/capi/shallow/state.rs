@@ -3,10 +3,7 @@
 use std::ffi::c_void;
 
 use super::spill::frz_shallow;
-use crate::capi::ffi::guard::frz_status::FRZ_ERROR_CAPACITY;
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{change, clear, read, required};
-use crate::capi::ffi::views::{frz_span, frz_view};
+use crate::capi::ffi::*;
 use crate::capi::runtime::context::{enter_light, frz_context};
 
 /// Saves all that the next frame depends on besides the ground, the parameters, the flow points and the bodies, in real time (frz_shallow):
@@ -83,7 +80,7 @@ pub(in crate::capi) unsafe fn put_state(
     let Some(room) = room else { return Ok(()) };
     if room.len() < needed {
         let text = format!("there is room for {capacity} bytes, {needed} are needed");
-        return Err(Failure::new(FRZ_ERROR_CAPACITY, text));
+        return Err(Failure::new(frz_status::FRZ_ERROR_CAPACITY, text));
     }
     save_to(room)?;
     Ok(())

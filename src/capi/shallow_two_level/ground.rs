@@ -3,16 +3,14 @@
 use std::ffi::c_void;
 
 use super::liquid::{DetailHandle, frz_shallow_detail};
-use crate::capi::ffi::guard::{frz_status, guard, refuse};
-use crate::capi::ffi::handle::{change, clear, read, required};
-use crate::capi::ffi::views::frz_view;
+use crate::capi::ffi::*;
 use crate::capi::runtime::context::{enter_light, frz_context};
 use crate::capi::shallow::calls::{changes, informs};
 use crate::capi::shallow::ground::{all_cells, read_heights};
 use crate::capi::shallow::lists::read_list;
 use crate::capi::shallow::state::{put_state, taken_state};
 use crate::capi::shallow::surface::{
-    FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target,
+    FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, frz_shallow_layout, frz_shallow_size, frz_shallow_target, writes,
 };
 use crate::capi::shallow::terrain::{frz_shallow_body, frz_shallow_moved};
 use crate::shallow::terrain::Solids;
@@ -135,26 +133,26 @@ pub unsafe extern "C" fn frz_shallow_detail_surface(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so are the spans.
-    guard(|| unsafe {
-        let wanted = Wanted::new(layout, target, size)?;
-        let _call = enter_light(context)?;
-        let DetailHandle { detail, surface, shown: [fine, coarse], is_reserved, .. } = &mut *change(detail)?;
-        for (flag, name) in
-            [(FRZ_SHALLOW_LIFTED, "FRZ_SHALLOW_LIFTED"), (FRZ_SHALLOW_SKIRTED, "FRZ_SHALLOW_SKIRTED")]
-        {
-            refuse(wanted.has(flag), || format!("{name} is not for liquid in cells of two sizes"))?;
-        }
-        if !*is_reserved {
-            surface.reserve(detail);
-            *is_reserved = true;
-        }
-        let needs = wanted.needs();
-        let depths = [fine.depths(detail.fine(), &needs)?, coarse.depths(detail.coarse(), &needs)?];
-        wanted.write_with(|target| match target {
-            Some(target) => surface.build(detail, depths.each_ref(), &wanted.layout, target),
-            None => surface.count(detail, depths.each_ref()),
+    unsafe {
+        writes(context, detail, (layout, target, size), |spread, wanted| {
+            let DetailHandle { detail, surface, shown: [fine, coarse], is_reserved, .. } = spread;
+            for (flag, name) in
+                [(FRZ_SHALLOW_LIFTED, "FRZ_SHALLOW_LIFTED"), (FRZ_SHALLOW_SKIRTED, "FRZ_SHALLOW_SKIRTED")]
+            {
+                refuse(wanted.has(flag), || format!("{name} is not for liquid in cells of two sizes"))?;
+            }
+            if !*is_reserved {
+                surface.reserve(detail);
+                *is_reserved = true;
+            }
+            let needs = wanted.needs();
+            let depths = [fine.depths(detail.fine(), &needs)?, coarse.depths(detail.coarse(), &needs)?];
+            wanted.write_with(|target| match target {
+                Some(target) => surface.build(detail, depths.each_ref(), &wanted.layout, target),
+                None => surface.count(detail, depths.each_ref()),
+            })
         })
-    })
+    }
 }
 
 /// Saves all that the next frame depends on, as frz_shallow_save does, in real time (frz_shallow_detail). The box of small cells is part of
