@@ -11,6 +11,9 @@ pub(in crate::capi) use views::*;
 pub(in crate::capi) mod handle;
 pub(in crate::capi) use handle::*;
 
+pub(in crate::capi) mod lists;
+pub(in crate::capi) use lists::*;
+
 pub(in crate::capi) mod saved;
 
 pub(in crate::capi) mod fields;
