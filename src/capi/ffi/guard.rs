@@ -125,24 +125,18 @@ pub(in crate::capi) fn last_error() -> *const c_char {
 }
 
 fn remember(text: &str) {
-    let cut = text.floor_char_boundary_at(LONGEST - 1);
+    let cut = cut_at(text, LONGEST - 1);
     LAST.with_borrow_mut(|last| {
         last[..cut].copy_from_slice(&text.as_bytes()[..cut]);
         last[cut] = 0;
     });
 }
 
-/// The longest prefix of a text that has at most the given number of bytes and ends between characters.
-trait Cut {
-    fn floor_char_boundary_at(&self, most: usize) -> usize;
-}
-
-impl Cut for str {
-    fn floor_char_boundary_at(&self, most: usize) -> usize {
-        // C would end the text at an embedded zero.
-        let end = self.find('\0').unwrap_or(self.len());
-        (0..=most.min(end)).rev().find(|&at| self.is_char_boundary(at)).unwrap_or(0)
-    }
+/// How many bytes of a text to keep: at most the given number, ending between characters.
+fn cut_at(text: &str, most: usize) -> usize {
+    // C would end the text at an embedded zero.
+    let end = text.find('\0').unwrap_or(text.len());
+    (0..=most.min(end)).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0)
 }
 
 fn words(panic: &(dyn Any + Send)) -> &str {

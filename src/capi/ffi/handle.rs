@@ -5,7 +5,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
 
 use super::guard::frz_status::*;
-use super::guard::{Failure, Outcome};
+use super::guard::{Failure, Outcome, refuse};
 
 /// A kind of handle.
 ///
@@ -68,6 +68,17 @@ pub(in crate::capi) unsafe fn clear<T>(out: *mut T) {
     }
 }
 
+/// Writes an output that may be NULL.
+///
+/// # Safety
+/// `out` must be NULL or point to memory for it.
+pub(in crate::capi) unsafe fn write_some<T>(out: *mut T, value: T) {
+    if !out.is_null() {
+        // SAFETY: guaranteed by the caller.
+        unsafe { out.write_unaligned(value) };
+    }
+}
+
 /// Runs the work of a call whose result is a number, or an array of them, which `out` receives; zeroes after a failure.
 ///
 /// # Safety
@@ -87,9 +98,7 @@ pub(in crate::capi) unsafe fn answer<T>(
 
 /// Refuses NULL.
 pub(in crate::capi) fn required<T>(pointer: *mut T, name: &str) -> Outcome<*mut T> {
-    if pointer.is_null() {
-        return Err(Failure::argument(format!("{name} is NULL")));
-    }
+    refuse(pointer.is_null(), || format!("{name} is NULL"))?;
     Ok(pointer)
 }
 
@@ -99,9 +108,7 @@ pub(in crate::capi) fn required<T>(pointer: *mut T, name: &str) -> Outcome<*mut 
 /// The pointer must be NULL or point to a handle of any kind that was not destroyed, for `'a`.
 unsafe fn look<'a, N: HandleType>(pointer: *const N) -> Outcome<&'a Handle<N::Value>> {
     let handle = pointer.cast::<Handle<N::Value>>();
-    if handle.is_null() {
-        return Err(Failure::argument(format!("the {} is NULL", N::NAME)));
-    }
+    refuse(handle.is_null(), || format!("the {} is NULL", N::NAME))?;
     if !handle.is_aligned() {
         return Err(Failure::new(FRZ_ERROR_HANDLE, format!("the pointer is not a {}", N::NAME)));
     }
@@ -148,10 +155,7 @@ pub(in crate::capi) unsafe fn read_some<'a, N: HandleType>(
 pub(in crate::capi) unsafe fn change<'a, N: HandleType>(pointer: *mut N) -> Outcome<Changing<'a, N::Value>> {
     // SAFETY: guaranteed by the caller.
     let handle = unsafe { look(pointer.cast_const()) }?;
-    if handle.users.compare_exchange(0, CHANGING, Ordering::Acquire, Ordering::Relaxed).is_err() {
-        return Err(busy::<N>());
-    }
-    let changing = Changing(handle);
+    let changing = lock::<N>(handle)?;
     sound::<N>(handle)?;
     Ok(changing)
 }
@@ -179,12 +183,10 @@ pub(in crate::capi) unsafe fn destroy_whole<N: HandleType, P: HandleType>(
     }
     // SAFETY: guaranteed by the caller.
     let handle = unsafe { look(pointer.cast_const()) }?;
-    let whole = seize::<N>(handle)?;
-    // SAFETY: nobody else uses it.
-    let lent = lent(unsafe { &*handle.value.get() });
+    let whole = lock::<N>(handle)?;
     // SAFETY: they live as long as the value.
-    let take = |part: &*mut P| seize::<P>(unsafe { look(part.cast_const()) }?);
-    let parts = lent.iter().map(take).collect::<Outcome<Vec<Seized<'_, P::Value>>>>()?;
+    let take = |part: &*mut P| lock::<P>(unsafe { look(part.cast_const()) }?);
+    let parts = lent(&whole).iter().map(take).collect::<Outcome<Vec<Changing<'_, P::Value>>>>()?;
     // None of them is in use now, and none can be used again.
     std::mem::forget((whole, parts));
     // SAFETY: made by `give`, and nobody uses it.
@@ -208,20 +210,12 @@ pub(in crate::capi) unsafe fn free<N: HandleType>(pointer: *mut N) {
     }
 }
 
-/// A handle that is locked against use, poisoned or not.
-struct Seized<'a, T>(&'a Handle<T>);
-
-fn seize<N: HandleType>(handle: &Handle<N::Value>) -> Outcome<Seized<'_, N::Value>> {
+/// Locks a handle against use by others, poisoned or not.
+fn lock<N: HandleType>(handle: &Handle<N::Value>) -> Outcome<Changing<'_, N::Value>> {
     if handle.users.compare_exchange(0, CHANGING, Ordering::AcqRel, Ordering::Relaxed).is_err() {
         return Err(busy::<N>());
     }
-    Ok(Seized(handle))
-}
-
-impl<T> Drop for Seized<'_, T> {
-    fn drop(&mut self) {
-        self.0.users.store(0, Ordering::Release);
-    }
+    Ok(Changing(handle))
 }
 
 fn busy<N: HandleType>() -> Failure {

@@ -1,12 +1,20 @@
-//! The C boundary itself: statuses, handles, views of a host's memory, saved states.
+//! The C boundary itself: statuses, handles, views of a host's memory, saved states. What every file of the interface needs is passed on
+//! from here.
 
 // In the order of the header.
 pub(in crate::capi) mod guard;
+pub(in crate::capi) use guard::*;
 
 pub(in crate::capi) mod views;
+pub(in crate::capi) use views::*;
 
 pub(in crate::capi) mod handle;
+pub(in crate::capi) use handle::*;
+
+pub(in crate::capi) mod lists;
+pub(in crate::capi) use lists::*;
 
 pub(in crate::capi) mod saved;
 
 pub(in crate::capi) mod fields;
+pub(in crate::capi) use fields::*;

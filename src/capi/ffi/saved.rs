@@ -1,12 +1,49 @@
-//! States that a host saves and restores.
+//! Bytes for a host: files in memory, and states that it saves and restores.
 
 use std::ffi::c_void;
 use std::sync::{Mutex, PoisonError};
 
-use super::guard::{Failure, Outcome, frz_status};
-use super::views::write_bytes;
+use super::guard::frz_status::*;
+use super::guard::{Failure, Outcome, frz_status, guard};
+use super::handle::{HandleType, change, clear, read, required};
+use super::views::{frz_span, frz_view};
+use crate::capi::runtime::context::{enter, enter_light, frz_context};
 use crate::context::Context;
 use crate::error::{Error, Result};
+
+/// Memory of a host for a state, as its functions pass it: where it goes, how many bytes fit, and where the state's size is reported.
+pub(in crate::capi) type Room = (*mut c_void, usize, *mut usize);
+
+/// Writes bytes to the host, or reports how many there are: with `dst` NULL, `size` receives `bound`, an upper bound.
+///
+/// # Safety
+/// `dst` must be NULL or have room for `capacity` bytes; `size` must be NULL or point to a number.
+pub(in crate::capi) unsafe fn write_bytes<B: AsRef<[u8]>>(
+    dst: *mut c_void,
+    capacity: usize,
+    size: *mut usize,
+    bound: impl FnOnce() -> usize,
+    bytes: impl FnOnce() -> Outcome<B>,
+) -> Outcome {
+    let size = required(size, "size")?;
+    // SAFETY: guaranteed by the caller, and it is not NULL.
+    let tell = |count: usize| unsafe { size.write(count) };
+    tell(0);
+    if dst.is_null() {
+        tell(bound());
+        return Ok(());
+    }
+    let bytes = bytes()?;
+    let bytes = bytes.as_ref();
+    tell(bytes.len());
+    if capacity < bytes.len() {
+        let text = format!("there is room for {capacity} bytes, {} are needed", bytes.len());
+        return Err(Failure::new(FRZ_ERROR_CAPACITY, text));
+    }
+    // SAFETY: guaranteed by the caller.
+    unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), dst.cast(), bytes.len()) };
+    Ok(())
+}
 
 /// The bytes of a state whose size was queried, kept for the call that copies them.
 #[derive(Default)]
@@ -17,29 +54,89 @@ impl Saved {
     pub(in crate::capi) fn take(&self) -> Option<Vec<u8>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
+}
 
-    /// Writes a state to the host, or reports its size, as [`write_bytes`] does; `save` makes it unless it was kept.
-    ///
-    /// # Safety
-    /// As [`write_bytes`].
-    pub(in crate::capi) unsafe fn write(
-        &self,
-        (dst, capacity, size): (*mut c_void, usize, *mut usize),
-        save: impl FnOnce() -> Result<Vec<u8>>,
-    ) -> Outcome {
+/// An interface function that writes an object's state to the host, or reports its size, as [`write_bytes`] does. `parts` are where the
+/// state may have been kept, and what `save` makes it of otherwise.
+///
+/// # Safety
+/// The pointers must be NULL or valid.
+pub(in crate::capi) unsafe fn saves<N: HandleType, T: Sync>(
+    context: *mut frz_context,
+    object: *const N,
+    (dst, capacity, size): Room,
+    parts: impl FnOnce(&N::Value) -> (&Saved, &T),
+    save: fn(&T) -> Vec<u8>,
+) -> frz_status {
+    // SAFETY: guaranteed by the caller.
+    guard(|| unsafe {
+        clear(size);
+        required(size, "size")?;
+        let call = enter(context)?;
+        let object = read(object)?;
+        let (kept, whole) = parts(&object);
         // No lock is held while the host's poll function runs.
-        let bytes = match self.take() {
+        let bytes = match kept.take() {
             Some(bytes) => bytes,
-            None => save()?,
+            None => call.ctx().phase("save", || Ok(save(whole)))?,
         };
-        // SAFETY: guaranteed by the caller.
-        let written = unsafe { write_bytes(dst, capacity, size, || bytes.len(), || Ok(bytes.as_slice())) };
+        let written = write_bytes(dst, capacity, size, || bytes.len(), || Ok(bytes.as_slice()));
         if dst.is_null() || written.is_err() {
             // A caller that queried the size, or whose buffer was too small, calls again.
-            *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(bytes);
+            *kept.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(bytes);
         }
         written
-    }
+    })
+}
+
+/// An interface function that writes an object's state to the host in real time, or reports its size.
+///
+/// # Safety
+/// The pointers must be NULL or valid.
+pub(in crate::capi) unsafe fn saves_in_place<N: HandleType>(
+    context: *mut frz_context,
+    object: *const N,
+    (dst, capacity, size): Room,
+    needed: impl FnOnce(&N::Value) -> usize,
+    save_to: impl FnOnce(&N::Value, &mut [u8]) -> Result<usize>,
+) -> frz_status {
+    // SAFETY: guaranteed by the caller.
+    guard(|| unsafe {
+        clear(size);
+        let size = required(size, "size")?;
+        let _call = enter_light(context)?;
+        let object = read(object)?;
+        let needed = needed(&object);
+        size.write_unaligned(needed);
+        let room = frz_span { data: dst, count: capacity, stride: 0 };
+        let Some(room) = room.numbers::<u8>("dst", 1)? else { return Ok(()) };
+        if room.len() < needed {
+            let text = format!("there is room for {capacity} bytes, {needed} are needed");
+            return Err(Failure::new(FRZ_ERROR_CAPACITY, text));
+        }
+        save_to(&object, room)?;
+        Ok(())
+    })
+}
+
+/// An interface function that replaces an object's state in real time by one of `bytes` bytes.
+///
+/// # Safety
+/// The pointers must be NULL or valid.
+pub(in crate::capi) unsafe fn restores<N: HandleType>(
+    context: *mut frz_context,
+    object: *mut N,
+    (state, bytes): (*const c_void, usize),
+    restore: impl FnOnce(&mut N::Value, &[u8]) -> Result<()>,
+) -> frz_status {
+    // SAFETY: guaranteed by the caller.
+    guard(|| unsafe {
+        let _call = enter_light(context)?;
+        let mut object = change(object)?;
+        required(state.cast_mut(), "state")?;
+        let state = frz_view::packed(state, bytes).bytes("state")?;
+        Ok(restore(&mut object, state)?)
+    })
 }
 
 /// Resumes from a saved state of a `noun`, which has `unpacked` bytes when unpacked.
@@ -53,7 +150,7 @@ pub(in crate::capi) fn resumed<T: Send>(
     ctx.phase("unpack", resume).map_err(|error| match error {
         Error::Bytes(what) => {
             let what = what.strip_prefix("the state ").unwrap_or(&what);
-            Failure::new(frz_status::FRZ_ERROR_FILE, format!("the saved state {what}"))
+            Failure::new(FRZ_ERROR_FILE, format!("the saved state {what}"))
         }
         other => other.into(),
     })

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 
 use super::guard::frz_status::FRZ_ERROR_CAPACITY;
 use super::guard::frz_status::FRZ_ERROR_VERSION;
-use super::guard::{Failure, Outcome};
+use super::guard::{Failure, Outcome, refuse};
 use crate::numeric::digits;
 
 /// An array that the caller lends for the duration of the call.
@@ -37,26 +37,22 @@ pub struct frz_span {
 /// # Safety
 /// Every bit pattern must be valid.
 pub(in crate::capi) unsafe trait Plain: Copy {}
-// SAFETY: a number.
-unsafe impl Plain for u8 {}
-// SAFETY: as above.
-unsafe impl Plain for u16 {}
-// SAFETY: as above.
-unsafe impl Plain for u32 {}
-// SAFETY: as above.
-unsafe impl Plain for u64 {}
-// SAFETY: as above.
-unsafe impl Plain for i32 {}
-// SAFETY: as above.
-unsafe impl Plain for i64 {}
-// SAFETY: as above.
-unsafe impl Plain for f32 {}
-// SAFETY: as above.
-unsafe impl Plain for f64 {}
+
+/// Numbers are plain.
+macro_rules! plain {
+    ($($number:ty)*) => {
+        // SAFETY: every bit pattern is a number.
+        $(unsafe impl Plain for $number {})*
+    };
+}
+plain!(u8 u16 u32 u64 i32 i64 f32 f64);
+
 // SAFETY: elements for which any bytes are valid, without padding between them.
 unsafe impl<T: Plain, const N: usize> Plain for [T; N] {}
 // SAFETY: pointers, which are followed only under the host's guarantee.
 unsafe impl<T> Plain for *const T {}
+// SAFETY: numbers and a pointer.
+unsafe impl Plain for frz_view {}
 
 /// Maximum memory that one array may span (bytes): the largest pointer offset.
 const MOST: usize = isize::MAX as usize;
@@ -65,26 +61,22 @@ const MOST: usize = isize::MAX as usize;
 fn stride<T>(name: &str, data: *const c_void, count: usize, stride: usize) -> Outcome<usize> {
     let size = size_of::<T>();
     let stride = if stride == 0 { size } else { stride };
-    if stride < size {
-        return Err(Failure::argument(format!(
-            "{name}: the stride of {stride} bytes is less than an element's {size}"
-        )));
-    }
+    refuse(stride < size, || {
+        format!("{name}: the stride of {stride} bytes is less than an element's {size}")
+    })?;
     let span = (count.max(1) - 1).checked_mul(stride).and_then(|bytes| bytes.checked_add(size));
-    if span.is_none_or(|span| span > MOST || (data as usize).checked_add(span).is_none()) {
-        return Err(Failure::argument(format!(
-            "{name}: {count} elements of {stride} bytes are more than a memory holds"
-        )));
-    }
-    if data.is_null() && count > 0 {
-        return Err(Failure::argument(format!("{name}: the data is NULL, but the count is {count}")));
-    }
+    refuse(span.is_none_or(|span| span > MOST || (data as usize).checked_add(span).is_none()), || {
+        format!("{name}: {count} elements of {stride} bytes are more than a memory holds")
+    })?;
+    refuse(data.is_null() && count > 0, || format!("{name}: the data is NULL, but the count is {count}"))?;
     Ok(stride)
 }
 
 impl frz_view {
-    /// No elements.
-    pub(in crate::capi) const NONE: Self = Self { data: std::ptr::null(), count: 0, stride: 0 };
+    /// Elements without gaps.
+    pub(in crate::capi) fn packed<T>(first: *const T, count: usize) -> Self {
+        Self { data: first.cast(), count, stride: 0 }
+    }
 
     /// The elements, copied.
     ///
@@ -180,6 +172,19 @@ impl frz_span {
         Ok(())
     }
 
+    /// As [`frz_span::fill`], from an iterator that does not say how many there are.
+    ///
+    /// # Safety
+    /// As [`frz_span::fill`].
+    pub(in crate::capi) unsafe fn collect<T: Plain>(
+        &self,
+        name: &str,
+        elements: impl Iterator<Item = T>,
+    ) -> Outcome {
+        // SAFETY: guaranteed by the caller.
+        unsafe { self.fill(name, &elements.collect::<Vec<_>>()) }
+    }
+
     /// Packed, aligned numbers to be written in place, `width` for each element; `None` if the data are NULL.
     ///
     /// # Safety
@@ -200,10 +205,9 @@ impl frz_span {
             )));
         }
         let first = self.data.cast::<T>();
-        if !first.is_aligned() {
-            let text = format!("{name}: the data are not aligned to {} bytes", align_of::<T>());
-            return Err(Failure::argument(text));
-        }
+        refuse(!first.is_aligned(), || {
+            format!("{name}: the data are not aligned to {} bytes", align_of::<T>())
+        })?;
         let count = self.count.saturating_mul(width);
         stride::<T>(name, self.data, count, 0)?;
         // SAFETY: guaranteed by the caller, and all of it can be reached.
@@ -233,37 +237,6 @@ impl frz_span {
     }
 }
 
-/// Writes bytes to the host, or reports how many there are: with `dst` NULL, `size` receives `bound`, an upper bound.
-///
-/// # Safety
-/// `dst` must be NULL or have room for `capacity` bytes; `size` must be NULL or point to a number.
-pub(in crate::capi) unsafe fn write_bytes<B: AsRef<[u8]>>(
-    dst: *mut c_void,
-    capacity: usize,
-    size: *mut usize,
-    bound: impl FnOnce() -> usize,
-    bytes: impl FnOnce() -> Outcome<B>,
-) -> Outcome {
-    let size = super::handle::required(size, "size")?;
-    // SAFETY: guaranteed by the caller, and it is not NULL.
-    let tell = |count: usize| unsafe { size.write(count) };
-    tell(0);
-    if dst.is_null() {
-        tell(bound());
-        return Ok(());
-    }
-    let bytes = bytes()?;
-    let bytes = bytes.as_ref();
-    tell(bytes.len());
-    if capacity < bytes.len() {
-        let text = format!("there is room for {capacity} bytes, {} are needed", bytes.len());
-        return Err(Failure::new(FRZ_ERROR_CAPACITY, text));
-    }
-    // SAFETY: guaranteed by the caller.
-    unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), dst.cast(), bytes.len()) };
-    Ok(())
-}
-
 /// Refuses a value that is not finite, naming it.
 pub(in crate::capi) fn finite(name: &str, value: f64) -> Outcome {
     if value.is_finite() { Ok(()) } else { Err(Failure::argument(format!("{name} is not finite"))) }
@@ -279,6 +252,9 @@ pub(in crate::capi) fn within(name: &str, value: f64, range: RangeInclusive<f64>
     }
     Ok(())
 }
+
+/// The numbers of an enum of the interface, and what they mean.
+pub(in crate::capi) type Meanings<T, const N: usize> = [(u32, T); N];
 
 /// Maps a number of a host's enum to its value.
 pub(in crate::capi) fn meaning<T: Copy>(
@@ -408,6 +384,24 @@ pub(in crate::capi) unsafe fn fill<T: Sized32>(pointer: *mut T, size: Option<usi
     Ok(())
 }
 
+/// Runs the work of a call that returns a report, which is written to the host unless the pointer is NULL; all zeroes after a failure.
+///
+/// # Safety
+/// As [`fill`], without a size.
+pub(in crate::capi) unsafe fn reports<T: Sized32, R: Into<T>>(
+    report: *mut T,
+    work: impl FnOnce() -> Outcome<R>,
+) -> Outcome {
+    if report.is_null() {
+        return work().map(drop);
+    }
+    // SAFETY: guaranteed by the caller.
+    unsafe {
+        fill(report, None, T::zeroed())?;
+        fill(report, None, work()?.into())
+    }
+}
+
 /// Maximum size (bytes) accepted for a struct of a newer header.
 const LARGEST: usize = 4096;
 
@@ -439,6 +433,7 @@ mod tests {
         const NAME: &'static str = "params";
     }
 
+    const NONE: frz_view = frz_view { data: std::ptr::null(), count: 0, stride: 0 };
     const DEFAULTS: Params = Params { struct_size: 16, first: 1.0, second: 2 };
 
     #[test]
@@ -480,8 +475,8 @@ mod tests {
             assert!(view(0, 2, 3).elements::<u32>("n").is_err());
             assert!(view(0, usize::MAX, 8).elements::<u32>("n").is_err());
             assert!(view(0, usize::MAX / 4, 4).elements::<u32>("n").is_err());
-            assert!(frz_view { count: 1, ..frz_view::NONE }.elements::<u32>("n").is_err());
-            assert!(frz_view::NONE.elements::<u32>("n").ok().unwrap().is_empty());
+            assert!(frz_view { count: 1, ..NONE }.elements::<u32>("n").is_err());
+            assert!(NONE.elements::<u32>("n").ok().unwrap().is_empty());
         }
         let mut room = [7u8; 12];
         let span = frz_span { data: room.as_mut_ptr().cast(), count: 2, stride: 6 };

@@ -4,9 +4,8 @@ use std::ffi::{c_char, c_void};
 use std::path::Path;
 
 use super::sparse::{Grid, frz_grid};
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{Reading, clear, read};
-use crate::capi::ffi::views::{Plain, frz_view, meaning, required_text, text, write_bytes};
+use crate::capi::ffi::saved::write_bytes;
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{creates, enter, frz_context};
 use crate::context::Context;
@@ -39,26 +38,14 @@ fn options(compression: u32, flags: u32) -> Outcome<WriteOptions> {
     Ok(WriteOptions { compression, half: flags & FRZ_HALF != 0, ..WriteOptions::default() })
 }
 
-/// A pointer to a grid, as an element of an array.
-#[derive(Clone, Copy)]
-#[repr(transparent)]
-struct Pointer(*const frz_grid);
-
-// SAFETY: a pointer, which is followed only as a handle.
-unsafe impl Plain for Pointer {}
-
+/// Grids of a host's array, with different names.
+///
 /// # Safety
 /// `grids` must be NULL or point to `count` pointers to grids.
 unsafe fn several<'a>(grids: *const *const frz_grid, count: usize) -> Outcome<Vec<Reading<'a, Grid>>> {
-    let view = frz_view { data: grids.cast(), count, stride: 0 };
     // SAFETY: guaranteed by the caller.
-    let grids = unsafe { view.elements::<Pointer>("grids") }?;
-    if grids.is_empty() {
-        return Err(Failure::argument("grids: there is none"));
-    }
-    // SAFETY: as above.
-    let grids: Vec<Reading<'a, Grid>> =
-        grids.iter().map(|grid| unsafe { read(grid.0) }).collect::<Outcome<_>>()?;
+    let grids = unsafe { read_each(grids, count, "grids") }?;
+    refuse(grids.is_empty(), || "grids: there is none")?;
     let mut names: Vec<String> = grids.iter().map(|grid| grid.any().name()).collect();
     names.sort_unstable();
     if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -81,7 +68,7 @@ pub(in crate::capi) unsafe fn loads(
     unsafe {
         creates(context, out, |ctx| {
             let path = Path::new(required_text(path, "path")?);
-            Ok(Grid::Own(load(ctx, path, text(name, "name")?)?))
+            load(ctx, path, text(name, "name")?)
         })
     }
 }
@@ -130,17 +117,15 @@ pub unsafe extern "C" fn frz_grid_save(
     compression: u32,
     flags: u32,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let path = Path::new(required_text(path, "path")?);
-            let options = options(compression, flags)?;
-            let grids = several(grids, count)?;
-            let list: Vec<GridRef<'_>> = grids.iter().map(|grid| grid.any()).collect();
-            Ok(ctx.phase_in_place("write", || file::write_any(path, &list, &options))?)
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let call = enter(context)?;
+        let ctx = call.ctx();
+        let path = Path::new(required_text(path, "path")?);
+        let options = options(compression, flags)?;
+        let grids = several(grids, count)?;
+        let list: Vec<GridRef<'_>> = grids.iter().map(|grid| grid.any()).collect();
+        Ok(ctx.phase_in_place("write", || file::write_any(path, &list, &options))?)
     })
 }
 
@@ -166,9 +151,9 @@ pub unsafe extern "C" fn frz_grid_from_bytes(
     unsafe {
         creates(context, out, |ctx| {
             ctx.allow("a grid from bytes", size as u64)?;
-            let bytes = frz_view { data: bytes, count: size, stride: 0 }.elements::<u8>("bytes")?;
+            let bytes = frz_view::packed(bytes, size).elements::<u8>("bytes")?;
             let name = text(name, "name")?;
-            Ok(Grid::Own(ctx.phase("read", || file::any_from_bytes(&bytes, name))?))
+            Ok(ctx.phase("read", || file::any_from_bytes(&bytes, name))?)
         })
     }
 }
@@ -195,18 +180,16 @@ pub unsafe extern "C" fn frz_grid_to_bytes(
     capacity: usize,
     size: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(size);
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let options = options(compression, flags)?;
-            let grids = several(grids, count)?;
-            let list: Vec<GridRef<'_>> = grids.iter().map(|grid| grid.any()).collect();
-            let bound = || list.iter().map(|grid| grid.file_bound() as usize).sum();
-            let bytes = || Ok(ctx.phase("write", || file::any_to_bytes(&list, &options))?);
-            write_bytes(dst, capacity, size, bound, bytes)
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        clear(size);
+        let call = enter(context)?;
+        let ctx = call.ctx();
+        let options = options(compression, flags)?;
+        let grids = several(grids, count)?;
+        let list: Vec<GridRef<'_>> = grids.iter().map(|grid| grid.any()).collect();
+        let bound = || list.iter().map(|grid| grid.file_bound() as usize).sum();
+        let bytes = || Ok(ctx.phase("write", || file::any_to_bytes(&list, &options))?);
+        write_bytes(dst, capacity, size, bound, bytes)
     })
 }

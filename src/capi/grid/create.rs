@@ -4,13 +4,12 @@ use std::collections::HashSet;
 use std::ffi::c_char;
 
 use super::leaves::{check_origin, frz_leaf, frz_vector_leaf};
-use super::sparse::{CLASSES, Grid, check_voxel, frz_grid, frz_value_type};
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status};
-use crate::capi::ffi::views::{Sized32, finite, frz_view, meaning, sized, text};
+use super::sparse::{CLASSES, check_voxel, frz_grid, frz_value_type, set_name};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{creates, frz_context};
 use crate::context::Context;
-use crate::numeric::blocks::{Block, BlockEdit, DIM, Mask, Origin, VOXELS, Values};
+use crate::numeric::blocks::{Block, BlockEdit, DIM, Origin, VOXELS, Values};
 use crate::vdb::{AnyGrid, FloatGrid, GridClass, VectorEdit, VectorGrid, Vectors};
 
 /// Description of a new grid.
@@ -43,23 +42,6 @@ pub struct frz_grid_desc {
     pub vector_leaves: *const frz_vector_leaf,
 }
 
-impl frz_grid_desc {
-    /// Values of the fields that an older header does not have.
-    const NONE: Self = Self {
-        struct_size: 0,
-        grid_class: 0,
-        voxel_size: 0.0,
-        background: 0.0,
-        flags: 0,
-        leaves: std::ptr::null(),
-        leaf_count: 0,
-        name: std::ptr::null(),
-        value_type: 0,
-        background_vector: [0.0; 3],
-        vector_leaves: std::ptr::null(),
-    };
-}
-
 // SAFETY: numbers and pointers.
 unsafe impl Sized32 for frz_grid_desc {
     const SIZES: &'static [usize] = &[
@@ -70,40 +52,44 @@ unsafe impl Sized32 for frz_grid_desc {
     const NAME: &'static str = "frz_grid_desc";
 }
 
-/// The origins of leaves: multiples of 8, each used once.
-#[derive(Default)]
-struct Places(HashSet<Origin>);
-
-impl Places {
-    /// Checks the origin of the next leaf, the one with index `at`.
-    fn add(&mut self, at: usize, origin: Origin) -> Outcome<Origin> {
-        let named = |failure: Failure| Failure { text: format!("leaf {at}: {}", failure.text), ..failure };
-        if !self.0.insert(check_origin(origin).map_err(named)?) {
-            return Err(Failure::argument(format!("leaf {at}: another one is at {origin:?} already")));
-        }
-        Ok(origin)
-    }
+/// Makes edits of a host's leaves, whose origins are multiples of 8, each used once. A failure names the leaf.
+///
+/// # Safety
+/// `list` must be NULL or point to `count` leaves.
+unsafe fn edits<L: Plain, E>(
+    (list, count, name): (*const L, usize, &str),
+    origin: impl Fn(&L) -> Origin,
+    edit: impl Fn(&L) -> Outcome<E>,
+) -> Outcome<Vec<E>> {
+    // SAFETY: guaranteed by the caller.
+    let leaves = unsafe { frz_view::packed(list, count).elements::<L>(name) }?;
+    let mut origins = HashSet::new();
+    let mut checked = |leaf: &L| {
+        let origin = check_origin(origin(leaf))?;
+        refuse(!origins.insert(origin), || format!("another one is at {origin:?} already"))?;
+        edit(leaf)
+    };
+    let named = |(at, leaf)| {
+        checked(leaf).map_err(|failure| Failure { text: format!("leaf {at}: {}", failure.text), ..failure })
+    };
+    leaves.iter().enumerate().map(named).collect()
 }
 
 /// Refuses values of a leaf that are not finite.
-fn check_values(at: usize, values: &[f32]) -> Outcome {
+fn check_values(values: &[f32]) -> Outcome {
     if values.iter().all(|value| value.is_finite()) {
         return Ok(());
     }
-    Err(Failure::argument(format!("leaf {at}: a value is not finite")))
+    Err(Failure::argument("a value is not finite"))
 }
 
-/// The active voxels of a leaf; `None` if the host does not specify them.
+/// What a pointer of a leaf points to.
 ///
 /// # Safety
-/// The pointer must be NULL or point to 8 words.
-unsafe fn mask_of(mask: *const u64) -> Outcome<Option<Mask>> {
-    if mask.is_null() {
-        return Ok(None);
-    }
-    let mask = frz_view { data: mask.cast(), count: 1, stride: 0 };
+/// The pointer must be valid.
+unsafe fn lent<T: Plain>(pointer: *const T, name: &str) -> Outcome<T> {
     // SAFETY: guaranteed by the caller.
-    Ok(Some(unsafe { mask.elements::<Mask>("mask") }?[0]))
+    Ok(unsafe { frz_view::packed(pointer, 1).elements::<T>(name) }?[0])
 }
 
 /// The leaves of a description as blocks.
@@ -111,30 +97,25 @@ unsafe fn mask_of(mask: *const u64) -> Outcome<Option<Mask>> {
 /// # Safety
 /// The description must describe memory that can be read.
 unsafe fn blocks(desc: &frz_grid_desc, class: GridClass) -> Outcome<Vec<BlockEdit>> {
-    let view = frz_view { data: desc.leaves.cast(), count: desc.leaf_count, stride: 0 };
-    // SAFETY: guaranteed by the caller.
-    let leaves = unsafe { view.elements::<frz_leaf>("leaves") }?;
-    let mut positions = Places::default();
-    let mut out = Vec::with_capacity(leaves.len());
-    for (at, leaf) in leaves.iter().enumerate() {
-        let origin = positions.add(at, leaf.origin)?;
-        if leaf.values.is_null() {
-            check_values(at, &[leaf.tile])?;
-            out.push(BlockEdit::Constant(origin, leaf.tile));
-            continue;
+    let block = |&frz_leaf { origin, tile, values, mask }: &frz_leaf| {
+        if values.is_null() {
+            check_values(&[tile])?;
+            return Ok(BlockEdit::Constant(origin, tile));
         }
-        let values = frz_view { data: leaf.values.cast(), count: 1, stride: 0 };
         // SAFETY: guaranteed by the caller.
-        let values: Box<Values> = Box::new(unsafe { values.elements::<Values>("values") }?[0]);
-        check_values(at, &*values)?;
+        let values: Box<Values> = Box::new(unsafe { lent(values.cast(), "values") }?);
+        check_values(&*values)?;
         let band = |index: usize| class != GridClass::LevelSet || values[index].abs() < desc.background;
-        let near =
-            || std::array::from_fn(|x| (0..64).fold(0, |word, at| word | u64::from(band(x << 6 | at)) << at));
-        // SAFETY: guaranteed by the caller.
-        let mask = unsafe { mask_of(leaf.mask) }?.unwrap_or_else(near);
-        out.push(BlockEdit::Dense(Block { origin, values, mask }));
-    }
-    Ok(out)
+        let near = |x: usize| (0..64).fold(0, |word, at| word | u64::from(band(x << 6 | at)) << at);
+        let mask = match mask.is_null() {
+            true => std::array::from_fn(near),
+            // SAFETY: guaranteed by the caller.
+            false => unsafe { lent(mask.cast(), "mask") }?,
+        };
+        Ok(BlockEdit::Dense(Block { origin, values, mask }))
+    };
+    // SAFETY: guaranteed by the caller.
+    unsafe { edits((desc.leaves, desc.leaf_count, "leaves"), |leaf| leaf.origin, block) }
 }
 
 /// A grid of floats from its description.
@@ -142,20 +123,16 @@ unsafe fn blocks(desc: &frz_grid_desc, class: GridClass) -> Outcome<Vec<BlockEdi
 /// # Safety
 /// As [`blocks`].
 unsafe fn of_floats(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> Outcome<FloatGrid> {
-    if !desc.vector_leaves.is_null() || desc.background_vector != [0.0; 3] {
-        let text =
-            "vector_leaves and background_vector are those of a grid of vectors: value_type says floats";
-        return Err(Failure::argument(text));
-    }
+    refuse(
+        !desc.vector_leaves.is_null() || desc.background_vector != [0.0; 3],
+        || "vector_leaves and background_vector are those of a grid of vectors: value_type says floats",
+    )?;
     finite("background", f64::from(desc.background))?;
     let half_width = f64::from(desc.background) / desc.voxel_size;
-    if class == GridClass::LevelSet && !(2.999..=64.001).contains(&half_width) {
-        let text = format!("background: the band is {half_width:.2} voxels wide, not 3 to 64");
-        return Err(Failure::argument(text));
-    }
-    if class == GridClass::Staggered {
-        return Err(Failure::argument("grid_class: floats are not staggered, vectors are"));
-    }
+    refuse(class == GridClass::LevelSet && !(2.999..=64.001).contains(&half_width), || {
+        format!("background: the band is {half_width:.2} voxels wide, not 3 to 64")
+    })?;
+    refuse(class == GridClass::Staggered, || "grid_class: floats are not staggered, vectors are")?;
     ctx.allow("a grid", (desc.leaf_count as u64).saturating_mul((VOXELS * 8 + 64) as u64))?;
     // SAFETY: guaranteed by the caller.
     let blocks = unsafe { blocks(desc, class) }?;
@@ -175,10 +152,10 @@ unsafe fn of_floats(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> Ou
 /// # Safety
 /// The description must describe memory that can be read.
 unsafe fn of_vectors(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> Outcome<VectorGrid> {
-    if !desc.leaves.is_null() || desc.background != 0.0 {
-        let text = "leaves and background are those of a grid of floats: value_type says vectors";
-        return Err(Failure::argument(text));
-    }
+    refuse(
+        !desc.leaves.is_null() || desc.background != 0.0,
+        || "leaves and background are those of a grid of floats: value_type says vectors",
+    )?;
     if !desc.background_vector.iter().all(|component| component.is_finite()) {
         return Err(Failure::argument("background_vector is not finite"));
     }
@@ -188,7 +165,7 @@ unsafe fn of_vectors(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> O
     let bytes = (VOXELS * 2 * size_of::<[f32; 3]>() + 64) as u64;
     ctx.allow("a grid", (desc.leaf_count as u64).saturating_mul(bytes))?;
     // SAFETY: guaranteed by the caller.
-    let edits = unsafe { edits(desc) }?;
+    let edits = unsafe { vectors(desc) }?;
     let mut grid = VectorGrid::new(desc.voxel_size, desc.background_vector)?;
     grid.set_class(class)?;
     Ok(ctx.polled(|| {
@@ -197,30 +174,25 @@ unsafe fn of_vectors(ctx: &Context, desc: &frz_grid_desc, class: GridClass) -> O
     })?)
 }
 
+/// The leaves of a description as edits.
+///
 /// # Safety
-/// As [`of_vectors`].
-unsafe fn edits(desc: &frz_grid_desc) -> Outcome<Vec<VectorEdit>> {
-    let view = frz_view { data: desc.vector_leaves.cast(), count: desc.leaf_count, stride: 0 };
-    // SAFETY: guaranteed by the caller.
-    let leaves = unsafe { view.elements::<frz_vector_leaf>("vector_leaves") }?;
-    let mut positions = Places::default();
-    let mut out = Vec::with_capacity(leaves.len());
-    for (at, leaf) in leaves.iter().enumerate() {
-        let origin = positions.add(at, leaf.origin)?;
-        if leaf.values.is_null() {
-            check_values(at, &leaf.tile)?;
-            out.push(VectorEdit::Constant(origin, leaf.tile));
-            continue;
+/// As [`blocks`].
+unsafe fn vectors(desc: &frz_grid_desc) -> Outcome<Vec<VectorEdit>> {
+    let edit = |&frz_vector_leaf { origin, tile, values, mask }: &frz_vector_leaf| {
+        if values.is_null() {
+            check_values(&tile)?;
+            return Ok(VectorEdit::Constant(origin, tile));
         }
-        let values = frz_view { data: leaf.values.cast(), count: 1, stride: 0 };
         // SAFETY: guaranteed by the caller.
-        let values: Box<Vectors> = Box::new(unsafe { values.elements::<Vectors>("values") }?[0]);
-        check_values(at, values.as_flattened())?;
+        let values: Box<Vectors> = Box::new(unsafe { lent(values.cast(), "values") }?);
+        check_values(values.as_flattened())?;
         // SAFETY: guaranteed by the caller.
-        let mask = unsafe { mask_of(leaf.mask) }?.unwrap_or([u64::MAX; DIM]);
-        out.push(VectorEdit::Dense { origin, values, mask });
-    }
-    Ok(out)
+        let mask = if mask.is_null() { [u64::MAX; DIM] } else { unsafe { lent(mask.cast(), "mask") }? };
+        Ok(VectorEdit::Dense { origin, values, mask })
+    };
+    // SAFETY: guaranteed by the caller.
+    unsafe { edits((desc.vector_leaves, desc.leaf_count, "vector_leaves"), |leaf| leaf.origin, edit) }
 }
 
 /// Creates a grid from blocks of voxels, which are copied.
@@ -238,25 +210,19 @@ pub unsafe extern "C" fn frz_grid_create(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
-            let desc = sized(desc, frz_grid_desc::NONE)?;
+            let desc = given(desc)?;
             no_flags(desc.flags, 0)?;
             let class = meaning("grid_class", "frz_grid_class", desc.grid_class, &CLASSES)?;
             check_voxel(desc.voxel_size)?;
             let name = text(desc.name, "name")?.unwrap_or("");
             let known =
                 [frz_value_type::FRZ_VALUE_FLOAT, frz_value_type::FRZ_VALUE_VECTOR].map(|t| (t as u32, t));
-            Ok(Grid::Own(match meaning("value_type", "frz_value_type", desc.value_type, &known)? {
-                frz_value_type::FRZ_VALUE_FLOAT => {
-                    let mut grid = of_floats(ctx, &desc, class)?;
-                    grid.set_name(name)?;
-                    AnyGrid::Floats(grid)
-                }
-                frz_value_type::FRZ_VALUE_VECTOR => {
-                    let mut grid = of_vectors(ctx, &desc, class)?;
-                    grid.set_name(name)?;
-                    AnyGrid::Vectors(grid)
-                }
-            }))
+            let mut grid = match meaning("value_type", "frz_value_type", desc.value_type, &known)? {
+                frz_value_type::FRZ_VALUE_FLOAT => AnyGrid::Floats(of_floats(ctx, &desc, class)?),
+                frz_value_type::FRZ_VALUE_VECTOR => AnyGrid::Vectors(of_vectors(ctx, &desc, class)?),
+            };
+            set_name(&mut grid, name)?;
+            Ok(grid)
         })
     }
 }

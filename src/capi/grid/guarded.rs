@@ -4,8 +4,7 @@ use std::ffi::c_char;
 
 use super::bytes::loads;
 use super::sparse::frz_grid;
-use crate::capi::ffi::guard::frz_status;
-use crate::capi::ffi::views::required_text;
+use crate::capi::ffi::*;
 use crate::capi::runtime::context::frz_context;
 use crate::vdb::reading::guard::Guard;
 

@@ -1,11 +1,9 @@
 //! Blocks of voxels that a grid lends.
 
 use super::sparse::frz_grid;
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{read, required};
-use crate::capi::ffi::views::{Plain, frz_span, frz_view};
+use crate::capi::ffi::*;
 use crate::numeric::blocks::Origin;
-use crate::vdb::{Leaf, Probe, VectorLeaf, VectorProbe};
+use crate::vdb::{Leaf, Probe};
 
 /// A block of 8 x 8 x 8 voxels. Voxel (x, y, z) of the block has its value at x * 64 + y * 8 + z, and its bit in
 /// mask[x] at y * 8 + z.
@@ -48,15 +46,41 @@ const FARTHEST: i32 = 1 << 30;
 
 /// Checks the origin of a block.
 pub(in crate::capi) fn check_origin(origin: Origin) -> Outcome<Origin> {
-    if origin.iter().any(|&index| index & 7 != 0 || !(-FARTHEST..=FARTHEST).contains(&index)) {
-        let text = format!("origin {origin:?} is not a block's: multiples of 8 within -2^30 to 2^30");
-        return Err(Failure::argument(text));
-    }
+    refuse(origin.iter().any(|&index| index & 7 != 0 || !(-FARTHEST..=FARTHEST).contains(&index)), || {
+        format!("origin {origin:?} is not a block's: multiples of 8 within -2^30 to 2^30")
+    })?;
     Ok(origin)
 }
 
-fn leaf_view(leaf: &Leaf<'_>) -> frz_leaf {
-    frz_leaf { origin: leaf.origin, tile: 0.0, values: leaf.values.as_ptr(), mask: leaf.mask.as_ptr() }
+impl frz_leaf {
+    fn of(origin: Origin, (tile, values, mask): (f32, *const f32, *const u64)) -> Self {
+        Self { origin, tile, values, mask }
+    }
+}
+
+impl frz_vector_leaf {
+    fn of(origin: Origin, (tile, values, mask): ([f32; 3], *const f32, *const u64)) -> Self {
+        Self { origin, tile, values, mask }
+    }
+}
+
+/// The value of a tile, or where the values and the mask of a leaf are.
+fn lent<V, T: Copy + Default>(probe: &Probe<'_, V, T>) -> (T, *const f32, *const u64) {
+    match probe {
+        Probe::Leaf(leaf) => (T::default(), std::ptr::from_ref(leaf.values).cast(), leaf.mask.as_ptr()),
+        Probe::Tile { value, .. } => (*value, std::ptr::null(), std::ptr::null()),
+    }
+}
+
+/// Origins of blocks, checked.
+///
+/// # Safety
+/// The view must describe memory that can be read.
+pub(in crate::capi) unsafe fn origins_of(origins: &frz_view) -> Outcome<Vec<Origin>> {
+    // SAFETY: guaranteed by the caller.
+    let origins = unsafe { origins.elements::<Origin>("origins") }?;
+    origins.iter().try_for_each(|&origin| check_origin(origin).map(drop))?;
+    Ok(origins)
 }
 
 /// Lends the leaves of a grid of floats without copying them, in an order that changes only when the grid changes.
@@ -75,15 +99,16 @@ pub unsafe extern "C" fn frz_grid_leaves(
     dst: frz_span,
     count: *mut usize,
 ) -> frz_status {
-    guard(|| {
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
         let count = required(count, "count")?;
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            count.write(0);
-            let held = read(grid)?;
-            let grid = held.floats()?;
-            dst.list(count, grid.leaf_count(), || Ok(grid.leaves()?.iter().map(leaf_view).collect()))
-        }
+        count.write(0);
+        let held = read(grid)?;
+        let grid = held.floats()?;
+        dst.list(count, grid.leaf_count(), || {
+            let leaf = |leaf: Leaf<'_, _>| frz_leaf::of(leaf.origin, lent(&Probe::Leaf(leaf)));
+            Ok(grid.leaves()?.into_iter().map(leaf).collect())
+        })
     })
 }
 
@@ -99,27 +124,13 @@ pub unsafe extern "C" fn frz_grid_probe(
     origins: frz_view,
     dst: frz_span,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let held = read(grid)?;
-            let origins = origins.elements::<[i32; 3]>("origins")?;
-            origins.iter().try_for_each(|&origin| check_origin(origin).map(drop))?;
-            let probes = held.floats()?.probe(&origins)?;
-            let view = |(&origin, probe): (&Origin, &Probe<'_>)| match probe {
-                Probe::Leaf(leaf) => leaf_view(leaf),
-                Probe::Tile { value, .. } => {
-                    frz_leaf { origin, tile: *value, values: std::ptr::null(), mask: std::ptr::null() }
-                }
-            };
-            dst.fill("dst", &origins.iter().zip(&probes).map(view).collect::<Vec<_>>())
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let held = read(grid)?;
+        let origins = origins_of(&origins)?;
+        let probes = held.floats()?.probe(&origins)?;
+        dst.put("dst", origins.iter().zip(&probes).map(|(&at, probe)| frz_leaf::of(at, lent(probe))))
     })
-}
-
-fn vector_leaf_view(leaf: &VectorLeaf<'_>) -> frz_vector_leaf {
-    let (values, mask) = (leaf.values.as_flattened().as_ptr(), leaf.mask.as_ptr());
-    frz_vector_leaf { origin: leaf.origin, tile: [0.0; 3], values, mask }
 }
 
 /// Lends the leaves of a grid of vectors without copying them, in an order that changes only when the grid changes.
@@ -137,15 +148,16 @@ pub unsafe extern "C" fn frz_grid_vector_leaves(
     dst: frz_span,
     count: *mut usize,
 ) -> frz_status {
-    guard(|| {
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
         let count = required(count, "count")?;
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            count.write(0);
-            let held = read(grid)?;
-            let grid = held.vectors()?;
-            dst.list(count, grid.leaf_count(), || Ok(grid.leaves()?.iter().map(vector_leaf_view).collect()))
-        }
+        count.write(0);
+        let held = read(grid)?;
+        let grid = held.vectors()?;
+        dst.list(count, grid.leaf_count(), || {
+            let leaf = |leaf: Leaf<'_, _>| frz_vector_leaf::of(leaf.origin, lent(&Probe::Leaf(leaf)));
+            Ok(grid.leaves()?.into_iter().map(leaf).collect())
+        })
     })
 }
 
@@ -161,21 +173,12 @@ pub unsafe extern "C" fn frz_grid_vector_probe(
     origins: frz_view,
     dst: frz_span,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let held = read(grid)?;
-            let grid = held.vectors()?;
-            let origins = origins.elements::<[i32; 3]>("origins")?;
-            origins.iter().try_for_each(|&origin| check_origin(origin).map(drop))?;
-            let probes = grid.probe(&origins)?;
-            let view = |(&origin, probe): (&Origin, &VectorProbe<'_>)| match probe {
-                Probe::Leaf(leaf) => vector_leaf_view(leaf),
-                Probe::Tile { value, .. } => {
-                    frz_vector_leaf { origin, tile: *value, values: std::ptr::null(), mask: std::ptr::null() }
-                }
-            };
-            dst.fill("dst", &origins.iter().zip(&probes).map(view).collect::<Vec<_>>())
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let held = read(grid)?;
+        let grid = held.vectors()?;
+        let origins = origins_of(&origins)?;
+        let probes = grid.probe(&origins)?;
+        dst.put("dst", origins.iter().zip(&probes).map(|(&at, probe)| frz_vector_leaf::of(at, lent(probe))))
     })
 }

@@ -2,11 +2,9 @@
 
 use std::ffi::c_char;
 
-use super::leaves::check_origin;
+use super::leaves::origins_of;
 use super::sparse::frz_grid;
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{Changing, change, read, required};
-use crate::capi::ffi::views::{frz_span, frz_view, meaning, text, within};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::{Mesh, frz_mesh};
 use crate::capi::runtime::context::{creates, enter, frz_context};
 use crate::context::Context;
@@ -101,16 +99,13 @@ pub unsafe extern "C" fn frz_grid_sample(
     sampling: u32,
     dst: frz_span,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let held = read(grid)?;
-            let grid = held.floats()?;
-            let positions = positions_of(&positions)?;
-            dst.fill("dst", &sampled(ctx, grid, &positions, sampling)?)
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let call = enter(context)?;
+        let held = read(grid)?;
+        let grid = held.floats()?;
+        let positions = positions_of(&positions)?;
+        dst.fill("dst", &sampled(call.ctx(), grid, &positions, sampling)?)
     })
 }
 
@@ -129,15 +124,13 @@ pub unsafe extern "C" fn frz_grid_sample_vectors(
     sampling: u32,
     dst: frz_span,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let call = enter(context)?;
-            let held = read(grid)?;
-            let grid = held.vectors()?;
-            let positions = positions_of(&positions)?;
-            dst.fill("dst", &sampled_vectors(call.ctx(), grid, &positions, sampling)?)
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let call = enter(context)?;
+        let held = read(grid)?;
+        let grid = held.vectors()?;
+        let positions = positions_of(&positions)?;
+        dst.fill("dst", &sampled_vectors(call.ctx(), grid, &positions, sampling)?)
     })
 }
 
@@ -156,30 +149,24 @@ pub unsafe extern "C" fn frz_grid_sample_mesh(
     sampling: u32,
     name: *const c_char,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let held = read(grid)?;
-            let mut mesh: Changing<'_, Mesh> = change(mesh)?;
-            let name = match text(name, "name")? {
-                Some(name) => name.to_string(),
-                None => held.any().name(),
-            };
-            if name.is_empty() {
-                return Err(Failure::argument("name: neither it nor the grid has one"));
-            }
-            let positions: Vec<DVec3> = mesh.triangles.positions.iter().map(|p| p.cast()).collect();
-            let (components, values) = match held.any() {
-                GridRef::Floats(grid) => (1, sampled(ctx, grid, &positions, sampling)?),
-                GridRef::Vectors(grid) => {
-                    (3, sampled_vectors(ctx, grid, &positions, sampling)?.into_flattened())
-                }
-            };
-            mesh.set_attribute(&name, components, values);
-            Ok(())
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let call = enter(context)?;
+        let ctx = call.ctx();
+        let held = read(grid)?;
+        let mut mesh: Changing<'_, Mesh> = change(mesh)?;
+        let name = match text(name, "name")? {
+            Some(name) => name.to_string(),
+            None => held.any().name(),
+        };
+        refuse(name.is_empty(), || "name: neither it nor the grid has one")?;
+        let positions: Vec<DVec3> = mesh.triangles.positions.iter().map(|p| p.cast()).collect();
+        let (components, values) = match held.any() {
+            GridRef::Floats(grid) => (1, sampled(ctx, grid, &positions, sampling)?),
+            GridRef::Vectors(grid) => (3, sampled_vectors(ctx, grid, &positions, sampling)?.into_flattened()),
+        };
+        mesh.set_attribute(&name, components, values);
+        Ok(())
     })
 }
 
@@ -202,9 +189,7 @@ unsafe fn meshes(
         creates(context, out, |ctx| {
             let held = read(grid)?;
             let grid = held.floats()?;
-            if !iso.is_finite() {
-                return Err(Failure::argument("iso is not finite"));
-            }
+            refuse(!iso.is_finite(), || "iso is not finite")?;
             within("adaptivity", f64::from(adaptivity), 0.0..=1.0, "")?;
             Ok(Mesh::of_triangles(make(ctx, grid)?))
         })
@@ -262,10 +247,9 @@ pub unsafe extern "C" fn frz_grid_to_mesh_box(
                 Ok(pointer.cast::<[i32; 3]>().read_unaligned())
             };
             let corners = [corner(voxel_min, "voxel_min")?, corner(voxel_max, "voxel_max")?];
-            if (0..3).any(|axis| corners[0][axis] > corners[1][axis]) {
-                let text = format!("voxel_max = {:?} is less than voxel_min = {:?}", corners[1], corners[0]);
-                return Err(Failure::argument(text));
-            }
+            refuse((0..3).any(|axis| corners[0][axis] > corners[1][axis]), || {
+                format!("voxel_max = {:?} is less than voxel_min = {:?}", corners[1], corners[0])
+            })?;
             ctx.allow("a mesh of the grid", grid.leaf_count() as u64 * BYTES_PER_LEAF)?;
             Ok(ctx.phase("mesh", || level_set::box_to_mesh(ctx, grid, iso, adaptivity, corners))?)
         })
@@ -291,8 +275,7 @@ pub unsafe extern "C" fn frz_grid_to_mesh_blocks(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         meshes(context, grid, [iso, adaptivity], out, |ctx, grid| {
-            let origins = origins.elements::<[i32; 3]>("origins")?;
-            origins.iter().try_for_each(|&origin| check_origin(origin).map(drop))?;
+            let origins = origins_of(&origins)?;
             ctx.allow("a mesh of the blocks", origins.len() as u64 * BYTES_PER_LEAF)?;
             Ok(ctx.phase("mesh", || level_set::blocks_to_mesh(ctx, grid, iso, adaptivity, &origins))?)
         })

@@ -3,10 +3,10 @@
 use std::ffi::{c_char, c_void};
 use std::ptr::NonNull;
 
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{HandleType, change, clear, destroy, read};
-use crate::capi::ffi::views::{Sized32, fill, finite, text, write_bytes};
+use crate::capi::ffi::saved::write_bytes;
+use crate::capi::ffi::*;
 use crate::capi::runtime::context::{creates, frz_context};
+use crate::error::Result;
 use crate::vdb::{AnyGrid, FloatGrid, GridClass, GridRef, VectorGrid};
 
 /// A sparse grid of 32-bit floats, or of vectors of three of them. Voxel (i, j, k) has its centre at (i, j, k) x voxel size, unless a file
@@ -89,6 +89,12 @@ impl HandleType for frz_grid {
     const TAG: u32 = 0x6672_7a04;
 }
 
+impl From<AnyGrid> for Grid {
+    fn from(grid: AnyGrid) -> Self {
+        Self::Own(grid)
+    }
+}
+
 impl From<FloatGrid> for Grid {
     fn from(grid: FloatGrid) -> Self {
         Self::Own(AnyGrid::Floats(grid))
@@ -146,6 +152,14 @@ impl Grid {
     }
 }
 
+/// Sets a grid's name.
+pub(in crate::capi) fn set_name(grid: &mut AnyGrid, name: &str) -> Result<()> {
+    match grid {
+        AnyGrid::Floats(grid) => grid.set_name(name),
+        AnyGrid::Vectors(grid) => grid.set_name(name),
+    }
+}
+
 pub(in crate::capi) const CLASSES: [(u32, GridClass); 4] = [
     (frz_grid_class::FRZ_GRID_UNKNOWN as u32, GridClass::Unknown),
     (frz_grid_class::FRZ_GRID_LEVEL_SET as u32, GridClass::LevelSet),
@@ -160,10 +174,7 @@ fn number_of(class: GridClass) -> u32 {
 /// Checks the edge of a voxel (m).
 pub(in crate::capi) fn check_voxel(voxel: f64) -> Outcome {
     finite("voxel_size", voxel)?;
-    if !(1e-6..=1e3).contains(&voxel) {
-        return Err(Failure::argument(format!("voxel_size = {voxel} is not within 1e-6 to 1000 m")));
-    }
-    Ok(())
+    refuse(!(1e-6..=1e3).contains(&voxel), || format!("voxel_size = {voxel} is not within 1e-6 to 1000 m"))
 }
 
 /// Destroys a grid; NULL is ignored. A grid that belongs to another object is not destroyed.
@@ -202,7 +213,7 @@ pub unsafe extern "C" fn frz_grid_copy(
             let held = read(grid)?;
             let source = held.any();
             ctx.allow("a copy of the grid", source.memory_bytes())?;
-            Ok(Grid::Own(ctx.polled(|| source.deep_copy())?))
+            Ok(ctx.polled(|| source.deep_copy())?)
         })
     }
 }
@@ -214,32 +225,30 @@ pub unsafe extern "C" fn frz_grid_copy(
 /// Any number of threads may read a grid.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_grid_get_info(grid: *const frz_grid, info: *mut frz_grid_info) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let held = read(grid)?;
-            let grid = held.any();
-            let (voxel_min, voxel_max) = grid.active_bbox().unwrap_or_default();
-            let (value_type, background, background_vector) = match grid {
-                GridRef::Floats(grid) => (frz_value_type::FRZ_VALUE_FLOAT, grid.background(), [0.0; 3]),
-                GridRef::Vectors(grid) => (frz_value_type::FRZ_VALUE_VECTOR, 0.0, grid.background()),
-            };
-            let value = frz_grid_info {
-                struct_size: 0,
-                grid_class: number_of(grid.class()),
-                voxel_size: grid.voxel_size(),
-                background,
-                world_fixed: u32::from(grid.is_world_fixed()),
-                active_voxels: grid.active_voxels(),
-                leaf_count: grid.leaf_count() as u64,
-                memory_bytes: grid.memory_bytes(),
-                voxel_min,
-                voxel_max,
-                value_type: value_type as u32,
-                background_vector,
-            };
-            fill(info, None, value)
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let held = read(grid)?;
+        let grid = held.any();
+        let (voxel_min, voxel_max) = grid.active_bbox().unwrap_or_default();
+        let (value_type, background, background_vector) = match grid {
+            GridRef::Floats(grid) => (frz_value_type::FRZ_VALUE_FLOAT, grid.background(), [0.0; 3]),
+            GridRef::Vectors(grid) => (frz_value_type::FRZ_VALUE_VECTOR, 0.0, grid.background()),
+        };
+        let value = frz_grid_info {
+            struct_size: 0,
+            grid_class: number_of(grid.class()),
+            voxel_size: grid.voxel_size(),
+            background,
+            world_fixed: u32::from(grid.is_world_fixed()),
+            active_voxels: grid.active_voxels(),
+            leaf_count: grid.leaf_count() as u64,
+            memory_bytes: grid.memory_bytes(),
+            voxel_min,
+            voxel_max,
+            value_type: value_type as u32,
+            background_vector,
+        };
+        fill(info, None, value)
     })
 }
 
@@ -257,15 +266,12 @@ pub unsafe extern "C" fn frz_grid_name(
     capacity: usize,
     size: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(size);
-            let mut name = read(grid)?.any().name().into_bytes();
-            name.push(0);
-            let needed = name.len();
-            write_bytes(dst.cast::<c_void>(), capacity, size, || needed, || Ok(name))
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        clear(size);
+        let mut name = read(grid)?.any().name().into_bytes();
+        name.push(0);
+        write_bytes(dst.cast::<c_void>(), capacity, size, || name.len(), || Ok(&name))
     })
 }
 
@@ -277,15 +283,9 @@ pub unsafe extern "C" fn frz_grid_name(
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_grid_set_name(grid: *mut frz_grid, name: *const c_char) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let name = text(name, "name")?.unwrap_or("");
-            match change(grid)?.own()? {
-                AnyGrid::Floats(grid) => grid.set_name(name)?,
-                AnyGrid::Vectors(grid) => grid.set_name(name)?,
-            }
-            Ok(())
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let name = text(name, "name")?.unwrap_or("");
+        Ok(set_name(change(grid)?.own()?, name)?)
     })
 }

@@ -5,8 +5,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::views::{Sized32, check_size, fill, finite, frz_view, sized, within};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::{no_flags, polygons};
 use crate::context::Context;
 use crate::error::Result;
@@ -61,23 +60,10 @@ pub struct frz_body {
 unsafe impl Sized32 for frz_body {
     const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_body, friction), size_of::<Self>()];
     const NAME: &'static str = "frz_body";
-}
 
-impl frz_body {
-    const USUAL: Self = Self {
-        struct_size: 0,
-        flags: 0,
-        id: 0,
-        positions: frz_view::NONE,
-        positions_end: frz_view::NONE,
-        between: std::ptr::null(),
-        between_count: 0,
-        face_counts: frz_view::NONE,
-        indices: frz_view::NONE,
-        friction: 0.3,
-        stick: 0.0,
-        compression: 0.0,
-    };
+    fn defaults() -> Self {
+        Self { friction: 0.3, ..Self::zeroed() }
+    }
 }
 
 /// Fills a body with the defaults: no arrays, a friction of 0.3.
@@ -89,11 +75,8 @@ impl frz_body {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_body_init(body: *mut frz_body, size: usize) -> frz_status {
     // SAFETY: the body is NULL or has `size` bytes.
-    guard(|| unsafe { fill(body, Some(size), frz_body::USUAL) })
+    guard(|| unsafe { fill(body, Some(size), frz_body::defaults()) })
 }
-
-// SAFETY: views are numbers and pointers.
-unsafe impl crate::capi::ffi::views::Plain for frz_view {}
 
 /// Maximum number of poses between the beginning and the end of a step.
 const MOST_BETWEEN: usize = 4096;
@@ -197,9 +180,7 @@ pub(in crate::capi) unsafe fn bodies(
     shapes: &mut Shapes,
 ) -> Outcome<Vec<(Body, Surface)>> {
     finite("dt", dt)?;
-    if dt < 0.0 {
-        return Err(Failure::argument(format!("dt = {dt} is not 0 or more")));
-    }
+    refuse(dt < 0.0, || format!("dt = {dt} is not 0 or more"))?;
     // SAFETY: guaranteed by the caller.
     let arrived = unsafe { arrived(list, count, dt) }?;
     if role != Role::Sweep {
@@ -273,7 +254,7 @@ unsafe fn arrived(list: *const frz_body, count: usize, dt: f64) -> Outcome<Vec<A
     if count == 0 {
         return Ok(Vec::new());
     }
-    let first = crate::capi::ffi::handle::required(list.cast_mut(), "bodies")?.cast_const();
+    let first = required(list.cast_mut(), "bodies")?.cast_const();
     // SAFETY: guaranteed by the caller: at least the size of a body is there.
     let stride = unsafe { first.cast::<u32>().read_unaligned() } as usize;
     // Checked before use: it is the stride of the bodies.
@@ -281,17 +262,13 @@ unsafe fn arrived(list: *const frz_body, count: usize, dt: f64) -> Outcome<Vec<A
     let room = frz_view { data: first.cast(), count, stride };
     // SAFETY: as above; the sizes must be equal for the bodies to be contiguous.
     let sizes = unsafe { room.elements::<u32>("bodies") }?;
-    if sizes.iter().any(|&size| size as usize != stride) {
-        return Err(Failure::argument("bodies: their struct_size differs"));
-    }
+    refuse(sizes.iter().any(|&size| size as usize != stride), || "bodies: their struct_size differs")?;
     let mut out: Vec<Arrived> = Vec::with_capacity(count);
     let mut ids = HashSet::with_capacity(count);
     for at in 0..count {
         // SAFETY: guaranteed by the caller.
         let body = unsafe { one(first.byte_add(at * stride), dt) }.map_err(|failure| named(at, failure))?;
-        if !ids.insert(body.id) {
-            return Err(Failure::argument(format!("body {at}: another one has the id {} too", body.id)));
-        }
+        refuse(!ids.insert(body.id), || format!("body {at}: another one has the id {} too", body.id))?;
         out.push(body);
     }
     Ok(out)
@@ -307,7 +284,7 @@ fn named(at: usize, failure: Failure) -> Failure {
 unsafe fn one(body: *const frz_body, dt: f64) -> Outcome<Arrived> {
     // SAFETY: guaranteed by the caller.
     unsafe {
-        let body = sized(body, frz_body::USUAL)?;
+        let body = given(body)?;
         no_flags(body.flags, FRZ_BODY_EXACT | FRZ_BODY_COMPRESSION)?;
         within("friction", body.friction, 0.0..=10.0, "")?;
         within("stick", body.stick, 0.0..=1000.0, "")?;
@@ -315,10 +292,9 @@ unsafe fn one(body: *const frz_body, dt: f64) -> Outcome<Arrived> {
         let compression = has_compression.then_some(body.compression);
         within("compression", compression.unwrap_or(0.0), 0.0..=1.0, "")?;
         let surface = Surface { friction: body.friction, stick: body.stick, compression };
-        if body.between_count > MOST_BETWEEN {
-            let text = format!("between_count = {} is more than {MOST_BETWEEN}", body.between_count);
-            return Err(Failure::argument(text));
-        }
+        refuse(body.between_count > MOST_BETWEEN, || {
+            format!("between_count = {} is more than {MOST_BETWEEN}", body.between_count)
+        })?;
         let mesh = polygons(&body.positions, &body.face_counts, &body.indices)?;
         let count = mesh.positions.len();
         let mut poses = vec![mesh.positions.clone()];
@@ -328,17 +304,16 @@ unsafe fn one(body: *const frz_body, dt: f64) -> Outcome<Arrived> {
                 "between: there are poses, but no positions_end that they lead to",
             ));
         }
-        let mut pose = |view: &frz_view, name: &str| {
+        let mut pose = |view: &frz_view, name: &str| -> Outcome {
             let positions = view.finite(name)?;
-            if positions.len() != count {
-                let text = format!("{name}: {} elements, but there are {count} positions", positions.len());
-                return Err(Failure::argument(text));
-            }
+            refuse(positions.len() != count, || {
+                format!("{name}: {} elements, but there are {count} positions", positions.len())
+            })?;
             poses.push(positions.into_iter().map(Vec3::from).collect());
             Ok(())
         };
         if dt > 0.0 && moves {
-            let list = frz_view { data: body.between.cast(), count: body.between_count, stride: 0 };
+            let list = frz_view::packed(body.between, body.between_count);
             for view in list.elements::<frz_view>("between")? {
                 pose(&view, "between")?;
             }

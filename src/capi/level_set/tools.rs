@@ -1,10 +1,8 @@
 //! Level sets: from meshes, particles and motion, and tools that change them.
 
 use super::body::{Role, Shapes, bodies, frz_body};
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{change, read, required};
-use crate::capi::ffi::views::{finite, frz_view, meaning};
-use crate::capi::grid::sparse::{Grid, check_voxel, frz_grid};
+use crate::capi::ffi::*;
+use crate::capi::grid::sparse::{check_voxel, frz_grid};
 use crate::capi::mesh::triangles::frz_mesh;
 use crate::capi::runtime::context::{creates, enter, frz_context};
 use crate::context::Context;
@@ -67,14 +65,10 @@ impl frz_noise {
     /// The defaults for hosts.
     pub(in crate::capi) const USUAL: Self = Self { amplitude: -1.0, size: -1.0, octaves: 3, seed: 0 };
 
-    /// Refuses values that are not finite.
-    pub(in crate::capi) fn check(&self) -> Outcome {
-        finite("noise amplitude", self.amplitude)?;
-        finite("noise size", self.size)
-    }
-
     /// The library's own parameters for voxels of a size (m); `None` for no noise.
-    pub(in crate::capi) fn params(&self, cell: f64) -> Option<NoiseParams> {
+    pub(in crate::capi) fn params(&self, cell: f64) -> Outcome<Option<NoiseParams>> {
+        finite("noise amplitude", self.amplitude)?;
+        finite("noise size", self.size)?;
         let defaults = NoiseParams::for_cell(cell);
         let or = |value: f64, defaults: f64| if value == -1.0 { defaults } else { value };
         let params = NoiseParams {
@@ -83,7 +77,7 @@ impl frz_noise {
             octaves: self.octaves,
             seed: self.seed,
         };
-        (params.amplitude != 0.0).then_some(params)
+        Ok((params.amplitude != 0.0).then_some(params))
     }
 }
 
@@ -108,9 +102,7 @@ type Filter = fn(&Context, &mut FloatGrid, u32, u32, Scheme) -> Result<()>;
 
 /// Refuses a grid that is not a level set, and warns if its values are not distances in metres.
 fn level_set_of<'a>(ctx: &Context, grid: &'a FloatGrid) -> Outcome<&'a FloatGrid> {
-    if grid.class() != GridClass::LevelSet {
-        return Err(Failure::argument("the grid is not a level set"));
-    }
+    refuse(grid.class() != GridClass::LevelSet, || "the grid is not a level set")?;
     if let Some(what) = distances::warning(grid)? {
         ctx.warn(&format!("the grid {what}"));
     }
@@ -126,15 +118,13 @@ unsafe fn changes(
     inout: *mut frz_grid,
     work: impl FnOnce(&Context, &mut FloatGrid) -> Outcome,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: guaranteed by the caller.
-        unsafe {
-            let call = enter(context)?;
-            let mut held = change(inout)?;
-            let grid = held.own_floats()?;
-            level_set_of(call.ctx(), grid)?;
-            work(call.ctx(), grid)
-        }
+    // SAFETY: guaranteed by the caller.
+    guard(|| unsafe {
+        let call = enter(context)?;
+        let mut held = change(inout)?;
+        let grid = held.own_floats()?;
+        level_set_of(call.ctx(), grid)?;
+        work(call.ctx(), grid)
     })
 }
 
@@ -164,14 +154,13 @@ pub unsafe extern "C" fn frz_levelset_from_mesh(
             let settings = settings(voxel_size, half_width)?;
             ctx.allow("a level set of the mesh", surface_bytes(mesh.triangles.area(), voxel_size))?;
             let solid = mesh.triangles.clone();
-            let grid = ctx.polled(|| {
+            Ok(ctx.polled(|| {
                 let still = Body::new(Box::new(Rigid::new(solid, Keys::default())), 0.0)?;
                 if let Some(what) = still.warning() {
                     ctx.warn(&format!("the mesh: {what}"));
                 }
                 sweep::chain(ctx, &[still], 0.0, 0.0, &settings)
-            })?;
-            Ok(Grid::from(grid))
+            })?)
         })
     }
 }
@@ -205,20 +194,17 @@ pub unsafe extern "C" fn frz_levelset_from_particles(
                 return Err(Failure::argument(format!("radii: element {at} is not finite")));
             }
             if let Some(at) = radii.iter().position(|radius| *radius <= 0.0) {
-                return Err(Failure::argument(format!(
-                    "radii: element {at} = {} m is not above 0",
-                    radii[at]
-                )));
+                let text = format!("radii: element {at} = {} m is not above 0", radii[at]);
+                return Err(Failure::argument(text));
             }
             let area: f64 =
                 radii.iter().map(|&radius| 4.0 * std::f64::consts::PI * f64::from(radius).powi(2)).sum();
             ctx.allow("a level set of the spheres", surface_bytes(area, voxel_size))?;
             reachable(&positions, &radii, voxel_size)?;
             let positions: Vec<DVec3> = positions.iter().map(|&p| DVec3::from(p.map(f64::from))).collect();
-            let grid = ctx.phase("spheres", || {
+            Ok(ctx.phase("spheres", || {
                 level_set::from_particles(ctx, &positions, &radii, voxel_size, settings.half_width)
-            })?;
-            Ok(Grid::from(grid))
+            })?)
         })
     }
 }
@@ -288,9 +274,9 @@ pub unsafe extern "C" fn frz_levelset_offset(
             let scheme = scheme_of(scheme)?;
             finite("distance", f64::from(distance))?;
             let voxels = f64::from(distance) / grid.voxel_size();
-            if !(-1000.0..=1000.0).contains(&voxels) {
-                return Err(Failure::argument(format!("distance = {distance} m is more than 1000 voxels")));
-            }
+            refuse(!(-1000.0..=1000.0).contains(&voxels), || {
+                format!("distance = {distance} m is more than 1000 voxels")
+            })?;
             ctx.allow("the moved level set", grown_bytes(grid, voxels))?;
             Ok(ctx.phase_in_place("offset", || level_set::offset(ctx, grid, distance, scheme))?)
         })
@@ -328,9 +314,9 @@ pub unsafe extern "C" fn frz_levelset_smooth(
         changes(context, inout, |ctx, grid| {
             let scheme = scheme_of(scheme)?;
             for (name, value, most) in [("width", width, 32), ("times", times, 1000)] {
-                if !(1..=most).contains(&value) {
-                    return Err(Failure::argument(format!("{name} = {value} is not within 1 to {most}")));
-                }
+                refuse(!(1..=most).contains(&value), || {
+                    format!("{name} = {value} is not within 1 to {most}")
+                })?;
             }
             ctx.allow("the smoothed level set", grid.memory_bytes())?;
             let known: [(u32, Filter); 2] = [
@@ -358,14 +344,12 @@ pub unsafe extern "C" fn frz_levelset_displace(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         changes(context, inout, |ctx, grid| {
-            if !grid.is_world_fixed() {
-                return Err(Failure::argument(
-                    "the grid's voxels are rotated or shifted against the world's axes",
-                ));
-            }
+            refuse(
+                !grid.is_world_fixed(),
+                || "the grid's voxels are rotated or shifted against the world's axes",
+            )?;
             let noise = required(noise.cast_mut(), "noise")?.read_unaligned();
-            noise.check()?;
-            let Some(params) = noise.params(grid.voxel_size()) else { return Ok(()) };
+            let Some(params) = noise.params(grid.voxel_size())? else { return Ok(()) };
             params.validate(grid.voxel_size())?;
             ctx.allow("the displaced level set", grid.memory_bytes().saturating_mul(4))?;
             Ok(ctx.polled(|| base_layer::displace(ctx, grid, &params))?)
@@ -402,8 +386,7 @@ pub unsafe extern "C" fn frz_levelset_sweep(
             let bodies = self::bodies(ctx, bodies, count, dt, Role::Sweep, &mut Shapes::new())?;
             let bodies: Vec<Body> = bodies.into_iter().map(|(body, _)| body).collect();
             ctx.polled(|| check_reach(&bodies, dt, voxel_size))?;
-            let grid = ctx.polled(|| sweep::chain(ctx, &bodies, 0.0, dt, &settings))?;
-            Ok(Grid::from(grid))
+            Ok(ctx.polled(|| sweep::chain(ctx, &bodies, 0.0, dt, &settings))?)
         })
     }
 }

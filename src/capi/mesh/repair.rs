@@ -1,14 +1,13 @@
 //! Repair: meshes with faults become solids.
 
 use super::triangles::{Mesh, frz_mesh};
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{clear, give, read, required};
-use crate::capi::ffi::views::{Sized32, fill, within};
+use crate::capi::ffi::fields::fields_of;
+use crate::capi::ffi::*;
 use crate::capi::runtime::context::{enter, frz_context};
 use crate::context::Context;
 use crate::geometry::mesh::attributes::{Number, On};
 use crate::geometry::{DetailedMesh, MeshArray};
-use crate::mesh_repair::{RepairReport, Repaired, carry_attributes, repair};
+use crate::mesh_repair::{Prepared, RepairReport, Repaired, carry_attributes, repair};
 
 /// What frz_mesh_repair did.
 #[repr(C)]
@@ -45,27 +44,23 @@ pub struct frz_repair_report {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_repair_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_repair_report";
 }
 
-impl frz_repair_report {
-    fn of(report: &RepairReport) -> Self {
-        let done = &report.prepared;
+fields_of!(Prepared => frz_repair_report {
+    joined_vertices, dropped_triangles, turned_triangles, turned_parts, holes, added_triangles
+});
+
+impl From<RepairReport> for frz_repair_report {
+    fn from(report: RepairReport) -> Self {
         Self {
-            struct_size: 0,
             rung: report.rung as u32,
-            joined_vertices: done.joined_vertices as u64,
-            dropped_triangles: done.dropped_triangles as u64,
-            turned_triangles: done.turned_triangles as u64,
-            turned_parts: done.turned_parts as u64,
-            holes: done.holes as u64,
-            added_triangles: done.added_triangles as u64,
             flagged_cells: report.flagged_cells as u64,
             rebuilt_cells: report.rebuilt_cells as u64,
             kept_triangles: report.kept_triangles as u64,
             slivers: report.slivers as u64,
             cell: report.cell,
+            ..report.prepared.into()
         }
     }
 }
@@ -94,21 +89,18 @@ pub unsafe extern "C" fn frz_mesh_repair(
     out: *mut *mut frz_mesh,
     report: *mut frz_repair_report,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(out);
-            if !report.is_null() {
-                fill(report, None, frz_repair_report::of(&RepairReport::default()))?;
-            }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        clear(out);
+        reports(report, || {
             let call = enter(context)?;
             required(out, "out")?;
             let mesh = read(mesh)?;
             within("cell", cell, 1e-9..=1e6, " m")?;
             let (repaired, done) = repaired(call.ctx(), &mesh, cell)?;
             give(out, repaired)?;
-            if report.is_null() { Ok(()) } else { fill(report, None, frz_repair_report::of(&done)) }
-        }
+            Ok(done)
+        })
     })
 }
 

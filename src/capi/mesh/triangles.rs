@@ -2,9 +2,7 @@
 
 use std::ffi::c_char;
 
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{HandleType, destroy, read};
-use crate::capi::ffi::views::{Plain, Sized32, fill, frz_span, frz_view, meaning, sized, text};
+use crate::capi::ffi::*;
 use crate::capi::runtime::context::{creates, frz_context};
 use crate::context::Context;
 use crate::geometry::{PolygonMesh, TriMesh, Vec3};
@@ -85,7 +83,6 @@ pub struct frz_mesh_info {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_mesh_info {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_mesh_info";
 }
 
@@ -171,9 +168,7 @@ pub(in crate::capi) unsafe fn polygons(
         None => set_triangles(&mut mesh, corners)?,
         Some(counts) => push_faces(&mut mesh, &corners, counts)?,
     }
-    if mesh.ends.is_empty() {
-        return Err(Failure::argument("indices: the mesh has no faces"));
-    }
+    refuse(mesh.ends.is_empty(), || "indices: the mesh has no faces")?;
     Ok(mesh)
 }
 
@@ -203,10 +198,9 @@ fn check_corners(corners: &[u32], vertices: usize) -> Outcome {
 }
 
 fn set_triangles(mesh: &mut PolygonMesh, corners: Vec<u32>) -> Outcome {
-    if !corners.len().is_multiple_of(3) {
-        let text = format!("indices: {} corners are not a multiple of 3", corners.len());
-        return Err(Failure::argument(text));
-    }
+    refuse(!corners.len().is_multiple_of(3), || {
+        format!("indices: {} corners are not a multiple of 3", corners.len())
+    })?;
     mesh.ends = (3..=corners.len() as u32).step_by(3).collect();
     mesh.corners = corners;
     Ok(())
@@ -214,10 +208,9 @@ fn set_triangles(mesh: &mut PolygonMesh, corners: Vec<u32>) -> Outcome {
 
 fn push_faces(mesh: &mut PolygonMesh, corners: &[u32], counts: Vec<u32>) -> Outcome {
     let sum: u64 = counts.iter().map(|&count| u64::from(count)).sum();
-    if sum != corners.len() as u64 {
-        let text = format!("face_counts: the faces have {sum} corners, indices {}", corners.len());
-        return Err(Failure::argument(text));
-    }
+    refuse(sum != corners.len() as u64, || {
+        format!("face_counts: the faces have {sum} corners, indices {}", corners.len())
+    })?;
     let mut rest = corners;
     for count in counts {
         let (face, left) = rest.split_at(count as usize);
@@ -245,17 +238,7 @@ pub unsafe extern "C" fn frz_mesh_create(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
-            let none = frz_view::NONE;
-            let defaults = frz_mesh_desc {
-                struct_size: 0,
-                flags: 0,
-                positions: none,
-                face_counts: none,
-                indices: none,
-                attributes: std::ptr::null(),
-                attribute_count: 0,
-            };
-            let desc = sized(desc, defaults)?;
+            let desc = given(desc)?;
             no_flags(desc.flags, 0)?;
             let polygons = polygons(&desc.positions, &desc.face_counts, &desc.indices)?;
             let bytes = (polygons.positions.len() + polygons.corners.len()) as u64 * 28;
@@ -273,14 +256,11 @@ fn made(ctx: &Context, polygons: PolygonMesh, attributes: Vec<Attribute>) -> Out
 
 /// Refuses unknown flags.
 pub(in crate::capi) fn no_flags(flags: u32, known: u32) -> Outcome {
-    if flags & !known != 0 {
-        return Err(Failure::argument(format!("flags = {flags:#x} has bits without a meaning")));
-    }
-    Ok(())
+    refuse(flags & !known != 0, || format!("flags = {flags:#x} has bits without a meaning"))
 }
 
 unsafe fn attributes(desc: &frz_mesh_desc, vertices: usize) -> Outcome<Vec<Attribute>> {
-    let view = frz_view { data: desc.attributes.cast(), count: desc.attribute_count, stride: 0 };
+    let view = frz_view::packed(desc.attributes, desc.attribute_count);
     // SAFETY: the caller of `frz_mesh_create` guarantees `attribute_count` attributes.
     let list = unsafe { view.elements::<frz_attribute>("attributes") }?;
     let mut out: Vec<Attribute> = Vec::with_capacity(list.len());
@@ -288,15 +268,13 @@ unsafe fn attributes(desc: &frz_mesh_desc, vertices: usize) -> Outcome<Vec<Attri
         // SAFETY: as above.
         let name = unsafe { text(attribute.name, "an attribute's name") }?.filter(|name| !name.is_empty());
         let name = name.ok_or_else(|| Failure::argument("an attribute has no name"))?.to_string();
-        if out.iter().any(|other| other.name == name) {
-            return Err(Failure::argument(format!("two attributes are named \"{name}\"")));
-        }
+        refuse(out.iter().any(|other| other.name == name), || {
+            format!("two attributes are named \"{name}\"")
+        })?;
         let values = attribute.values;
-        if values.count != vertices {
-            let text =
-                format!("attribute \"{name}\" has {} elements, the mesh {vertices} vertices", values.count);
-            return Err(Failure::argument(text));
-        }
+        refuse(values.count != vertices, || {
+            format!("attribute \"{name}\" has {} elements, the mesh {vertices} vertices", values.count)
+        })?;
         let components = attribute.components as usize;
         // SAFETY: as above.
         let values: Vec<f32> = unsafe {
@@ -334,27 +312,25 @@ pub unsafe extern "C" fn frz_mesh_destroy(mesh: *mut frz_mesh) {
 /// Any number of threads may read a mesh.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_mesh_get_info(mesh: *const frz_mesh, info: *mut frz_mesh_info) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mesh = read(mesh)?;
-            let triangles = &mesh.triangles;
-            let (low, high) = triangles.bounds().unwrap_or_default();
-            let value = frz_mesh_info {
-                struct_size: 0,
-                closed: u32::from(triangles.is_closed()),
-                vertex_count: mesh.polygons.positions.len() as u64,
-                face_count: mesh.polygons.ends.len() as u64,
-                corner_count: mesh.polygons.corners.len() as u64,
-                triangle_count: triangles.triangles.len() as u64,
-                attribute_count: mesh.attributes.len() as u64,
-                box_min: low.into(),
-                box_max: high.into(),
-                area: triangles.area(),
-                volume: triangles.volume(),
-            };
-            fill(info, None, value)
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let mesh = read(mesh)?;
+        let triangles = &mesh.triangles;
+        let (low, high) = triangles.bounds().unwrap_or_default();
+        let value = frz_mesh_info {
+            struct_size: 0,
+            closed: u32::from(triangles.is_closed()),
+            vertex_count: mesh.polygons.positions.len() as u64,
+            face_count: mesh.polygons.ends.len() as u64,
+            corner_count: mesh.polygons.corners.len() as u64,
+            triangle_count: triangles.triangles.len() as u64,
+            attribute_count: mesh.attributes.len() as u64,
+            box_min: low.into(),
+            box_max: high.into(),
+            area: triangles.area(),
+            volume: triangles.volume(),
+        };
+        fill(info, None, value)
     })
 }
 
@@ -362,7 +338,7 @@ pub unsafe extern "C" fn frz_mesh_get_info(mesh: *const frz_mesh, info: *mut frz
 /// The span must describe memory that can be written.
 unsafe fn triples(dst: &frz_span, triples: &[Vec3]) -> Outcome {
     // SAFETY: guaranteed by the caller.
-    unsafe { dst.fill("dst", &triples.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>()) }
+    unsafe { dst.put("dst", triples.iter().map(|&triple| <[f32; 3]>::from(triple))) }
 }
 
 /// Copies an array of a mesh into the caller's memory.
@@ -375,28 +351,25 @@ unsafe fn triples(dst: &frz_span, triples: &[Vec3]) -> Outcome {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_mesh_read(mesh: *const frz_mesh, part: u32, dst: frz_span) -> frz_status {
     use frz_mesh_part::*;
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mesh = read(mesh)?;
-            let known = [
-                FRZ_MESH_POSITIONS,
-                FRZ_MESH_FACE_COUNTS,
-                FRZ_MESH_INDICES,
-                FRZ_MESH_TRIANGLES,
-                FRZ_MESH_NORMALS,
-            ]
-            .map(|part| (part as u32, part));
-            match meaning("part", "frz_mesh_part", part, &known)? {
-                FRZ_MESH_POSITIONS => triples(&dst, &mesh.polygons.positions),
-                FRZ_MESH_NORMALS => triples(&dst, &mesh.triangles.normals()),
-                FRZ_MESH_FACE_COUNTS => {
-                    let counts: Vec<u32> = mesh.polygons.polygons().map(|face| face.len() as u32).collect();
-                    dst.fill("dst", &counts)
-                }
-                FRZ_MESH_INDICES => dst.fill("dst", &mesh.polygons.corners),
-                FRZ_MESH_TRIANGLES => dst.fill("dst", &mesh.triangles.triangles),
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let mesh = read(mesh)?;
+        let known = [
+            FRZ_MESH_POSITIONS,
+            FRZ_MESH_FACE_COUNTS,
+            FRZ_MESH_INDICES,
+            FRZ_MESH_TRIANGLES,
+            FRZ_MESH_NORMALS,
+        ]
+        .map(|part| (part as u32, part));
+        match meaning("part", "frz_mesh_part", part, &known)? {
+            FRZ_MESH_POSITIONS => triples(&dst, &mesh.polygons.positions),
+            FRZ_MESH_NORMALS => triples(&dst, &mesh.triangles.normals()),
+            FRZ_MESH_FACE_COUNTS => {
+                dst.collect("dst", mesh.polygons.polygons().map(|face| face.len() as u32))
             }
+            FRZ_MESH_INDICES => dst.fill("dst", &mesh.polygons.corners),
+            FRZ_MESH_TRIANGLES => dst.fill("dst", &mesh.triangles.triangles),
         }
     })
 }
@@ -415,38 +388,28 @@ pub unsafe extern "C" fn frz_mesh_attribute(
     dst: frz_span,
     components: *mut u32,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let tell = |count: usize| {
-                if !components.is_null() {
-                    components.write(count as u32);
-                }
-            };
-            tell(0);
-            let mesh = read(mesh)?;
-            let name = text(name, "name")?.ok_or_else(|| Failure::argument("name is NULL"))?;
-            let found = mesh.attributes.iter().find(|attribute| attribute.name == name);
-            let attribute = found.ok_or_else(|| {
-                let names: Vec<&str> = mesh.attributes.iter().map(|other| other.name.as_str()).collect();
-                let there = if names.is_empty() {
-                    "it has none".into()
-                } else {
-                    format!("it has {}", names.join(", "))
-                };
-                Failure::argument(format!("the mesh has no attribute \"{name}\": {there}"))
-            })?;
-            if !dst.data.is_null() {
-                let values = &attribute.values;
-                match attribute.components {
-                    1 => dst.fill("dst", values)?,
-                    2 => dst.fill("dst", values.as_chunks::<2>().0)?,
-                    3 => dst.fill("dst", values.as_chunks::<3>().0)?,
-                    _ => dst.fill("dst", values.as_chunks::<4>().0)?,
-                }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        clear(components);
+        let mesh = read(mesh)?;
+        let name = required_text(name, "name")?;
+        let found = mesh.attributes.iter().find(|attribute| attribute.name == name);
+        let attribute = found.ok_or_else(|| {
+            let names: Vec<&str> = mesh.attributes.iter().map(|other| other.name.as_str()).collect();
+            let there =
+                if names.is_empty() { "it has none".into() } else { format!("it has {}", names.join(", ")) };
+            Failure::argument(format!("the mesh has no attribute \"{name}\": {there}"))
+        })?;
+        if !dst.data.is_null() {
+            let values = &attribute.values;
+            match attribute.components {
+                1 => dst.fill("dst", values)?,
+                2 => dst.fill("dst", values.as_chunks::<2>().0)?,
+                3 => dst.fill("dst", values.as_chunks::<3>().0)?,
+                _ => dst.fill("dst", values.as_chunks::<4>().0)?,
             }
-            tell(attribute.components);
-            Ok(())
         }
+        write_some(components, attribute.components as u32);
+        Ok(())
     })
 }

@@ -1,6 +1,7 @@
 //! Contexts: cancel, progress, warnings and times of a computation.
 
 use std::ffi::{CString, c_char, c_int, c_void};
+use std::ops::Deref;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -8,9 +9,7 @@ use std::time::Instant;
 use super::library::FRZ_ABI_VERSION;
 use super::pool::{Threads, frz_pool};
 use crate::capi::ffi::guard::frz_status::*;
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{HandleType, Reading, clear, destroy, give, read, required};
-use crate::capi::ffi::views::{Plain, frz_span};
+use crate::capi::ffi::*;
 use crate::context::{Context, PhaseTime, Phases, Progress, Running, machine_memory};
 use crate::error::Error;
 
@@ -98,66 +97,31 @@ impl HandleType for frz_context {
     const TAG: u32 = 0x6672_7a02;
 }
 
-/// A call with exclusive use of a context, except for cancel, reset and progress; and its phases.
-pub(in crate::capi) struct Call<'a>(Reading<'a, State>, Option<(Running, Phases)>);
-
-impl Call<'_> {
-    /// The library's own context.
-    pub(in crate::capi) fn ctx(&self) -> &Context {
-        &self.0.ctx
-    }
-}
-
-/// Begins a call with a context.
-///
-/// # Safety
-/// The context must be NULL or not destroyed.
-pub(in crate::capi) unsafe fn enter<'a>(context: *const frz_context) -> Outcome<Call<'a>> {
-    // SAFETY: guaranteed by the caller.
-    let state = unsafe { read(context) }?;
-    if state.entered.swap(true, Ordering::AcqRel) {
-        return Err(Failure::new(FRZ_ERROR_BUSY, "the context is in use by another call"));
-    }
-    let mut call = Call(state, None);
-    if call.0.poisoned.load(Ordering::Acquire) {
-        let text = "the context saw an internal error before and can only be destroyed";
-        return Err(Failure::new(FRZ_ERROR_POISONED, text));
-    }
-    call.1 = Some((call.ctx().begin(), call.ctx().collect()));
-    call.0.began.set(Some(Instant::now()));
-    Ok(call)
-}
-
-/// A call of a real-time frame, with exclusive use of a context as a [`Call`] has. It takes no lock, allocates nothing, reads no clock, and
-/// has no phases, polls or progress.
+/// A call of a real-time frame, with exclusive use of a context, except for cancel, reset and progress. It takes no lock, allocates
+/// nothing, reads no clock, and has no phases, polls or progress.
 pub(in crate::capi) struct LightCall<'a>(Reading<'a, State>);
 
-impl LightCall<'_> {
+impl<'a> LightCall<'a> {
+    /// # Safety
+    /// The context must be NULL or not destroyed.
+    unsafe fn begin(context: *const frz_context) -> Outcome<Self> {
+        // SAFETY: guaranteed by the caller.
+        let state = unsafe { read(context) }?;
+        if state.entered.swap(true, Ordering::AcqRel) {
+            return Err(Failure::new(FRZ_ERROR_BUSY, "the context is in use by another call"));
+        }
+        let call = Self(state);
+        if call.0.poisoned.load(Ordering::Acquire) {
+            let text = "the context saw an internal error before and can only be destroyed";
+            return Err(Failure::new(FRZ_ERROR_POISONED, text));
+        }
+        Ok(call)
+    }
+
     /// The library's own context.
     pub(in crate::capi) fn ctx(&self) -> &Context {
         &self.0.ctx
     }
-}
-
-/// Begins a call of a real-time frame with a context, unless it is cancelled; a cancel is read only here.
-///
-/// # Safety
-/// As [`enter`].
-pub(in crate::capi) unsafe fn enter_light<'a>(context: *const frz_context) -> Outcome<LightCall<'a>> {
-    // SAFETY: guaranteed by the caller.
-    let state = unsafe { read(context) }?;
-    if state.entered.swap(true, Ordering::AcqRel) {
-        return Err(Failure::new(FRZ_ERROR_BUSY, "the context is in use by another call"));
-    }
-    let call = LightCall(state);
-    if call.0.poisoned.load(Ordering::Acquire) {
-        let text = "the context saw an internal error before and can only be destroyed";
-        return Err(Failure::new(FRZ_ERROR_POISONED, text));
-    }
-    if call.ctx().is_cancelled() {
-        return Err(Error::Cancelled.into());
-    }
-    Ok(call)
 }
 
 impl Drop for LightCall<'_> {
@@ -169,40 +133,90 @@ impl Drop for LightCall<'_> {
     }
 }
 
-/// An interface function that creates an object: `out` receives it, or NULL after a failure.
+/// Begins a call of a real-time frame with a context, unless it is cancelled; a cancel is read only here.
 ///
 /// # Safety
-/// As [`enter`] and [`give`].
-pub(in crate::capi) unsafe fn creates<N: HandleType>(
-    context: *const frz_context,
-    out: *mut *mut N,
-    make: impl FnOnce(&Context) -> Outcome<N::Value>,
-) -> frz_status {
-    guard(|| {
-        // SAFETY: guaranteed by the caller.
-        unsafe {
-            clear(out);
-            let call = enter(context)?;
-            required(out, "out")?;
-            give(out, make(call.ctx())?)
-        }
-    })
+/// As [`enter`].
+pub(in crate::capi) unsafe fn enter_light<'a>(context: *const frz_context) -> Outcome<LightCall<'a>> {
+    // SAFETY: guaranteed by the caller.
+    let call = unsafe { LightCall::begin(context) }?;
+    if call.ctx().is_cancelled() {
+        return Err(Error::Cancelled.into());
+    }
+    Ok(call)
+}
+
+/// A call with phases, polls and progress, with exclusive use of a context as a [`LightCall`] has.
+pub(in crate::capi) struct Call<'a> {
+    /// Dropped first: the next call must not begin within this one, as it would inherit its cancel.
+    phases: (Running, Phases),
+    light: LightCall<'a>,
+}
+
+impl<'a> Deref for Call<'a> {
+    type Target = LightCall<'a>;
+    fn deref(&self) -> &LightCall<'a> {
+        &self.light
+    }
 }
 
 impl Drop for Call<'_> {
     fn drop(&mut self) {
-        if std::thread::panicking() {
-            self.0.poisoned.store(true, Ordering::Release);
-        }
-        let timings = self.1.as_ref().map_or_else(Vec::new, |(_, phases)| phases.times());
+        let timings = self.phases.1.times();
         if !timings.is_empty() {
-            *self.0.timings.lock().unwrap_or_else(PoisonError::into_inner) = timings;
+            *self.light.0.timings.lock().unwrap_or_else(PoisonError::into_inner) = timings;
         }
-        self.0.began.set(None);
-        // The next call must not begin within this one: it would inherit its cancel.
-        self.1.take();
-        self.0.entered.store(false, Ordering::Release);
+        self.light.0.began.set(None);
     }
+}
+
+/// Begins a call with a context.
+///
+/// # Safety
+/// The context must be NULL or not destroyed.
+pub(in crate::capi) unsafe fn enter<'a>(context: *const frz_context) -> Outcome<Call<'a>> {
+    // SAFETY: guaranteed by the caller.
+    let light = unsafe { LightCall::begin(context) }?;
+    let phases = (light.ctx().begin(), light.ctx().collect());
+    light.0.began.set(Some(Instant::now()));
+    Ok(Call { phases, light })
+}
+
+/// An interface function that creates an object: `out` receives it, or NULL after a failure.
+///
+/// # Safety
+/// As [`enter`] and [`give`].
+pub(in crate::capi) unsafe fn creates<N: HandleType, V: Into<N::Value>>(
+    context: *const frz_context,
+    out: *mut *mut N,
+    make: impl FnOnce(&Context) -> Outcome<V>,
+) -> frz_status {
+    // SAFETY: guaranteed by the caller.
+    guard(|| unsafe {
+        clear(out);
+        let call = enter(context)?;
+        required(out, "out")?;
+        give(out, make(call.ctx())?.into())
+    })
+}
+
+/// An interface function that moves an object through a step and reports what the step did.
+///
+/// # Safety
+/// As [`enter`], [`change`] and [`reports`].
+pub(in crate::capi) unsafe fn steps<N: HandleType, T: Sized32>(
+    context: *const frz_context,
+    object: *mut N,
+    report: *mut T,
+    step: impl FnOnce(&Context, &mut N::Value) -> Outcome<T>,
+) -> frz_status {
+    // SAFETY: guaranteed by the caller.
+    guard(|| unsafe {
+        reports(report, || {
+            let call = enter(context)?;
+            step(call.ctx(), &mut *change(object)?)
+        })
+    })
 }
 
 /// A host's pointer, which is only passed back to it.
@@ -231,13 +245,11 @@ fn usual_limit() -> u64 {
 }
 
 fn progress_of(progress: &Progress, began: &Began) -> frz_progress {
-    let Progress { phase, phases_done, part, .. } = *progress;
-    let fraction = part.map_or(-1.0, f64::from);
     frz_progress {
-        stage: letters(phase),
-        stages_done: phases_done as u64,
+        stage: letters(progress.phase),
+        stages_done: progress.phases_done as u64,
         seconds: began.seconds(),
-        fraction,
+        fraction: progress.part.map_or(-1.0, f64::from),
     }
 }
 
@@ -254,34 +266,31 @@ pub unsafe extern "C" fn frz_context_create(
     pool: *mut frz_pool,
     out: *mut *mut frz_context,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(out);
-            required(out, "out")?;
-            if abi >> 16 != FRZ_ABI_VERSION >> 16 || abi & 0xffff > FRZ_ABI_VERSION & 0xffff {
-                let [major, minor] = [abi >> 16, abi & 0xffff];
-                let [own, own_minor] = [FRZ_ABI_VERSION >> 16, FRZ_ABI_VERSION & 0xffff];
-                let text =
-                    format!("the header has interface {major}.{minor}, this library {own}.{own_minor}");
-                return Err(Failure::new(FRZ_ERROR_VERSION, text));
-            }
-            let threads = read(pool.cast_const())?.share();
-            let ctx = Context::new(threads.0.clone());
-            ctx.set_memory_limit(usual_limit());
-            give(
-                out,
-                State {
-                    ctx,
-                    _threads: threads,
-                    progress_room: if abi & 0xffff == 0 { FIRST_PROGRESS } else { size_of::<frz_progress>() },
-                    entered: AtomicBool::new(false),
-                    poisoned: AtomicBool::new(false),
-                    began: Began::default(),
-                    timings: Mutex::default(),
-                },
-            )
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        clear(out);
+        required(out, "out")?;
+        if abi >> 16 != FRZ_ABI_VERSION >> 16 || abi & 0xffff > FRZ_ABI_VERSION & 0xffff {
+            let [major, minor] = [abi >> 16, abi & 0xffff];
+            let [own, own_minor] = [FRZ_ABI_VERSION >> 16, FRZ_ABI_VERSION & 0xffff];
+            let text = format!("the header has interface {major}.{minor}, this library {own}.{own_minor}");
+            return Err(Failure::new(FRZ_ERROR_VERSION, text));
         }
+        let threads = read(pool.cast_const())?.share();
+        let ctx = Context::new(threads.0.clone());
+        ctx.set_memory_limit(usual_limit());
+        give(
+            out,
+            State {
+                ctx,
+                _threads: threads,
+                progress_room: if abi & 0xffff == 0 { FIRST_PROGRESS } else { size_of::<frz_progress>() },
+                entered: AtomicBool::new(false),
+                poisoned: AtomicBool::new(false),
+                began: Began::default(),
+                timings: Mutex::default(),
+            },
+        )
     })
 }
 
@@ -416,15 +425,13 @@ pub unsafe extern "C" fn frz_context_progress(
     context: *const frz_context,
     out: *mut frz_progress,
 ) -> frz_status {
-    guard(|| {
+    // SAFETY: the pointers are NULL or valid, and `out` has as much room as the header of the context's creator states.
+    guard(|| unsafe {
         let out = required(out, "out")?.cast::<u8>();
-        // SAFETY: the pointers are NULL or valid, and `out` has as much room as the header of the context's creator states.
-        unsafe {
-            out.write_bytes(0, FIRST_PROGRESS);
-            let state = read(context)?;
-            let told = progress_of(&state.ctx.progress(), &state.began);
-            std::ptr::copy_nonoverlapping((&raw const told).cast::<u8>(), out, state.progress_room);
-        }
+        out.write_bytes(0, FIRST_PROGRESS);
+        let state = read(context)?;
+        let told = progress_of(&state.ctx.progress(), &state.began);
+        std::ptr::copy_nonoverlapping((&raw const told).cast::<u8>(), out, state.progress_room);
         Ok(())
     })
 }
@@ -442,18 +449,14 @@ pub unsafe extern "C" fn frz_context_timings(
     dst: frz_span,
     count: *mut usize,
 ) -> frz_status {
-    guard(|| {
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
         let count = required(count, "count")?;
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            count.write(0);
-            let call = enter(context)?;
-            let timings = call.0.timings.lock().unwrap_or_else(PoisonError::into_inner);
-            let time = |time: &PhaseTime| frz_stage_time {
-                stage: letters(time.name),
-                seconds: time.time.as_secs_f64(),
-            };
-            dst.list(count, timings.len(), || Ok(timings.iter().map(time).collect()))
-        }
+        count.write(0);
+        let call = enter(context)?;
+        let timings = call.0.timings.lock().unwrap_or_else(PoisonError::into_inner);
+        let time =
+            |time: &PhaseTime| frz_stage_time { stage: letters(time.name), seconds: time.time.as_secs_f64() };
+        dst.list(count, timings.len(), || Ok(timings.iter().map(time).collect()))
     })
 }

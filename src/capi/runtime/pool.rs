@@ -3,8 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{HandleType, clear, destroy, give};
+use crate::capi::ffi::*;
 use crate::context::Pool;
 
 /// Worker threads that any number of contexts may share.
@@ -59,13 +58,11 @@ impl HandleType for frz_pool {
 /// Any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_pool_create(threads: u32, out: *mut *mut frz_pool) -> frz_status {
-    guard(|| {
-        // SAFETY: `out` is NULL or valid.
-        unsafe {
-            clear(out);
-            crate::capi::ffi::handle::required(out, "out")?;
-            give(out, Threads::start(threads)?)
-        }
+    // SAFETY: `out` is NULL or valid.
+    guard(|| unsafe {
+        clear(out);
+        required(out, "out")?;
+        give(out, Threads::start(threads)?)
     })
 }
 

@@ -2,15 +2,13 @@
 
 use super::calls::informs;
 use super::lists::list;
-use super::snapshot::{Taken, frz_shallow_snapshot};
-use super::spill::{ShallowHandle, frz_shallow};
+use super::snapshot::frz_shallow_snapshot;
+use super::spill::frz_shallow;
 use super::surface::{
-    Buffer, Wanted, check_buffers, check_room, frz_shallow_layout, frz_shallow_size, indices_in,
+    Buffer, Wanted, check_buffers, check_room, frz_shallow_layout, frz_shallow_size, indices_in, writes,
 };
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{change, read, required};
-use crate::capi::ffi::views::{Plain, Sized32, frz_span};
-use crate::capi::runtime::context::{enter_light, frz_context};
+use crate::capi::ffi::*;
+use crate::capi::runtime::context::frz_context;
 use crate::shallow::free_fall::Droplet;
 use crate::shallow::free_fall::mesh::{Balls, Target, bound};
 
@@ -196,14 +194,13 @@ pub unsafe extern "C" fn frz_shallow_drops_mesh(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so are the spans.
-    guard(|| unsafe {
-        let wanted = Wanted::new(layout, target, size)?;
-        let _call = enter_light(context)?;
-        let ShallowHandle { shallow, balls, drops, .. } = &mut *change(shallow)?;
-        drops.clear();
-        drops.extend(shallow.drops());
-        wanted.write_drops(balls, drops)
-    })
+    unsafe {
+        writes(context, shallow, (layout, target, size), |spill, wanted| {
+            spill.drops.clear();
+            spill.drops.extend(spill.shallow.drops());
+            wanted.write_drops(&mut spill.balls, &spill.drops)
+        })
+    }
 }
 
 /// Writes the liquid that was in the air when a snapshot was taken, as frz_shallow_drops_mesh does, in real time (frz_shallow).
@@ -223,10 +220,9 @@ pub unsafe extern "C" fn frz_shallow_snapshot_drops_mesh(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so are the spans.
-    guard(|| unsafe {
-        let wanted = Wanted::new(layout, target, size)?;
-        let _call = enter_light(context)?;
-        let Taken { snapshot, balls, .. } = &mut *change(snapshot)?;
-        wanted.write_drops(balls, snapshot.drops())
-    })
+    unsafe {
+        writes(context, snapshot, (layout, target, size), |taken, wanted| {
+            wanted.write_drops(&mut taken.balls, taken.snapshot.drops())
+        })
+    }
 }

@@ -3,8 +3,7 @@
 use std::ops::Range;
 
 use super::lists::one_for_each;
-use crate::capi::ffi::guard::{Failure, Outcome, refuse};
-use crate::capi::ffi::views::frz_view;
+use crate::capi::ffi::*;
 use crate::context::Context;
 use crate::error::Result;
 use crate::geometry::{TriMesh, Vec3};

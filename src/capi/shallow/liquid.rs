@@ -6,10 +6,7 @@ use super::lists::list;
 use super::params::{frz_shallow_domain, frz_shallow_params};
 use super::spill::{ShallowHandle, frz_shallow};
 use super::surroundings::Setup;
-use crate::capi::ffi::fields::fields_of;
-use crate::capi::ffi::guard::{frz_status, guard};
-use crate::capi::ffi::handle::{change, destroy, read, required};
-use crate::capi::ffi::views::{Sized32, frz_span, frz_view, given, within};
+use crate::capi::ffi::*;
 #[cfg(feature = "vdb")]
 use crate::capi::grid::sparse::frz_grid;
 use crate::capi::mesh::triangles::frz_mesh;

@@ -1,8 +1,6 @@
 //! Arrays from a host: of structs, and of as many numbers as there are things.
 
-use crate::capi::ffi::guard::{Failure, Outcome, refuse};
-use crate::capi::ffi::handle::required;
-use crate::capi::ffi::views::{Plain, Sized32, check_size, frz_span, frz_view, sized};
+use crate::capi::ffi::*;
 
 /// Replaces a list by the structs of a host's array, converted, all of one version; `nouns` name one and all of them in an error. Fields
 /// that the host's header does not have are 0. Nothing but the list is allocated, except on failure.

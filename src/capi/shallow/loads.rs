@@ -2,10 +2,7 @@
 
 use super::lists::{one_for_each, stride_of};
 use super::spill::{ShallowHandle, frz_shallow};
-use crate::capi::ffi::fields::fields_of;
-use crate::capi::ffi::guard::{Outcome, frz_status, guard, refuse};
-use crate::capi::ffi::handle::change;
-use crate::capi::ffi::views::{Sized32, fill, frz_view};
+use crate::capi::ffi::*;
 use crate::shallow::Load;
 
 /// The load of a liquid on a body.

@@ -1,7 +1,6 @@
 //! The liquid, its parameters and its domain, in C.
 
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::views::{Sized32, fill, given, meaning, within};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::context::Context;
 use crate::shallow::columns::grid::{Grid, Heights};

@@ -4,12 +4,10 @@ use super::read::probe;
 use super::spill::{ShallowHandle, frz_shallow};
 use super::surface::prepared::{Ledged, wanted_lifts};
 use super::surface::{
-    FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target,
+    FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, frz_shallow_layout, frz_shallow_size, frz_shallow_target, writes,
 };
-use crate::capi::ffi::guard::{frz_status, guard};
-use crate::capi::ffi::handle::{HandleType, change, destroy, read};
-use crate::capi::ffi::views::{frz_span, frz_view};
-use crate::capi::runtime::context::{creates, enter_light, frz_context};
+use crate::capi::ffi::*;
+use crate::capi::runtime::context::{creates, frz_context};
 use crate::shallow::Snapshot;
 use crate::shallow::free_fall::mesh::Balls;
 use crate::shallow::surface::{Depths, Surface};
@@ -138,25 +136,24 @@ pub unsafe extern "C" fn frz_shallow_snapshot_surface(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so are the spans.
-    guard(|| unsafe {
-        let wanted = Wanted::new(layout, target, size)?;
-        let _call = enter_light(context)?;
-        let Taken { snapshot, surface, least, sunk, ledged, .. } = &mut *change(snapshot)?;
-        let when = "when the snapshot was taken";
-        let known = (!least.is_empty()).then_some((&least[..], &sunk[..]));
-        let (least, sunk) = wanted_lifts(wanted.has(FRZ_SHALLOW_LIFTED), known, when)?;
-        let ledges = ledged.wanted(wanted.has(FRZ_SHALLOW_SKIRTED), when)?;
-        let depths = Depths {
-            depth: snapshot.depths(),
-            velocity: snapshot.velocities(),
-            active: Some(snapshot.active()),
-            least,
-            sunk,
-            carried: std::array::from_fn(|scalar| snapshot.concentrations(scalar)),
-            ledges,
-        };
-        wanted.write(surface, snapshot.columns(), &depths)
-    })
+    unsafe {
+        writes(context, snapshot, (layout, target, size), |taken, wanted| {
+            let Taken { snapshot, surface, least, sunk, ledged, .. } = taken;
+            let when = "when the snapshot was taken";
+            let known = (!least.is_empty()).then_some((&least[..], &sunk[..]));
+            let (least, sunk) = wanted_lifts(wanted.has(FRZ_SHALLOW_LIFTED), known, when)?;
+            let depths = Depths {
+                depth: snapshot.depths(),
+                velocity: snapshot.velocities(),
+                active: Some(snapshot.active()),
+                least,
+                sunk,
+                carried: std::array::from_fn(|scalar| snapshot.concentrations(scalar)),
+                ledges: ledged.wanted(wanted.has(FRZ_SHALLOW_SKIRTED), when)?,
+            };
+            wanted.write(surface, snapshot.columns(), &depths)
+        })
+    }
 }
 
 /// Reads the liquid at points as it was when the snapshot was taken, as frz_shallow_probe does, in real time (frz_shallow).

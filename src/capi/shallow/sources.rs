@@ -4,10 +4,7 @@ use super::calls::{answers, informs};
 use super::flow_points::frz_shallow_flow;
 use super::lists::{check_index, numbers, one_for_each};
 use super::spill::{ShallowHandle, frz_shallow};
-use crate::capi::ffi::fields::fields_of;
-use crate::capi::ffi::guard::{Failure, frz_status, guard};
-use crate::capi::ffi::handle::{answer, change, read};
-use crate::capi::ffi::views::{Sized32, finite, frz_view};
+use crate::capi::ffi::*;
 use crate::shallow::Balance;
 
 /// Sets sources, drains and absorbers, replacing those before; what those have moved remains in frz_shallow_balance. An absorber that is

@@ -2,8 +2,7 @@
 
 use super::surface::prepared::{Ledged, Lifted, Shown};
 use super::surroundings::{Setup, Surroundings};
-use crate::capi::ffi::guard::Outcome;
-use crate::capi::ffi::handle::HandleType;
+use crate::capi::ffi::*;
 use crate::context::Context;
 use crate::shallow::free_fall::Droplet;
 use crate::shallow::free_fall::mesh::Balls;

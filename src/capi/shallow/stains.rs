@@ -6,9 +6,8 @@ use super::calls::answers;
 use super::lists::one_for_each;
 use super::params::FRZ_SHALLOW_NO_SCALAR;
 use super::spill::frz_shallow;
-use crate::capi::ffi::guard::{Outcome, frz_status, guard, refuse};
-use crate::capi::ffi::handle::{HandleType, answer, change, destroy, read, required};
-use crate::capi::ffi::views::{Sized32, fill, frz_span, frz_view, given_or_defaults, write_bytes};
+use crate::capi::ffi::saved::{restores, write_bytes};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{creates, enter_light, frz_context};
 use crate::geometry::Vec3;
@@ -250,16 +249,8 @@ pub unsafe extern "C" fn frz_shallow_stains_restore(
     state: *const c_void,
     bytes: usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so are the bytes.
-        unsafe {
-            let _call = enter_light(context)?;
-            let mut stained = change(stains)?;
-            required(state.cast_mut(), "state")?;
-            let state = frz_view { data: state, count: bytes, stride: 0 }.bytes("state")?;
-            Ok(stained.stains.restore(state)?)
-        }
-    })
+    // SAFETY: the pointers are NULL or valid, and so are the bytes.
+    unsafe { restores(context, stains, (state, bytes), |stained, state| stained.stains.restore(state)) }
 }
 
 /// Destroys stains; NULL is ignored.

@@ -3,11 +3,9 @@
 use std::ffi::c_void;
 
 use super::spill::frz_shallow;
-use crate::capi::ffi::guard::frz_status::FRZ_ERROR_CAPACITY;
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{change, clear, read, required};
-use crate::capi::ffi::views::{frz_span, frz_view};
-use crate::capi::runtime::context::{enter_light, frz_context};
+use crate::capi::ffi::guard::frz_status;
+use crate::capi::ffi::saved::{restores, saves_in_place};
+use crate::capi::runtime::context::frz_context;
 
 /// Saves all that the next frame depends on besides the ground, the parameters, the flow points and the bodies, in real time (frz_shallow):
 /// for a replay, an undo, a host's own cache. The bytes are the same on any number of threads.
@@ -25,16 +23,16 @@ pub unsafe extern "C" fn frz_shallow_save(
     capacity: usize,
     size: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so is the memory at dst.
-        unsafe {
-            clear(size);
-            let size = required(size, "size")?;
-            let _call = enter_light(context)?;
-            let spill = read(shallow)?;
-            put_state(dst, capacity, size, spill.shallow.save_size(), |room| spill.shallow.save_to(room))
-        }
-    })
+    // SAFETY: the pointers are NULL or valid, and so is the memory at dst.
+    unsafe {
+        saves_in_place(
+            context,
+            shallow,
+            (dst, capacity, size),
+            |spill| spill.shallow.save_size(),
+            |spill, room| spill.shallow.save_to(room),
+        )
+    }
 }
 
 /// Replaces the liquid's state by a saved one, in real time (frz_shallow): from there it flows as the saved one did, to the same bytes,
@@ -52,49 +50,6 @@ pub unsafe extern "C" fn frz_shallow_restore(
     state: *const c_void,
     bytes: usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so are the bytes.
-        unsafe {
-            let _call = enter_light(context)?;
-            let mut spill = change(shallow)?;
-            let state = taken_state(state, bytes)?;
-            Ok(spill.shallow.restore(state)?)
-        }
-    })
-}
-
-/// Writes a state of a given size to a host's memory, unless that is NULL.
-///
-/// # Safety
-/// There must be room for `capacity` bytes at `dst`, unless it is NULL.
-pub(in crate::capi) unsafe fn put_state(
-    dst: *mut c_void,
-    capacity: usize,
-    size: *mut usize,
-    needed: usize,
-    save_to: impl FnOnce(&mut [u8]) -> crate::Result<usize>,
-) -> Outcome {
-    let room = frz_span { data: dst, count: capacity, stride: 0 };
-    // SAFETY: guaranteed by the caller.
-    let room = unsafe {
-        size.write_unaligned(needed);
-        room.numbers::<u8>("dst", 1)?
-    };
-    let Some(room) = room else { return Ok(()) };
-    if room.len() < needed {
-        let text = format!("there is room for {capacity} bytes, {needed} are needed");
-        return Err(Failure::new(FRZ_ERROR_CAPACITY, text));
-    }
-    save_to(room)?;
-    Ok(())
-}
-
-/// The bytes of a host's state.
-///
-/// # Safety
-/// The pointer must be NULL or point to that many bytes, for `'a`.
-pub(in crate::capi) unsafe fn taken_state<'a>(state: *const c_void, bytes: usize) -> Outcome<&'a [u8]> {
-    required(state.cast_mut(), "state")?;
-    // SAFETY: guaranteed by the caller.
-    unsafe { frz_view { data: state, count: bytes, stride: 0 }.bytes("state") }
+    // SAFETY: the pointers are NULL or valid, and so are the bytes.
+    unsafe { restores(context, shallow, (state, bytes), |spill, state| spill.shallow.restore(state)) }
 }

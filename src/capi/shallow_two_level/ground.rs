@@ -3,16 +3,14 @@
 use std::ffi::c_void;
 
 use super::liquid::{DetailHandle, frz_shallow_detail};
-use crate::capi::ffi::guard::{frz_status, guard, refuse};
-use crate::capi::ffi::handle::{change, clear, read, required};
-use crate::capi::ffi::views::frz_view;
-use crate::capi::runtime::context::{enter_light, frz_context};
+use crate::capi::ffi::saved::{restores, saves_in_place};
+use crate::capi::ffi::*;
+use crate::capi::runtime::context::frz_context;
 use crate::capi::shallow::calls::{changes, informs};
 use crate::capi::shallow::ground::{all_cells, read_heights};
 use crate::capi::shallow::lists::read_list;
-use crate::capi::shallow::state::{put_state, taken_state};
 use crate::capi::shallow::surface::{
-    FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target,
+    FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, frz_shallow_layout, frz_shallow_size, frz_shallow_target, writes,
 };
 use crate::capi::shallow::terrain::{frz_shallow_body, frz_shallow_moved};
 use crate::shallow::terrain::Solids;
@@ -135,26 +133,26 @@ pub unsafe extern "C" fn frz_shallow_detail_surface(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so are the spans.
-    guard(|| unsafe {
-        let wanted = Wanted::new(layout, target, size)?;
-        let _call = enter_light(context)?;
-        let DetailHandle { detail, surface, shown: [fine, coarse], is_reserved, .. } = &mut *change(detail)?;
-        for (flag, name) in
-            [(FRZ_SHALLOW_LIFTED, "FRZ_SHALLOW_LIFTED"), (FRZ_SHALLOW_SKIRTED, "FRZ_SHALLOW_SKIRTED")]
-        {
-            refuse(wanted.has(flag), || format!("{name} is not for liquid in cells of two sizes"))?;
-        }
-        if !*is_reserved {
-            surface.reserve(detail);
-            *is_reserved = true;
-        }
-        let needs = wanted.needs();
-        let depths = [fine.depths(detail.fine(), &needs)?, coarse.depths(detail.coarse(), &needs)?];
-        wanted.write_with(|target| match target {
-            Some(target) => surface.build(detail, depths.each_ref(), &wanted.layout, target),
-            None => surface.count(detail, depths.each_ref()),
+    unsafe {
+        writes(context, detail, (layout, target, size), |spread, wanted| {
+            let DetailHandle { detail, surface, shown: [fine, coarse], is_reserved, .. } = spread;
+            for (flag, name) in
+                [(FRZ_SHALLOW_LIFTED, "FRZ_SHALLOW_LIFTED"), (FRZ_SHALLOW_SKIRTED, "FRZ_SHALLOW_SKIRTED")]
+            {
+                refuse(wanted.has(flag), || format!("{name} is not for liquid in cells of two sizes"))?;
+            }
+            if !*is_reserved {
+                surface.reserve(detail);
+                *is_reserved = true;
+            }
+            let needs = wanted.needs();
+            let depths = [fine.depths(detail.fine(), &needs)?, coarse.depths(detail.coarse(), &needs)?];
+            wanted.write_with(|target| match target {
+                Some(target) => surface.build(detail, depths.each_ref(), &wanted.layout, target),
+                None => surface.count(detail, depths.each_ref()),
+            })
         })
-    })
+    }
 }
 
 /// Saves all that the next frame depends on, as frz_shallow_save does, in real time (frz_shallow_detail). The box of small cells is part of
@@ -173,16 +171,16 @@ pub unsafe extern "C" fn frz_shallow_detail_save(
     capacity: usize,
     size: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so is the memory at dst.
-        unsafe {
-            clear(size);
-            let size = required(size, "size")?;
-            let _call = enter_light(context)?;
-            let spread = read(detail)?;
-            put_state(dst, capacity, size, spread.detail.save_size(), |room| spread.detail.save_to(room))
-        }
-    })
+    // SAFETY: the pointers are NULL or valid, and so is the memory at dst.
+    unsafe {
+        saves_in_place(
+            context,
+            detail,
+            (dst, capacity, size),
+            |spread| spread.detail.save_size(),
+            |spread, room| spread.detail.save_to(room),
+        )
+    }
 }
 
 /// Replaces the liquid's state by a saved one, as frz_shallow_restore does, and moves the box of small cells to where it was.
@@ -199,16 +197,13 @@ pub unsafe extern "C" fn frz_shallow_detail_restore(
     state: *const c_void,
     bytes: usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so are the bytes.
-        unsafe {
-            let _call = enter_light(context)?;
-            let mut spread = change(detail)?;
-            let state = taken_state(state, bytes)?;
+    // SAFETY: the pointers are NULL or valid, and so are the bytes.
+    unsafe {
+        restores(context, detail, (state, bytes), |spread, state| {
             let near = spread.detail.near().clone();
             spread.detail.restore(state)?;
             spread.is_reserved &= near == *spread.detail.near();
             Ok(())
-        }
-    })
+        })
+    }
 }

@@ -1,8 +1,6 @@
 //! Shallow liquid in cells of two sizes: small ones near what matters.
 
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{HandleType, answer, change, destroy, read};
-use crate::capi::ffi::views::{finite, frz_view, given};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::frz_mesh;
 use crate::capi::runtime::context::{creates, frz_context};
 use crate::capi::shallow::calls::{answers, changes, informs};

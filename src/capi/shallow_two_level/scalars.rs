@@ -1,9 +1,7 @@
 //! Scalars of shallow liquid in cells of two sizes.
 
 use super::liquid::frz_shallow_detail;
-use crate::capi::ffi::guard::{frz_status, guard};
-use crate::capi::ffi::handle::{change, read};
-use crate::capi::ffi::views::frz_view;
+use crate::capi::ffi::*;
 use crate::capi::shallow::calls::informs;
 use crate::capi::shallow::lists::check_index;
 use crate::capi::shallow::scalars::{

@@ -3,16 +3,16 @@
 use std::ffi::c_void;
 use std::ptr::NonNull;
 
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{HandleType, change, clear, destroy_whole, free, give, read, required};
-use crate::capi::ffi::views::{Sized32, fill, finite, frz_view, sized, write_bytes};
+use crate::capi::ffi::fields::fields_of;
+use crate::capi::ffi::saved::write_bytes;
+use crate::capi::ffi::*;
 use crate::capi::grid::sparse::{Grid, frz_grid};
 use crate::capi::level_set::body::{Role, Shapes, bodies, frz_body};
 use crate::capi::level_set::tools::frz_noise;
 use crate::capi::mesh::triangles::no_flags;
-use crate::capi::runtime::context::{creates, enter, frz_context};
+use crate::capi::runtime::context::{creates, enter, frz_context, steps};
 use crate::numeric::blocks::Origin;
-use crate::snow::base_layer::{BaseLayer, Params};
+use crate::snow::base_layer::{BaseLayer, Params, StepReport};
 use crate::sweep::{Body, TOLERANCE};
 use crate::vdb::FloatGrid;
 
@@ -39,21 +39,18 @@ pub struct frz_base_params {
 unsafe impl Sized32 for frz_base_params {
     const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_base_params, noise), size_of::<Self>()];
     const NAME: &'static str = "frz_base_params";
+
+    fn defaults() -> Self {
+        Self { tolerance: TOLERANCE, noise: frz_noise::USUAL, ..Self::zeroed() }
+    }
 }
 
 impl frz_base_params {
-    const USUAL: Self = Self { struct_size: 0, flags: 0, tolerance: TOLERANCE, noise: frz_noise::USUAL };
-
-    /// Refuses unknown flags, and values that are not finite.
-    fn check(&self) -> Outcome {
+    /// The library's own parameters for voxels of a size (m).
+    fn params(&self, cell: f64) -> Outcome<Params> {
         no_flags(self.flags, 0)?;
         finite("tolerance", self.tolerance)?;
-        self.noise.check()
-    }
-
-    /// The library's own parameters for voxels of a size (m).
-    fn params(&self, cell: f64) -> Params {
-        Params { noise: self.noise.params(cell), tolerance: self.tolerance }
+        Ok(Params { noise: self.noise.params(cell)?, tolerance: self.tolerance })
     }
 }
 
@@ -81,6 +78,8 @@ unsafe impl Sized32 for frz_base_report {
         &[std::mem::offset_of!(frz_base_report, touched_blocks), size_of::<Self>()];
     const NAME: &'static str = "frz_base_report";
 }
+
+fields_of!(StepReport => frz_base_report { removed_volume, base_volume, touched_blocks, sweep_faces });
 
 /// Grids that a base layer lends: snow, removed, compression, touched.
 const LENT: usize = 4;
@@ -153,7 +152,7 @@ impl Drop for Layer {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_base_params_init(params: *mut frz_base_params, size: usize) -> frz_status {
     // SAFETY: the parameters are NULL or have `size` bytes.
-    guard(|| unsafe { fill(params, Some(size), frz_base_params::USUAL) })
+    guard(|| unsafe { fill(params, Some(size), frz_base_params::defaults()) })
 }
 
 /// Creates a base layer: untouched, or in a state that frz_base_save wrote.
@@ -180,15 +179,8 @@ pub unsafe extern "C" fn frz_base_create(
         creates(context, out, |ctx| {
             let held = read(snow)?;
             let snow = held.floats()?;
-            let params = if params.is_null() {
-                frz_base_params::USUAL
-            } else {
-                sized(params, frz_base_params::USUAL)?
-            };
-            params.check()?;
-            let params = params.params(snow.voxel_size());
-            let state =
-                frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
+            let params = given_or_defaults(params)?.params(snow.voxel_size())?;
+            let state = frz_view::packed(restart, restart_bytes).elements::<u8>("restart")?;
             ctx.allow("the base layer", snow.memory_bytes().saturating_add(state.len() as u64))?;
             let untouched = restart.is_null();
             let layer = ctx.polled(|| match untouched {
@@ -222,15 +214,11 @@ pub unsafe extern "C" fn frz_base_set_params(
     base: *mut frz_base,
     params: *const frz_base_params,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut base = change(base)?;
-            let params = sized(params, frz_base_params::USUAL)?;
-            params.check()?;
-            let params = params.params(base.layer.surface().voxel_size());
-            Ok(base.layer.set_params(params)?)
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let mut base = change(base)?;
+        let params = given(params)?.params(base.layer.surface().voxel_size())?;
+        Ok(base.layer.set_params(params)?)
     })
 }
 
@@ -256,44 +244,21 @@ pub unsafe extern "C" fn frz_base_step(
     frame: i32,
     report: *mut frz_base_report,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut told = frz_base_report {
-                struct_size: 0,
-                reserved: 0,
-                removed_volume: 0.0,
-                base_volume: 0.0,
-                touched_blocks: 0,
-                sweep_faces: 0,
-            };
-            if !report.is_null() {
-                fill(report, None, told)?;
-            }
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let mut base = change(base)?;
-            if frame.unsigned_abs() > 1 << 24 {
-                return Err(Failure::argument(format!(
-                    "frame = {frame} is not within -16777216 to 16777216"
-                )));
-            }
-            let done = base.alone(|state| {
-                let mut shapes = std::mem::take(&mut state.shapes);
-                let bodies = self::bodies(ctx, bodies, count, dt, Role::Sweep, &mut shapes);
-                state.shapes = shapes;
-                let bodies: Vec<Body> = bodies?.into_iter().map(|(body, _)| body).collect();
+    // SAFETY: the pointers are NULL or valid.
+    unsafe {
+        steps(context, base, report, |ctx, base| {
+            refuse(frame.unsigned_abs() > 1 << 24, || {
+                format!("frame = {frame} is not within -16777216 to 16777216")
+            })?;
+            base.alone(|state| {
+                let bodies = self::bodies(ctx, bodies, count, dt, Role::Sweep, &mut state.shapes)?;
+                let bodies: Vec<Body> = bodies.into_iter().map(|(body, _)| body).collect();
                 let done = state.layer.step(ctx, &bodies, 0.0, dt, frame)?;
                 state.dirty = state.layer.dirty().collect();
-                Ok(done)
-            })?;
-            told.removed_volume = done.removed_volume;
-            told.base_volume = done.base_volume;
-            told.touched_blocks = done.touched_blocks as u64;
-            told.sweep_faces = done.sweep_faces as u64;
-            if report.is_null() { Ok(()) } else { fill(report, None, told) }
-        }
-    })
+                Ok(frz_base_report::from(done))
+            })
+        })
+    }
 }
 
 /// Saves what the next step depends on besides the snow that the layer was made from, for a host's own cache.
@@ -314,21 +279,18 @@ pub unsafe extern "C" fn frz_base_save(
     capacity: usize,
     size: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(size);
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let base = read(base)?;
-            let bound = || base.layer.save_bound();
-            write_bytes(dst, capacity, size, bound, || Ok(base.layer.save(ctx)?))
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        clear(size);
+        let call = enter(context)?;
+        let base = read(base)?;
+        let bound = || base.layer.save_bound();
+        write_bytes(dst, capacity, size, bound, || Ok(base.layer.save(call.ctx())?))
     })
 }
 
 fn lent(base: *const frz_base, index: usize) -> *const frz_grid {
-    crate::capi::ffi::guard::guard_value(std::ptr::null(), || {
+    guard_value(std::ptr::null(), || {
         // SAFETY: the layer is NULL or alive.
         Ok(unsafe { read(base) }?.lent[index].cast_const())
     })
@@ -382,18 +344,16 @@ pub unsafe extern "C" fn frz_base_touched(base: *const frz_base) -> *const frz_g
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_base_bounds(base: *const frz_base, min: *mut f64, max: *mut f64) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let [min, max] = [min.cast::<[f64; 3]>(), max.cast::<[f64; 3]>()];
-            clear(min);
-            clear(max);
-            let [min, max] = [required(min, "min")?, required(max, "max")?];
-            let (low, high) = read(base)?.layer.bounds();
-            min.write_unaligned(low.into());
-            max.write_unaligned(high.into());
-            Ok(())
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let [min, max] = [min.cast::<[f64; 3]>(), max.cast::<[f64; 3]>()];
+        clear(min);
+        clear(max);
+        let [min, max] = [required(min, "min")?, required(max, "max")?];
+        let (low, high) = read(base)?.layer.bounds();
+        min.write_unaligned(low.into());
+        max.write_unaligned(high.into());
+        Ok(())
     })
 }
 
@@ -411,19 +371,17 @@ pub unsafe extern "C" fn frz_base_dirty(
     origins: *mut *const i32,
     count: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(origins);
-            clear(count);
-            let count = required(count, "count")?;
-            let origins = required(origins, "origins")?;
-            let base = read(base)?;
-            if !base.dirty.is_empty() {
-                origins.write(base.dirty.as_flattened().as_ptr());
-                count.write(base.dirty.len());
-            }
-            Ok(())
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        clear(origins);
+        clear(count);
+        let count = required(count, "count")?;
+        let origins = required(origins, "origins")?;
+        let base = read(base)?;
+        if !base.dirty.is_empty() {
+            origins.write(base.dirty.as_flattened().as_ptr());
+            count.write(base.dirty.len());
         }
+        Ok(())
     })
 }

@@ -4,16 +4,15 @@ use std::ffi::c_void;
 
 use super::base_layer::frz_base;
 use super::grains_params::{FRZ_GRAINS_FLOOR, frz_grains_params};
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{HandleType, change, destroy, read};
+use crate::capi::ffi::fields::fields_of;
 use crate::capi::ffi::saved::{Saved, resumed};
-use crate::capi::ffi::views::{Sized32, fill, frz_view, sized, within};
+use crate::capi::ffi::*;
 use crate::capi::grid::sparse::frz_grid;
 use crate::capi::level_set::body::{Role, Shapes, bodies, frz_body};
-use crate::capi::runtime::context::{creates, enter, frz_context};
+use crate::capi::runtime::context::{creates, frz_context, steps};
 use crate::context::Context;
 use crate::numeric::digits;
-use crate::snow::grains::{Base, Grains, Surroundings, memory};
+use crate::snow::grains::{Base, Grains, StepReport, Surroundings, memory};
 use crate::vdb::{FloatGrid, GridClass};
 
 /// Grains of snow, all of one size.
@@ -58,25 +57,12 @@ pub struct frz_grains_report {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_grains_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_grains_report";
 }
 
-impl frz_grains_report {
-    const NOTHING: Self = Self {
-        struct_size: 0,
-        sub_steps: 0,
-        count: 0,
-        resting: 0,
-        born: 0,
-        dropped: 0,
-        expired: 0,
-        trapped: 0,
-        removed_volume: 0.0,
-        owed: 0.0,
-        fastest: 0.0,
-    };
-}
+fields_of!(StepReport => frz_grains_report {
+    sub_steps, count, resting, born, dropped, expired, trapped, removed_volume, owed, fastest
+});
 
 /// What lies below the grains.
 #[derive(Clone, Copy)]
@@ -113,41 +99,26 @@ impl Heap {
         frame: i32,
     ) -> Outcome<frz_grains_report> {
         within("dt", dt, 0.0..=LONGEST, " s")?;
-        if dt > 0.0 && dt < SHORTEST {
-            return Err(Failure::argument(format!("dt = {dt} is not 0, and less than {SHORTEST} s")));
-        }
+        refuse(dt > 0.0 && dt < SHORTEST, || format!("dt = {dt} is not 0, and less than {SHORTEST} s"))?;
         if let Some(snow) = base.after() {
             check_size(self.grains.params().radius, snow.voxel_size())?;
         }
         ctx.allow("the grains", memory(self.grains.count()))?;
-        let mut shapes = std::mem::take(&mut self.shapes);
         // SAFETY: guaranteed by the caller.
-        let bodies = unsafe { bodies(ctx, list, count, dt, Role::Push, &mut shapes) };
-        self.shapes = shapes;
-        let bodies = bodies?;
+        let bodies = unsafe { bodies(ctx, list, count, dt, Role::Push, &mut self.shapes) }?;
         if dt == 0.0 {
             let (count, resting) = (self.grains.count() as u64, self.grains.resting() as u64);
-            return Ok(frz_grains_report { count, resting, ..frz_grains_report::NOTHING });
+            return Ok(frz_grains_report { count, resting, ..frz_grains_report::zeroed() });
         }
         let objects: Vec<_> = bodies.iter().map(|(body, surface)| surface.of(body)).collect();
         let Ground { floor, lowest } = self.ground;
         let around = Surroundings { base, objects: &objects, statics: &[], ground: &[], floor, lowest };
         let done = self.grains.step(ctx, &around, [0.0, dt], frame)?;
         self.saved.take();
-        Ok(frz_grains_report {
-            struct_size: 0,
-            sub_steps: done.sub_steps as u32,
-            count: done.count as u64,
-            resting: done.resting as u64,
-            born: done.born as u64,
-            dropped: done.dropped as u64,
-            expired: done.expired as u64,
-            trapped: done.trapped as u64,
-            // An empty sum is -0.
-            removed_volume: done.removed_volume + 0.0,
-            owed: done.owed + 0.0,
-            fastest: f64::from(done.fastest),
-        })
+        let report = frz_grains_report::from(done);
+        // An empty sum is -0.
+        let (removed_volume, owed) = (report.removed_volume + 0.0, report.owed + 0.0);
+        Ok(frz_grains_report { removed_volume, owed, ..report })
     }
 }
 
@@ -174,14 +145,10 @@ fn check_size(radius: f64, voxel: f64) -> Outcome {
 
 /// Refuses a grid that cannot be the snow of a base layer.
 pub(in crate::capi) fn check_snow(name: &str, grid: &FloatGrid) -> Outcome {
-    if grid.class() != GridClass::LevelSet {
-        return Err(Failure::argument(format!("{name}: the grid is not a level set")));
-    }
-    if !grid.is_world_fixed() {
-        let text = format!("{name}: the grid is rotated or shifted against the world's axes");
-        return Err(Failure::argument(text));
-    }
-    Ok(())
+    refuse(grid.class() != GridClass::LevelSet, || format!("{name}: the grid is not a level set"))?;
+    refuse(!grid.is_world_fixed(), || {
+        format!("{name}: the grid is rotated or shifted against the world's axes")
+    })
 }
 
 /// Creates grains: none yet, or those of a state that frz_grains_save wrote.
@@ -204,17 +171,14 @@ pub unsafe extern "C" fn frz_grains_create(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
-            let defaults = frz_grains_params::defaults();
-            let params = if params.is_null() { defaults } else { sized(params, defaults)? };
+            let params = given_or_defaults(params)?;
             let own = params.params()?;
-            let state =
-                frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
+            let state = frz_view::packed(restart, restart_bytes).elements::<u8>("restart")?;
             let grains = match restart.is_null() {
                 true => Grains::new(own)?,
                 false => resumed(ctx, "grains", Grains::unpacked(&state), || Grains::resume(own, &state))?,
             };
-            let ground = params.ground();
-            Ok(Heap { grains, ground, shapes: Shapes::new(), saved: Saved::default() })
+            Ok(Heap { grains, ground: params.ground(), shapes: Shapes::new(), saved: Saved::default() })
         })
     }
 }
@@ -240,15 +204,13 @@ pub unsafe extern "C" fn frz_grains_set_params(
     grains: *mut frz_grains,
     params: *const frz_grains_params,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut grains = change(grains)?;
-            let params = sized(params, frz_grains_params::defaults())?;
-            grains.grains.set_params(params.params()?)?;
-            grains.ground = params.ground();
-            Ok(())
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let mut grains = change(grains)?;
+        let params = given(params)?;
+        grains.grains.set_params(params.params()?)?;
+        grains.ground = params.ground();
+        Ok(())
     })
 }
 
@@ -283,7 +245,7 @@ pub unsafe extern "C" fn frz_grains_step(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     unsafe {
-        stepped(context, grains, report, |ctx, grains| {
+        steps(context, grains, report, |ctx, grains| {
             if base.is_null() {
                 return grains.step(ctx, Base::Missing, (bodies, count), dt, frame);
             }
@@ -321,7 +283,7 @@ pub unsafe extern "C" fn frz_grains_step_grids(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     unsafe {
-        stepped(context, grains, report, |ctx, grains| {
+        steps(context, grains, report, |ctx, grains| {
             let after = read(after)?;
             let after = after.floats()?;
             check_snow("after", after)?;
@@ -332,35 +294,10 @@ pub unsafe extern "C" fn frz_grains_step_grids(
             let before = before.floats()?;
             check_snow("before", before)?;
             let voxels = [before, after].map(FloatGrid::voxel_size);
-            if voxels[0] != voxels[1] {
-                let text = format!("before has voxels of {} m, but after of {} m", voxels[0], voxels[1]);
-                return Err(Failure::argument(text));
-            }
+            refuse(voxels[0] != voxels[1], || {
+                format!("before has voxels of {} m, but after of {} m", voxels[0], voxels[1])
+            })?;
             grains.step(ctx, Base::Whole([before, after]), (bodies, count), dt, frame)
         })
     }
-}
-
-/// A step with its report, which is zero after a failure.
-///
-/// # Safety
-/// The pointers must be NULL or valid.
-unsafe fn stepped(
-    context: *mut frz_context,
-    grains: *mut frz_grains,
-    report: *mut frz_grains_report,
-    step: impl FnOnce(&Context, &mut Heap) -> Outcome<frz_grains_report>,
-) -> frz_status {
-    guard(|| {
-        // SAFETY: guaranteed by the caller.
-        unsafe {
-            if !report.is_null() {
-                fill(report, None, frz_grains_report::NOTHING)?;
-            }
-            let call = enter(context)?;
-            let mut grains = change(grains)?;
-            let told = step(call.ctx(), &mut grains)?;
-            if report.is_null() { Ok(()) } else { fill(report, None, told) }
-        }
-    })
 }

@@ -1,8 +1,7 @@
 //! Parameters of grains, in C.
 
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::required;
-use crate::capi::ffi::views::{Sized32, fill, finite, sized, within};
+use crate::capi::ffi::fields::fields_of;
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::geometry::DVec3;
 use crate::snow::grains::Params;
@@ -72,38 +71,22 @@ unsafe impl Sized32 for frz_grains_params {
     const SIZES: &'static [usize] =
         &[std::mem::offset_of!(frz_grains_params, active_distance), size_of::<Self>()];
     const NAME: &'static str = "frz_grains_params";
+
+    /// For voxels of 1 cm.
+    fn defaults() -> Self {
+        let params = Params::for_cell(0.01);
+        Self { lowest: -FARTHEST, max_grains: params.most as u64, ..params.into() }
+    }
 }
+
+fields_of!(Params => frz_grains_params {
+    radius, compression, friction, attraction, restitution, air, gravity, seed
+});
 
 /// Maximum height of the ground above or below 0 (m).
 pub(in crate::capi) const FARTHEST: f64 = 1.0e6;
 
 impl frz_grains_params {
-    /// The library's defaults, for voxels of 1 cm.
-    pub(in crate::capi) fn defaults() -> Self {
-        let defaults = Params::for_cell(0.01);
-        Self {
-            struct_size: 0,
-            flags: 0,
-            radius: defaults.radius,
-            compression: defaults.compression,
-            friction: defaults.friction,
-            attraction: defaults.attraction,
-            restitution: defaults.restitution,
-            air: defaults.air,
-            gravity: defaults.gravity,
-            floor: 0.0,
-            lowest: -FARTHEST,
-            keep_low: [0.0; 3],
-            keep_high: [0.0; 3],
-            lifetime: 0.0,
-            max_grains: defaults.most as u64,
-            seed: defaults.seed,
-            sub_steps: 0,
-            reserved: 0,
-            active_distance: 0.0,
-        }
-    }
-
     /// The library's own parameters; an error names a field that is out of range.
     pub(in crate::capi) fn params(&self) -> Outcome<Params> {
         let known = FRZ_GRAINS_FLOOR | FRZ_GRAINS_RESTLESS | FRZ_GRAINS_BOX | FRZ_GRAINS_AIR_BY_DENSITY;
@@ -173,18 +156,15 @@ pub unsafe extern "C" fn frz_grains_params_of_snow(
     repose_angle_deg: f64,
     stands: f64,
 ) -> frz_status {
-    guard(|| {
+    // SAFETY: the parameters are NULL or valid.
+    guard(|| unsafe {
         within("repose_angle_deg", repose_angle_deg, 0.0..=grain_friction::STEEPEST, " degrees")?;
         within("stands", stands, 0.0..=1000.0, " m")?;
         let to = required(params, "params")?;
-        // SAFETY: the parameters are valid, and their size was checked.
-        unsafe {
-            let mut now = sized(to.cast_const(), frz_grains_params::defaults())?;
-            now.params()?;
-            now.attraction = grain_cohesion::of_wall(stands, 2.0 * now.radius, repose_angle_deg).min(1000.0);
-            now.friction = grain_friction::of_repose(repose_angle_deg, now.attraction > 0.0);
-            fill(to, None, now)?;
-        }
-        Ok(())
+        let mut now = given(to.cast_const())?;
+        now.params()?;
+        now.attraction = grain_cohesion::of_wall(stands, 2.0 * now.radius, repose_angle_deg).min(1000.0);
+        now.friction = grain_friction::of_repose(repose_angle_deg, now.attraction > 0.0);
+        fill(to, None, now)
     })
 }

@@ -3,12 +3,11 @@
 use std::ffi::c_void;
 
 use super::grains::frz_grains;
-use crate::capi::ffi::guard::{frz_status, guard};
-use crate::capi::ffi::handle::{change, clear, read, required};
-use crate::capi::ffi::views::{frz_span, frz_view, meaning};
+use crate::capi::ffi::saved::saves;
+use crate::capi::ffi::*;
 use crate::capi::runtime::context::{enter, frz_context};
 use crate::geometry::DVec3;
-use crate::snow::grains::memory;
+use crate::snow::grains::{Grains, memory};
 
 /// Attributes that frz_grains_read copies; the customary attribute name is in brackets.
 #[repr(u32)]
@@ -67,26 +66,21 @@ pub unsafe extern "C" fn frz_grains_emit(
     frame: i32,
     first: *mut i64,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(first);
-            let call = enter(context)?;
-            let ctx = call.ctx();
-            let mut grains = change(grains)?;
-            let all = grains.grains.count().saturating_add(positions.count);
-            ctx.allow("the grains", memory(all))?;
-            let places = positions.finite("positions")?;
-            let velocities = velocities.finite("velocities")?;
-            let places: Vec<DVec3> = places.into_iter().map(|place| place.map(f64::from).into()).collect();
-            let all = &mut grains.grains;
-            let id = ctx.phase_in_place("emit", || all.emit(&places, &velocities, frame))?;
-            grains.saved.take();
-            if !first.is_null() {
-                first.write_unaligned(if places.is_empty() { -1 } else { i64::from(id) });
-            }
-            Ok(())
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        clear(first);
+        let call = enter(context)?;
+        let ctx = call.ctx();
+        let mut heap = change(grains)?;
+        let grains = &mut heap.grains;
+        ctx.allow("the grains", memory(grains.count().saturating_add(positions.count)))?;
+        let places = positions.finite("positions")?;
+        let velocities = velocities.finite("velocities")?;
+        let places: Vec<DVec3> = places.into_iter().map(|place| place.map(f64::from).into()).collect();
+        let id = ctx.phase_in_place("emit", || grains.emit(&places, &velocities, frame))?;
+        heap.saved.take();
+        write_some(first, if places.is_empty() { -1 } else { i64::from(id) });
+        Ok(())
     })
 }
 
@@ -97,15 +91,8 @@ pub unsafe extern "C" fn frz_grains_emit(
 /// Any number of threads may read grains.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_grains_count(grains: *const frz_grains, count: *mut usize) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(count);
-            let count = required(count, "count")?;
-            count.write_unaligned(read(grains)?.grains.count());
-            Ok(())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe { answer(count, "count", || Ok(read(grains)?.grains.count())) })
 }
 
 /// Copies an attribute of all grains. All attributes have the same order, which changes from step to step: ids identify the grains.
@@ -120,35 +107,22 @@ pub unsafe extern "C" fn frz_grains_read(
     attribute: u32,
     dst: frz_span,
 ) -> frz_status {
-    guard(|| {
+    // SAFETY: the grains are NULL or alive; the span is valid.
+    guard(|| unsafe {
         let attribute = meaning("attribute", "frz_grains_attribute", attribute, &ATTRIBUTES)?;
-        // SAFETY: the grains are NULL or alive; the span is valid.
-        unsafe {
-            let heap = read(grains)?;
-            let grains = &heap.grains;
-            match attribute {
-                FRZ_GRAINS_POSITION => {
-                    let positions: Vec<[f32; 3]> = grains
-                        .positions()
-                        .map(|position| [0, 1, 2].map(|axis| position[axis] as f32))
-                        .collect();
-                    dst.fill("dst", &positions)
-                }
-                FRZ_GRAINS_POSITION_DOUBLE => {
-                    dst.fill("dst", &grains.positions().map(<[f64; 3]>::from).collect::<Vec<_>>())
-                }
-                FRZ_GRAINS_VELOCITY => dst.fill("dst", &grains.velocities().collect::<Vec<_>>()),
-                FRZ_GRAINS_ID => {
-                    dst.fill("dst", &grains.ids().iter().copied().map(i64::from).collect::<Vec<_>>())
-                }
-                FRZ_GRAINS_RADIUS => dst.fill("dst", &vec![grains.params().radius as f32; grains.count()]),
-                FRZ_GRAINS_SOURCE_FRAME => dst.fill("dst", &grains.source_frames().collect::<Vec<_>>()),
-                FRZ_GRAINS_ACTIVE => dst.fill("dst", &grains.awake().map(i32::from).collect::<Vec<_>>()),
-                FRZ_GRAINS_TRAPPED => {
-                    dst.fill("dst", &grains.trapped_each().map(i32::from).collect::<Vec<_>>())
-                }
-                FRZ_GRAINS_REST => dst.fill("dst", &grains.rests().collect::<Vec<_>>()),
-            }
+        let heap = read(grains)?;
+        let grains = &heap.grains;
+        let single = |position: DVec3| <[f32; 3]>::from(position.map(|x| x as f32));
+        match attribute {
+            FRZ_GRAINS_POSITION => dst.collect("dst", grains.positions().map(single)),
+            FRZ_GRAINS_POSITION_DOUBLE => dst.collect("dst", grains.positions().map(<[f64; 3]>::from)),
+            FRZ_GRAINS_VELOCITY => dst.collect("dst", grains.velocities()),
+            FRZ_GRAINS_ID => dst.collect("dst", grains.ids().iter().map(|&id| i64::from(id))),
+            FRZ_GRAINS_RADIUS => dst.fill("dst", &vec![grains.params().radius as f32; grains.count()]),
+            FRZ_GRAINS_SOURCE_FRAME => dst.collect("dst", grains.source_frames()),
+            FRZ_GRAINS_REST => dst.collect("dst", grains.rests()),
+            FRZ_GRAINS_ACTIVE => dst.collect("dst", grains.awake().map(i32::from)),
+            FRZ_GRAINS_TRAPPED => dst.collect("dst", grains.trapped_each().map(i32::from)),
         }
     })
 }
@@ -169,16 +143,6 @@ pub unsafe extern "C" fn frz_grains_save(
     capacity: usize,
     size: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(size);
-            required(size, "size")?;
-            let call = enter(context)?;
-            let heap = read(grains)?;
-            let grains = &heap.grains;
-            let save = || call.ctx().phase("save", || Ok(grains.save()));
-            heap.saved.write((dst, capacity, size), save)
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    unsafe { saves(context, grains, (dst, capacity, size), |heap| (&heap.saved, &heap.grains), Grains::save) }
 }

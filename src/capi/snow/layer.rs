@@ -1,10 +1,8 @@
 //! The layer of snow before anything moves.
 
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{Reading, read};
-use crate::capi::ffi::views::{Plain, Sized32, fill, finite, frz_view, sized, within};
-use crate::capi::grid::sparse::{Grid, check_voxel, frz_grid};
-use crate::capi::mesh::triangles::{Mesh, frz_mesh, no_flags};
+use crate::capi::ffi::*;
+use crate::capi::grid::sparse::{check_voxel, frz_grid};
+use crate::capi::mesh::triangles::{frz_mesh, no_flags};
 use crate::capi::runtime::context::{creates, frz_context};
 use crate::geometry::TriMesh;
 use crate::snow::base_layer::initial::{Cover, Ground, layer};
@@ -42,30 +40,12 @@ pub struct frz_snow_desc {
 unsafe impl Sized32 for frz_snow_desc {
     const SIZES: &'static [usize] = &[std::mem::offset_of!(frz_snow_desc, statics), size_of::<Self>()];
     const NAME: &'static str = "frz_snow_desc";
+
+    fn defaults() -> Self {
+        let area = [-1.0, -1.0, 1.0, 1.0];
+        Self { voxel_size: 0.01, half_width: 3.0, depth: 0.3, area, ..Self::zeroed() }
+    }
 }
-
-impl frz_snow_desc {
-    const USUAL: Self = Self {
-        struct_size: 0,
-        flags: 0,
-        voxel_size: 0.01,
-        half_width: 3.0,
-        depth: 0.3,
-        top: std::ptr::null(),
-        ground: std::ptr::null(),
-        ground_height: 0.0,
-        area: [-1.0, -1.0, 1.0, 1.0],
-        statics: std::ptr::null(),
-        static_count: 0,
-    };
-}
-
-#[derive(Clone, Copy)]
-#[repr(transparent)]
-struct Pointer(*const frz_mesh);
-
-// SAFETY: a pointer, which is followed only as a handle.
-unsafe impl Plain for Pointer {}
 
 /// Fills a description with the defaults: voxels of 1 cm, 0.3 m of snow on a square of 2 m at y = 0.
 ///
@@ -76,7 +56,7 @@ unsafe impl Plain for Pointer {}
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_snow_desc_init(desc: *mut frz_snow_desc, size: usize) -> frz_status {
     // SAFETY: the description is NULL or has `size` bytes.
-    guard(|| unsafe { fill(desc, Some(size), frz_snow_desc::USUAL) })
+    guard(|| unsafe { fill(desc, Some(size), frz_snow_desc::defaults()) })
 }
 
 /// Creates a layer of snow as a level set named "surface", for frz_base_create.
@@ -94,7 +74,7 @@ pub unsafe extern "C" fn frz_snow_layer(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
-            let desc = sized(desc, frz_snow_desc::USUAL)?;
+            let desc = given(desc)?;
             no_flags(desc.flags, 0)?;
             check_voxel(desc.voxel_size)?;
             within("half_width", desc.half_width, 3.0..=64.0, "")?;
@@ -103,10 +83,7 @@ pub unsafe extern "C" fn frz_snow_layer(
             for (at, &side) in desc.area.iter().enumerate() {
                 finite(&format!("area: element {at}"), side)?;
             }
-            let list = frz_view { data: desc.statics.cast(), count: desc.static_count, stride: 0 };
-            let list = list.elements::<Pointer>("statics")?;
-            let statics: Vec<Reading<'_, Mesh>> =
-                list.iter().map(|mesh| read(mesh.0)).collect::<Outcome<_>>()?;
+            let statics = read_each(desc.statics, desc.static_count, "statics")?;
             let statics: Vec<TriMesh> = statics.iter().map(|mesh| mesh.triangles.clone()).collect();
             let ground = match desc.ground.is_null() {
                 true => Ground::Plane { height: desc.ground_height, area: desc.area },
@@ -119,8 +96,7 @@ pub unsafe extern "C" fn frz_snow_layer(
             let area = surfaces(&ground, &cover, &statics);
             ctx.allow("the layer of snow", surface_bytes(area, desc.voxel_size))?;
             let half_width = desc.half_width as f32;
-            let grid = ctx.polled(|| layer(ctx, &ground, &statics, &cover, desc.voxel_size, half_width))?;
-            Ok(Grid::from(grid))
+            Ok(ctx.polled(|| layer(ctx, &ground, &statics, &cover, desc.voxel_size, half_width))?)
         })
     }
 }

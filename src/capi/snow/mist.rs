@@ -5,18 +5,17 @@ use std::ffi::c_void;
 use super::base_layer::frz_base;
 use super::grains::frz_grains;
 use super::mist_params::frz_mist_params;
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{HandleType, change, clear, destroy, read, read_some, required};
-use crate::capi::ffi::saved::{Saved, resumed};
-use crate::capi::ffi::views::{Sized32, fill, frz_view, meaning, sized, within};
+use crate::capi::ffi::fields::fields_of;
+use crate::capi::ffi::saved::{Saved, resumed, saves};
+use crate::capi::ffi::*;
 use crate::capi::grid::sparse::{Grid, frz_grid};
 use crate::capi::level_set::body::{Role, Shapes, bodies, frz_body};
-use crate::capi::runtime::context::{creates, enter, frz_context};
+use crate::capi::runtime::context::{creates, frz_context, steps};
 use crate::context::Context;
 use crate::flow::Tiles;
 use crate::geometry::DVec3;
 use crate::snow::base_layer::BaseLayer;
-use crate::snow::mist::{Around, Grids, Mist, Source, Start, Surroundings, Wind};
+use crate::snow::mist::{Around, Grids, Mist, Source, Start, StepReport, Surroundings, Wind};
 use crate::sweep::Body;
 use crate::vdb::{AnyGrid, FloatGrid, VectorGrid};
 
@@ -49,22 +48,10 @@ pub struct frz_mist_report {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_mist_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_mist_report";
 }
 
-impl frz_mist_report {
-    const NOTHING: Self = Self {
-        struct_size: 0,
-        sub_steps: 0,
-        cells: 0,
-        sources: 0,
-        iterations: 0,
-        mass: 0.0,
-        divergence: 0.0,
-        fastest: 0.0,
-    };
-}
+fields_of!(StepReport => frz_mist_report { sub_steps, cells, sources, iterations, mass, divergence, fastest });
 
 /// The value of a handle of mist.
 pub(in crate::capi) struct Air {
@@ -110,11 +97,8 @@ impl Air {
         let Scene { snow, wind, bodies: (list, count), time, dt } = *scene;
         within("dt", dt, SHORTEST..=LONGEST, " s")?;
         within("time", time, -LATEST..=LATEST, " s")?;
-        let mut shapes = std::mem::take(&mut self.shapes);
         // SAFETY: guaranteed by the caller.
-        let bodies = unsafe { bodies(ctx, list, count, dt, Role::Bound, &mut shapes) };
-        self.shapes = shapes;
-        let bodies = bodies?;
+        let bodies = unsafe { bodies(ctx, list, count, dt, Role::Bound, &mut self.shapes) }?;
         let bodies: Vec<&Body> = bodies.iter().map(|(body, _)| body).collect();
         let removing = vec![true; bodies.len()];
         let surroundings =
@@ -130,16 +114,7 @@ impl Air {
         let around = Around { sources, boundary: &boundary, fastest, wind: wind.as_ref() };
         let done = self.mist.step(ctx, &around, [time, time + dt])?;
         self.saved.take();
-        Ok(frz_mist_report {
-            struct_size: 0,
-            sub_steps: done.sub_steps as u32,
-            cells: done.cells as u64,
-            sources: done.sources as u64,
-            iterations: done.iterations as u64,
-            mass: done.mass,
-            divergence: f64::from(done.divergence),
-            fastest: f64::from(done.fastest),
-        })
+        Ok(done.into())
     }
 }
 
@@ -163,11 +138,9 @@ pub unsafe extern "C" fn frz_mist_create(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
-            let defaults = frz_mist_params::defaults();
-            let params = if params.is_null() { defaults } else { sized(params, defaults)? };
+            let params = given_or_defaults(params)?;
             let own = params.params()?;
-            let state =
-                frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
+            let state = frz_view::packed(restart, restart_bytes).elements::<u8>("restart")?;
             let mist = match restart.is_null() {
                 true => Mist::new(own)?,
                 false => resumed(ctx, "mist", Mist::unpacked(&state), || Mist::resume(own, &state))?,
@@ -198,15 +171,13 @@ pub unsafe extern "C" fn frz_mist_set_params(
     mist: *mut frz_mist,
     params: *const frz_mist_params,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut air = change(mist)?;
-            let params = sized(params, frz_mist_params::defaults())?;
-            air.mist.set_params(params.params()?)?;
-            air.floor = params.ground();
-            Ok(())
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let mut air = change(mist)?;
+        let params = given(params)?;
+        air.mist.set_params(params.params()?)?;
+        air.floor = params.ground();
+        Ok(())
     })
 }
 
@@ -246,7 +217,7 @@ pub unsafe extern "C" fn frz_mist_step(
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
     unsafe {
-        stepped(context, mist, report, |ctx, air| {
+        steps(context, mist, report, |ctx, air| {
             let grains = read_some(grains)?;
             let base = read_some(base)?;
             let wind = read_some(wind)?;
@@ -283,30 +254,6 @@ fn before(ctx: &Context, layer: &BaseLayer) -> Outcome<FloatGrid> {
         Ok(snow)
     };
     Ok(ctx.phase("snow", copy)?)
-}
-
-/// A step with its report, which is zero after a failure.
-///
-/// # Safety
-/// The pointers must be NULL or valid.
-pub(in crate::capi) unsafe fn stepped(
-    context: *mut frz_context,
-    mist: *mut frz_mist,
-    report: *mut frz_mist_report,
-    step: impl FnOnce(&Context, &mut Air) -> Outcome<frz_mist_report>,
-) -> frz_status {
-    guard(|| {
-        // SAFETY: guaranteed by the caller.
-        unsafe {
-            if !report.is_null() {
-                fill(report, None, frz_mist_report::NOTHING)?;
-            }
-            let call = enter(context)?;
-            let mut air = change(mist)?;
-            let told = step(call.ctx(), &mut air)?;
-            if report.is_null() { Ok(()) } else { fill(report, None, told) }
-        }
-    })
 }
 
 /// Fields that frz_mist_grid returns.
@@ -366,16 +313,6 @@ pub unsafe extern "C" fn frz_mist_save(
     capacity: usize,
     size: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(size);
-            required(size, "size")?;
-            let call = enter(context)?;
-            let air = read(mist)?;
-            let mist = &air.mist;
-            let save = || call.ctx().phase("save", || Ok(mist.save()));
-            air.saved.write((dst, capacity, size), save)
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    unsafe { saves(context, mist, (dst, capacity, size), |air| (&air.saved, &air.mist), Mist::save) }
 }

@@ -1,7 +1,7 @@
 //! Parameters of mist, in C.
 
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::views::{Sized32, fill, finite, within};
+use crate::capi::ffi::fields::fields_of;
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::snow::mist::Params;
 
@@ -49,38 +49,22 @@ pub struct frz_mist_params {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_mist_params {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_mist_params";
+
+    /// For voxels of 1 cm.
+    fn defaults() -> Self {
+        Params::for_cell(0.01 * 4.0 / 3.0).into()
+    }
 }
+
+fields_of!(Params => frz_mist_params {
+    cell, from_speed, gravity, half_life, wind, turbulence, turbulence_size, confinement, noise, noise_size, seed, padding
+});
 
 /// Maximum height of the ground above or below 0 (m).
 const FARTHEST: f64 = 1.0e6;
-/// The default cell (m), for voxels of 1 cm.
-const USUAL: f64 = 0.01 * 4.0 / 3.0;
 
 impl frz_mist_params {
-    /// The library's defaults, for voxels of 1 cm.
-    pub(in crate::capi) fn defaults() -> Self {
-        let defaults = Params::for_cell(USUAL);
-        Self {
-            struct_size: 0,
-            flags: 0,
-            cell: defaults.cell,
-            from_speed: defaults.from_speed,
-            gravity: defaults.gravity,
-            half_life: defaults.half_life,
-            wind: defaults.wind,
-            turbulence: defaults.turbulence,
-            turbulence_size: defaults.turbulence_size,
-            confinement: defaults.confinement,
-            noise: defaults.noise,
-            noise_size: defaults.noise_size,
-            floor: 0.0,
-            seed: defaults.seed,
-            padding: defaults.padding,
-        }
-    }
-
     /// The library's own parameters; an error names a field that is out of range.
     pub(in crate::capi) fn params(&self) -> Outcome<Params> {
         no_flags(self.flags, FRZ_MIST_FALLING | FRZ_MIST_FLOOR)?;

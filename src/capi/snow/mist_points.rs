@@ -1,13 +1,11 @@
 //! Mist that a host's points raise.
 
 use super::grains::check_snow;
-use super::mist::{Scene, frz_mist, frz_mist_report, stepped};
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status};
-use crate::capi::ffi::handle::read_some;
-use crate::capi::ffi::views::{frz_view, within};
+use super::mist::{Scene, frz_mist, frz_mist_report};
+use crate::capi::ffi::*;
 use crate::capi::grid::sparse::{Grid, frz_grid};
 use crate::capi::level_set::body::frz_body;
-use crate::capi::runtime::context::frz_context;
+use crate::capi::runtime::context::{frz_context, steps};
 use crate::snow::mist::{Source, Start};
 
 /// Moves mist through a step, and adds what points raise along their paths: as frz_mist_step, for a host that has grains or a base layer of
@@ -118,7 +116,7 @@ unsafe fn step_along(
 ) -> frz_status {
     // SAFETY: guaranteed by the caller.
     unsafe {
-        stepped(context, mist, report, |ctx, air| {
+        steps(context, mist, report, |ctx, air| {
             let snow = read_some(snow)?;
             let snow = snow.as_deref().map(Grid::floats).transpose()?;
             snow.map_or(Ok(()), |snow| check_snow("snow", snow))?;

@@ -2,11 +2,8 @@
 
 use super::follower::frz_tracker;
 use super::mesh::{frz_particles, particles};
-use crate::capi::ffi::guard::{Failure, frz_status, guard};
-use crate::capi::ffi::handle::change;
-use crate::capi::ffi::views::{finite, frz_span};
+use crate::capi::ffi::*;
 use crate::capi::runtime::context::{enter, frz_context};
-use crate::surface::Particles;
 
 /// Maximum number of frames ahead.
 const MOST: usize = 100;
@@ -38,44 +35,25 @@ pub unsafe extern "C" fn frz_tracker_read_eased(
     dt: f64,
     dst: frz_span,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let call = enter(context)?;
-            let mut follower = change(tracker)?;
-            call.ctx().check()?;
-            finite("dt", dt)?;
-            if dt <= 0.0 {
-                return Err(Failure::argument(format!("dt = {dt} s must be positive and finite")));
-            }
-            if ahead == 0 || ahead as usize > MOST {
-                return Err(Failure::argument(format!("ahead = {ahead} is not within 1 to {MOST}")));
-            }
-            if count > ahead as usize {
-                return Err(Failure::argument(format!("count = {count} is more than ahead, {ahead}")));
-            }
-            if coming.is_null() && count > 0 {
-                return Err(Failure::argument("coming is NULL"));
-            }
-            let now = particles(now)?;
-            let coming: Vec<Particles> = frames(coming, count)?;
-            let follower = &mut *follower;
-            if !follower.tracker.params().rebuild {
-                let positions = follower.tracker.vertices().iter();
-                return dst.fill("dst", &positions.map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>());
-            }
-            follower.outlook.look(call.ctx(), &follower.tracker, now, coming, dt)?;
-            let positions = follower.outlook.eased(call.ctx(), &follower.tracker, ahead as usize)?;
-            dst.fill("dst", &positions.iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let call = enter(context)?;
+        let mut follower = change(tracker)?;
+        call.ctx().check()?;
+        finite("dt", dt)?;
+        refuse(dt <= 0.0, || format!("dt = {dt} s must be positive and finite"))?;
+        refuse(ahead == 0 || ahead as usize > MOST, || format!("ahead = {ahead} is not within 1 to {MOST}"))?;
+        refuse(count > ahead as usize, || format!("count = {count} is more than ahead, {ahead}"))?;
+        refuse(coming.is_null() && count > 0, || "coming is NULL")?;
+        let now = particles(now)?;
+        let coming = frz_view::packed(coming, count).elements::<*const frz_particles>("coming")?;
+        let coming = coming.into_iter().map(|frame| particles(frame)).collect::<Outcome<Vec<_>>>()?;
+        let follower = &mut *follower;
+        if !follower.tracker.params().rebuild {
+            return dst.put("dst", follower.tracker.vertices().iter().map(|&p| <[f64; 3]>::from(p)));
         }
+        follower.outlook.look(call.ctx(), &follower.tracker, now, coming, dt)?;
+        let positions = follower.outlook.eased(call.ctx(), &follower.tracker, ahead as usize)?;
+        dst.put("dst", positions.iter().map(|&p| <[f64; 3]>::from(p)))
     })
-}
-
-/// The particles of several frames.
-///
-/// # Safety
-/// The pointer must be valid for `count` pointers to structs.
-unsafe fn frames(first: *const *const frz_particles, count: usize) -> Result<Vec<Particles>, Failure> {
-    // SAFETY: guaranteed by the caller.
-    (0..count).map(|frame| unsafe { particles(first.add(frame).read_unaligned()) }).collect()
 }

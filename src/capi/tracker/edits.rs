@@ -1,9 +1,7 @@
 //! The current mesh of a tracker, and how the last step changed it.
 
 use super::follower::{TrackerHandle, frz_tracker};
-use crate::capi::ffi::guard::{frz_status, guard};
-use crate::capi::ffi::handle::{clear, read, required};
-use crate::capi::ffi::views::{frz_span, meaning};
+use crate::capi::ffi::*;
 use crate::geometry::DVec3;
 use crate::mesh_repair::Source;
 
@@ -40,15 +38,8 @@ const ARRAYS: [(u32, frz_tracker_array); 4] = [
 /// Any number of threads may read a tracker.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_tracker_count(tracker: *const frz_tracker, count: *mut usize) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(count);
-            let count = required(count, "count")?;
-            count.write_unaligned(read(tracker)?.tracker.vertices().len());
-            Ok(())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe { answer(count, "count", || Ok(read(tracker)?.tracker.vertices().len())) })
 }
 
 /// Copies an array of the mesh's vertices.
@@ -63,28 +54,17 @@ pub unsafe extern "C" fn frz_tracker_read(
     array: u32,
     dst: frz_span,
 ) -> frz_status {
-    guard(|| {
+    // SAFETY: the tracker is NULL or alive; the span is valid.
+    guard(|| unsafe {
         let array = meaning("array", "frz_tracker_array", array, &ARRAYS)?;
-        // SAFETY: the tracker is NULL or alive; the span is valid.
-        unsafe {
-            let follower = read(tracker)?;
-            let tracker = &follower.tracker;
-            match array {
-                FRZ_TRACKER_POSITION => {
-                    let positions = tracker.vertices().iter();
-                    dst.fill(
-                        "dst",
-                        &positions.map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect::<Vec<_>>(),
-                    )
-                }
-                FRZ_TRACKER_POSITION_DOUBLE => {
-                    dst.fill("dst", &tracker.vertices().iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())
-                }
-                FRZ_TRACKER_DELTA => dst.fill("dst", tracker.delta()),
-                FRZ_TRACKER_FLAGGED => {
-                    dst.fill("dst", &tracker.flags().iter().map(|flag| i32::from(*flag)).collect::<Vec<_>>())
-                }
-            }
+        let follower = read(tracker)?;
+        let tracker = &follower.tracker;
+        let positions = tracker.vertices().iter();
+        match array {
+            FRZ_TRACKER_POSITION => dst.put("dst", positions.map(|p| <[f32; 3]>::from(p.map(|x| x as f32)))),
+            FRZ_TRACKER_POSITION_DOUBLE => dst.put("dst", positions.map(|&p| <[f64; 3]>::from(p))),
+            FRZ_TRACKER_DELTA => dst.fill("dst", tracker.delta()),
+            FRZ_TRACKER_FLAGGED => dst.put("dst", tracker.flags().iter().map(|&flag| i32::from(flag))),
         }
     })
 }
@@ -100,15 +80,8 @@ pub unsafe extern "C" fn frz_tracker_triangle_count(
     tracker: *const frz_tracker,
     count: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(count);
-            let count = required(count, "count")?;
-            count.write_unaligned(read(tracker)?.tracker.triangles().len());
-            Ok(())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe { answer(count, "count", || Ok(read(tracker)?.tracker.triangles().len())) })
 }
 
 /// Copies the mesh's triangles, counter-clockwise seen from outside. Until a step changes the mesh they are the FRZ_MESH_TRIANGLES of the
@@ -174,19 +147,14 @@ pub unsafe extern "C" fn frz_tracker_edits(
     changed: *mut u32,
     before: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(changed);
-            clear(before);
-            let changed = required(changed, "changed")?;
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        clear(before);
+        answer(changed, "changed", || {
             let follower = read(tracker)?;
-            changed.write_unaligned(u32::from(follower.edits.is_some()));
-            if !before.is_null() {
-                before.write_unaligned(follower.before().len());
-            }
-            Ok(())
-        }
+            write_some(before, follower.before().len());
+            Ok(u32::from(follower.edits.is_some()))
+        })
     })
 }
 
@@ -203,19 +171,15 @@ pub unsafe extern "C" fn frz_tracker_read_edits(
     array: u32,
     dst: frz_span,
 ) -> frz_status {
-    guard(|| {
+    // SAFETY: the tracker is NULL or alive; the span is valid.
+    guard(|| unsafe {
         let array = meaning("array", "frz_edit_array", array, &EDITS)?;
-        // SAFETY: the tracker is NULL or alive; the span is valid.
-        unsafe {
-            let follower = read(tracker)?;
-            match array {
-                FRZ_EDIT_ORIGIN => dst.fill("dst", &follower.origins()),
-                FRZ_EDIT_SOURCE => dst.fill("dst", &follower.sources()),
-                FRZ_EDIT_KIND => dst.fill("dst", &follower.kinds()),
-                FRZ_EDIT_BEFORE => {
-                    dst.fill("dst", &follower.before().iter().map(|p| [p.x, p.y, p.z]).collect::<Vec<_>>())
-                }
-            }
+        let follower = read(tracker)?;
+        match array {
+            FRZ_EDIT_ORIGIN => dst.fill("dst", &follower.origins()),
+            FRZ_EDIT_SOURCE => dst.fill("dst", &follower.sources()),
+            FRZ_EDIT_KIND => dst.fill("dst", &follower.kinds()),
+            FRZ_EDIT_BEFORE => dst.put("dst", follower.before().iter().map(|&p| <[f64; 3]>::from(p))),
         }
     })
 }

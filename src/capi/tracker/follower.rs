@@ -1,7 +1,7 @@
 //! A tracker, as its handle holds it.
 
-use crate::capi::ffi::handle::HandleType;
 use crate::capi::ffi::saved::Saved;
+use crate::capi::ffi::*;
 use crate::geometry::DVec3;
 use crate::mesh_repair::Source;
 use crate::surface::{Change, Outlook, Tracker};

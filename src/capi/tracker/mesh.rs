@@ -4,16 +4,15 @@ use std::ffi::c_void;
 
 use super::follower::{TrackerHandle, frz_tracker};
 pub use super::params::{frz_tracker_params, frz_tracker_params_init};
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{change, clear, destroy, read, required};
-use crate::capi::ffi::saved::{Saved, resumed};
-use crate::capi::ffi::views::{Sized32, fill, finite, frz_view, sized};
+use crate::capi::ffi::fields::fields_of;
+use crate::capi::ffi::saved::{Saved, resumed, saves};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::{frz_mesh, no_flags};
-use crate::capi::runtime::context::{creates, enter, frz_context};
+use crate::capi::runtime::context::{creates, enter, frz_context, steps};
 use crate::capi::tracker::follower::Edits;
 use crate::geometry::check::orientation::{Closing, Orientation};
 use crate::geometry::check::topology::Topology;
-use crate::surface::{Change, Outlook, Particles, Tracker, estimate_spacing};
+use crate::surface::{Change, Outlook, Particles, StepReport, Tracker, estimate_spacing};
 
 /// The particles of a liquid at one time. Their order does not matter.
 #[repr(C)]
@@ -33,7 +32,6 @@ pub struct frz_particles {
 
 // SAFETY: numbers and pointers.
 unsafe impl Sized32 for frz_particles {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_particles";
 }
 
@@ -87,26 +85,7 @@ unsafe impl Sized32 for frz_tracker_report {
     const NAME: &'static str = "frz_tracker_report";
 }
 
-impl frz_tracker_report {
-    const NOTHING: Self = Self {
-        struct_size: 0,
-        parts: 0,
-        jumped: 0,
-        lost: 0,
-        born: 0,
-        died: 0,
-        triangles: 0,
-        drops: 0,
-        bubbles: 0,
-        uncovered: 0,
-        changed: 0,
-        rung: 0,
-        changed_cells: 0,
-        rebuilt_cells: 0,
-        made_triangles: 0,
-        specks: 0,
-    };
-}
+fields_of!(StepReport => frz_tracker_report { parts, jumped, lost, born, died, triangles, uncovered });
 
 /// Refuses to rebuild a restored mesh that is not closed, as [`Tracker::new`] does at the first frame.
 fn check_closed(tracker: &Tracker) -> Outcome {
@@ -123,11 +102,9 @@ fn check_closed(tracker: &Tracker) -> Outcome {
 /// # Safety
 /// The pointer must be NULL or valid, and its views must describe memory that can be read.
 pub(in crate::capi) unsafe fn particles(pointer: *const frz_particles) -> Outcome<Particles> {
-    let none = frz_view::NONE;
-    let defaults = frz_particles { struct_size: 0, flags: 0, positions: none, velocities: none, ids: none };
     // SAFETY: guaranteed by the caller.
     let (places, velocities, ids) = unsafe {
-        let given = sized(pointer, defaults)?;
+        let given = given(pointer)?;
         no_flags(given.flags, 0)?;
         (
             given.positions.elements::<[f64; 3]>("positions")?,
@@ -152,17 +129,14 @@ pub unsafe extern "C" fn frz_particles_spacing(
     particles: *const frz_particles,
     spacing: *mut f64,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(spacing);
-            required(spacing, "spacing")?;
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        answer(spacing, "spacing", || {
             let call = enter(context)?;
             let particles = self::particles(particles)?;
             let estimate = call.ctx().phase("spacing", || Ok(estimate_spacing(&particles.positions)))?;
-            spacing.write_unaligned(estimate.unwrap_or(0.0));
-            Ok(())
-        }
+            Ok(estimate.unwrap_or(0.0))
+        })
     })
 }
 
@@ -192,11 +166,10 @@ pub unsafe extern "C" fn frz_tracker_create(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
-            let params = sized(params, frz_tracker_params::defaults())?.params()?;
+            let params = given(params)?.params()?;
             let mesh = read(mesh)?;
             let triangles = &mesh.triangles;
-            let state =
-                frz_view { data: restart, count: restart_bytes, stride: 0 }.elements::<u8>("restart")?;
+            let state = frz_view::packed(restart, restart_bytes).elements::<u8>("restart")?;
             let mut tracker = match restart.is_null() {
                 true => {
                     let particles = self::particles(particles)?;
@@ -248,15 +221,12 @@ pub unsafe extern "C" fn frz_tracker_set_params(
     tracker: *mut frz_tracker,
     params: *const frz_tracker_params,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut follower = change(tracker)?;
-            let params = sized(params, frz_tracker_params::defaults())?.params()?;
-            follower.tracker.set_params(params)?;
-            follower.outlook = Outlook::default();
-            Ok(())
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let mut follower = change(tracker)?;
+        follower.tracker.set_params(given(params)?.params()?)?;
+        follower.outlook = Outlook::default();
+        Ok(())
     })
 }
 
@@ -272,15 +242,13 @@ pub unsafe extern "C" fn frz_tracker_ahead(
     tracker: *mut frz_tracker,
     particles: *const frz_particles,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut follower = change(tracker)?;
-            let particles = self::particles(particles)?;
-            particles.validate()?;
-            follower.tracker.set_ahead(std::sync::Arc::new(particles));
-            Ok(())
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let mut follower = change(tracker)?;
+        let particles = self::particles(particles)?;
+        particles.validate()?;
+        follower.tracker.set_ahead(std::sync::Arc::new(particles));
+        Ok(())
     })
 }
 
@@ -306,52 +274,41 @@ pub unsafe extern "C" fn frz_tracker_step(
     dt: f64,
     report: *mut frz_tracker_report,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            if !report.is_null() {
-                fill(report, None, frz_tracker_report::NOTHING)?;
-            }
-            let call = enter(context)?;
-            let mut follower = change(tracker)?;
+    // SAFETY: the pointers are NULL or valid.
+    unsafe {
+        steps(context, tracker, report, |ctx, follower| {
             finite("dt", dt)?;
             let (from, to) = (particles(from)?, particles(to)?);
-            let follower = &mut *follower;
             // Taking a step that was computed in advance does not check for a cancel.
-            call.ctx().check()?;
-            let done = match follower.outlook.take(&from, &to, dt) {
+            ctx.check()?;
+            let mut done = match follower.outlook.take(&from, &to, dt) {
                 Some((tracker, done)) => {
                     follower.tracker = tracker;
                     done
                 }
-                None => follower.tracker.step(call.ctx(), &from, &to, dt)?,
+                None => follower.tracker.step(ctx, &from, &to, dt)?,
             };
             follower.saved.take();
-            done.new_warnings(&mut follower.has_warned).for_each(|warning| call.ctx().warn(warning));
+            done.new_warnings(&mut follower.has_warned).for_each(|warning| ctx.warn(warning));
             let drops = done.apart.iter().filter(|apart| apart.volume >= 0.0).count();
-            let of_change = |count: fn(&Change) -> usize| done.change.as_ref().map_or(0, count);
-            let told = frz_tracker_report {
-                struct_size: 0,
-                parts: done.parts as u32,
-                jumped: done.jumped as u64,
-                lost: done.lost as u64,
-                born: done.born as u64,
-                died: done.died as u64,
-                triangles: done.triangles as u64,
+            let bubbles = done.apart.len() - drops;
+            let change = done.change.take();
+            let of_change = |count: fn(&Change) -> usize| change.as_ref().map_or(0, count) as u64;
+            let report = frz_tracker_report {
                 drops: drops as u64,
-                bubbles: (done.apart.len() - drops) as u64,
-                uncovered: done.uncovered as u64,
-                changed: u32::from(done.change.is_some()),
+                bubbles: bubbles as u64,
+                changed: u32::from(change.is_some()),
                 rung: of_change(|change| change.rung) as u32,
-                changed_cells: of_change(|change| change.flagged_cells) as u64,
-                rebuilt_cells: of_change(|change| change.rebuilt_cells) as u64,
-                made_triangles: of_change(Change::made_triangles) as u64,
-                specks: of_change(|change| change.specks) as u64,
+                changed_cells: of_change(|change| change.flagged_cells),
+                rebuilt_cells: of_change(|change| change.rebuilt_cells),
+                made_triangles: of_change(Change::made_triangles),
+                specks: of_change(|change| change.specks),
+                ..done.into()
             };
-            follower.edits = done.change.map(Edits::from);
-            if report.is_null() { Ok(()) } else { fill(report, None, told) }
-        }
-    })
+            follower.edits = change.map(Edits::from);
+            Ok(report)
+        })
+    }
 }
 
 /// Saves all that the next step depends on besides the parameters, the mesh and the particles, for a host's own cache. The bytes are the
@@ -370,16 +327,8 @@ pub unsafe extern "C" fn frz_tracker_save(
     capacity: usize,
     size: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(size);
-            required(size, "size")?;
-            let call = enter(context)?;
-            let follower = read(tracker)?;
-            let tracker = &follower.tracker;
-            let save = || call.ctx().phase("save", || Ok(tracker.save()));
-            follower.saved.write((dst, capacity, size), save)
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    unsafe {
+        saves(context, tracker, (dst, capacity, size), |held| (&held.saved, &held.tracker), Tracker::save)
+    }
 }

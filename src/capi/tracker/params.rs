@@ -1,7 +1,7 @@
 //! Parameters of a tracker, in C.
 
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::views::{Sized32, fill, finite, meaning, within};
+use crate::capi::ffi::fields::fields_of;
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::surface::{Params, Weighting};
 
@@ -86,28 +86,16 @@ unsafe impl Sized32 for frz_tracker_params {
         size_of::<Self>(),
     ];
     const NAME: &'static str = "frz_tracker_params";
+
+    fn defaults() -> Self {
+        let (weighting, r#match) = (FRZ_TRACKER_AFFINE as u32, FRZ_TRACKER_MATCH_FLAGGED as u32);
+        Self { weighting, r#match, ..Params::for_spacing(0.0).into() }
+    }
 }
 
-impl frz_tracker_params {
-    pub(in crate::capi) fn defaults() -> Self {
-        let defaults = Params::for_spacing(0.0);
-        Self {
-            struct_size: 0,
-            flags: 0,
-            spacing: defaults.spacing,
-            cell: defaults.cell,
-            change: defaults.change,
-            half_life: defaults.half_life,
-            fade: defaults.fade,
-            weighting: FRZ_TRACKER_AFFINE as u32,
-            reserved: 0,
-            rebuild: u32::from(defaults.rebuild),
-            r#match: FRZ_TRACKER_MATCH_FLAGGED as u32,
-            min_drop: defaults.min_drop as u32,
-            reserved3: 0,
-        }
-    }
+fields_of!(Params => frz_tracker_params { spacing, cell, change, half_life, fade, rebuild, min_drop });
 
+impl frz_tracker_params {
     /// The library's own parameters; an error names a field that is out of range.
     pub(in crate::capi) fn params(&self) -> Outcome<Params> {
         no_flags(self.flags, 0)?;

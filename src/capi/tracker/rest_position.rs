@@ -2,9 +2,7 @@
 
 use super::follower::frz_tracker;
 use super::mesh::{frz_particles, particles};
-use crate::capi::ffi::guard::{Failure, frz_status, guard};
-use crate::capi::ffi::handle::read;
-use crate::capi::ffi::views::frz_span;
+use crate::capi::ffi::*;
 use crate::capi::runtime::context::{enter, frz_context};
 use crate::surface::Rest;
 
@@ -27,21 +25,17 @@ pub unsafe extern "C" fn frz_tracker_read_rest(
     now: *const frz_particles,
     dst: frz_span,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid; the span is valid.
-        unsafe {
-            let call = enter(context)?;
-            let follower = read(tracker)?;
-            let (first, now) = (particles(first)?, particles(now)?);
-            let nameless = |which: &str| Failure::argument(format!("{which}: the particles have no ids"));
-            let rest = Rest::of(&first).ok_or_else(|| nameless("first"))?;
-            if now.ids.is_empty() {
-                return Err(nameless("now"));
-            }
-            let positions = follower.tracker.rest(call.ctx(), &rest, &now)?;
-            let of_vertex =
-                positions.iter().map(|position| position.map_or([f64::NAN; 3], |p| [p.x, p.y, p.z]));
-            dst.fill("dst", &of_vertex.collect::<Vec<_>>())
+    // SAFETY: the pointers are NULL or valid; the span is valid.
+    guard(|| unsafe {
+        let call = enter(context)?;
+        let follower = read(tracker)?;
+        let (first, now) = (particles(first)?, particles(now)?);
+        let nameless = |which: &str| Failure::argument(format!("{which}: the particles have no ids"));
+        let rest = Rest::of(&first).ok_or_else(|| nameless("first"))?;
+        if now.ids.is_empty() {
+            return Err(nameless("now"));
         }
+        let positions = follower.tracker.rest(call.ctx(), &rest, &now)?;
+        dst.put("dst", positions.iter().map(|position| position.map_or([f64::NAN; 3], |p| p.into())))
     })
 }

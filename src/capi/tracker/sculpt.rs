@@ -2,8 +2,7 @@
 
 use super::follower::{Edits, frz_tracker};
 use super::mesh::{frz_particles, particles};
-use crate::capi::ffi::guard::{frz_status, guard};
-use crate::capi::ffi::handle::{change, read};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::frz_mesh;
 use crate::capi::runtime::context::{enter, frz_context};
 use crate::mesh_repair::Source;
@@ -28,26 +27,24 @@ pub unsafe extern "C" fn frz_tracker_resculpt(
     mesh: *const frz_mesh,
     particles: *const frz_particles,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let call = enter(context)?;
-            let mut follower = change(tracker)?;
-            let mesh = read(mesh)?;
-            let particles = self::particles(particles)?;
-            let detail_retention = mesh.attribute("detail", 1).unwrap_or_default().to_vec();
-            let before = follower.tracker.vertices().to_vec();
-            let follower = &mut *follower;
-            follower.tracker.resculpt(call.ctx(), &mesh.triangles, detail_retention, &particles)?;
-            let now = &follower.tracker;
-            follower.edits = Some(Edits {
-                origins: vec![None; now.vertices().len()],
-                sources: vec![Source::New; now.triangles().len()],
-                before,
-            });
-            follower.outlook = Outlook::default();
-            follower.saved.take();
-            Ok(())
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let call = enter(context)?;
+        let mut follower = change(tracker)?;
+        let mesh = read(mesh)?;
+        let particles = self::particles(particles)?;
+        let detail_retention = mesh.attribute("detail", 1).unwrap_or_default().to_vec();
+        let before = follower.tracker.vertices().to_vec();
+        let follower = &mut *follower;
+        follower.tracker.resculpt(call.ctx(), &mesh.triangles, detail_retention, &particles)?;
+        let now = &follower.tracker;
+        follower.edits = Some(Edits {
+            origins: vec![None; now.vertices().len()],
+            sources: vec![Source::New; now.triangles().len()],
+            before,
+        });
+        follower.outlook = Outlook::default();
+        follower.saved.take();
+        Ok(())
     })
 }

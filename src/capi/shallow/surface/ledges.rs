@@ -2,7 +2,7 @@
 
 use super::frz_shallow_size;
 use super::prepared::Ledged;
-use crate::capi::ffi::guard::frz_status;
+use crate::capi::ffi::*;
 use crate::capi::runtime::context::frz_context;
 use crate::capi::shallow::calls::changes;
 use crate::capi::shallow::ground::Terrain;

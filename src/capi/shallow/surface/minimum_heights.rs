@@ -1,13 +1,9 @@
 //! Minimum heights of shallow liquid: how far its films are raised so that the ground's mesh does not show through them.
 
 use super::prepared::Lifted;
-use crate::capi::ffi::fields::fields_of;
-use crate::capi::ffi::guard::{Failure, frz_status, guard};
-use crate::capi::ffi::handle::change;
-use crate::capi::ffi::views::{Sized32, given_or_defaults};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{enter_light, frz_context};
-use crate::capi::shallow::calls::reports;
 use crate::capi::shallow::ground::{Terrain, cells_in};
 use crate::capi::shallow::spill::{ShallowHandle, frz_shallow};
 use crate::shallow::surface::heights::minimum_heights::{Distance, Fitted};

@@ -7,10 +7,7 @@ pub(in crate::capi) mod prepared;
 use self::prepared::{Needs, wanted_lifts};
 use super::calls::informs;
 use super::spill::{ShallowHandle, frz_shallow};
-use crate::capi::ffi::fields::fields_of;
-use crate::capi::ffi::guard::{Outcome, frz_status, guard, refuse};
-use crate::capi::ffi::handle::{change, read};
-use crate::capi::ffi::views::{Sized32, fill, frz_span, given, given_or_defaults};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{enter_light, frz_context};
 use crate::shallow::columns::Columns;
@@ -250,12 +247,31 @@ pub(in crate::capi) struct Wanted<T> {
     size: *mut frz_shallow_size,
 }
 
+/// An interface function that writes a mesh of an object in real time: `write` receives the layout, the buffers and the size that are
+/// `wanted`.
+///
+/// # Safety
+/// The pointers must be NULL or valid, and so must be the spans.
+pub(in crate::capi) unsafe fn writes<N: HandleType, T: Sized32>(
+    context: *mut frz_context,
+    object: *mut N,
+    (layout, target, size): (*const frz_shallow_layout, *const T, *mut frz_shallow_size),
+    write: impl FnOnce(&mut N::Value, &Wanted<T>) -> Outcome,
+) -> frz_status {
+    // SAFETY: guaranteed by the caller.
+    guard(|| unsafe {
+        let wanted = Wanted::new(layout, target, size)?;
+        let _call = enter_light(context)?;
+        write(&mut *change(object)?, &wanted)
+    })
+}
+
 impl<T: Sized32> Wanted<T> {
     /// The request of a host.
     ///
     /// # Safety
     /// The pointers must be NULL or valid.
-    pub(in crate::capi) unsafe fn new(
+    unsafe fn new(
         layout: *const frz_shallow_layout,
         target: *const T,
         size: *mut frz_shallow_size,
@@ -389,14 +405,14 @@ pub unsafe extern "C" fn frz_shallow_surface(
     size: *mut frz_shallow_size,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid, and so are the spans.
-    guard(|| unsafe {
-        let wanted = Wanted::new(layout, target, size)?;
-        let _call = enter_light(context)?;
-        let ShallowHandle { shallow, surface, shown, lifted, ledged, .. } = &mut *change(shallow)?;
-        let since = "since the ground or a body moved";
-        let (least, sunk) = wanted_lifts(wanted.has(FRZ_SHALLOW_LIFTED), lifted.known(), since)?;
-        let ledges = ledged.wanted(wanted.has(FRZ_SHALLOW_SKIRTED), since)?;
-        let depths = Depths { least, sunk, ledges, ..shown.depths(shallow, &wanted.needs())? };
-        wanted.write(surface, shallow.columns(), &depths)
-    })
+    unsafe {
+        writes(context, shallow, (layout, target, size), |spill, wanted| {
+            let ShallowHandle { shallow, surface, shown, lifted, ledged, .. } = spill;
+            let since = "since the ground or a body moved";
+            let (least, sunk) = wanted_lifts(wanted.has(FRZ_SHALLOW_LIFTED), lifted.known(), since)?;
+            let ledges = ledged.wanted(wanted.has(FRZ_SHALLOW_SKIRTED), since)?;
+            let depths = Depths { least, sunk, ledges, ..shown.depths(shallow, &wanted.needs())? };
+            wanted.write(surface, shallow.columns(), &depths)
+        })
+    }
 }

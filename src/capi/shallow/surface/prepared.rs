@@ -1,7 +1,7 @@
 //! What surfaces are built with besides the depths: velocities and concentrations; minimum heights and ledges, and whether these match the
 //! current ground.
 
-use crate::capi::ffi::guard::{Outcome, refuse};
+use crate::capi::ffi::*;
 use crate::error::Result;
 use crate::shallow::Shallow;
 use crate::shallow::scalars::MOST;
