@@ -27,28 +27,19 @@ fn declared(files: &[PathBuf]) -> BTreeSet<String> {
         path.ends_with("keys.rs") || path.parent().is_some_and(|folder| folder.ends_with("keys"))
     };
     for path in files.iter().filter(has_keys) {
-        for key in text(path).split("Key::new(").skip(1).filter(|key| key.contains(".or(")) {
-            let name = key
-                .split('"')
-                .skip(1)
-                .step_by(2)
-                .find(|part| !part.contains([' ', ':']) && *part != table_of(key));
-            names.extend(name.map(String::from));
+        // `key(STEP, "grains", "rest", Flag, or("true"))`, with `OBJECT` for a table that all systems share.
+        for key in text(path).split("key(").skip(1).filter(|key| key.contains(", or(")) {
+            let table = usize::from(!key.split('"').next().unwrap_or_default().contains("OBJECT"));
+            names.extend(key.split('"').skip(1).step_by(2).nth(table).map(String::from));
         }
     }
     names
 }
 
-/// A key's table, where it is written as text.
-fn table_of(key: &str) -> &str {
-    let first = key.trim_start();
-    if first.starts_with('"') { first.split('"').nth(1).unwrap_or_default() } else { "" }
-}
-
 /// Names of keys whose value is replaced where there is none: `number("name").unwrap_or(1.0)`, in one statement or field.
 fn replaced(text: &str) -> Vec<String> {
     let mut names = Vec::new();
-    for call in ["number(\"", "value(\"", "flag(\"", "whole(\"", "text(\"", "name, \""] {
+    for call in ["find(\"", "number(\"", "value(\"", "flag(\"", "whole(\"", "text(\"", "name, \""] {
         for rest in text.split(call).skip(1) {
             let Some((name, rest)) = rest.split_once("\")") else { continue };
             let end = rest.find([';', ',']).unwrap_or(rest.len());
@@ -74,7 +65,7 @@ fn a_default_is_declared_once() {
         names.map(move |name| format!("{}: {name}", at.display())).collect::<Vec<_>>()
     };
     let second: Vec<String> = files.iter().flat_map(second).collect();
-    assert!(second.is_empty(), "second defaults; Values::settled has the declared one: {second:#?}");
+    assert!(second.is_empty(), "second defaults; TableValues::get has the declared one: {second:#?}");
     // What this looks for.
     assert_eq!(replaced("opaque_depth: number(\"opaque_depth\").unwrap_or(0.01),"), ["opaque_depth"]);
 }

@@ -2,72 +2,65 @@
 
 use crate::error::Result;
 use crate::scene::schema::key::Kind::{Cells, Choice, File, Flag, Number, Numbers, Whole};
-use crate::scene::schema::key::{Key, Kind, OBJECT, Scope, Unset, optional, or, or_cells};
+use crate::scene::schema::key::{Key, OBJECT, Scope, Scopes, key, optional, or, or_cells};
 use crate::scene::schema::{FAR, Table, Values, rounded};
 use crate::snow::{grain_cohesion, grain_friction};
 
 /// Maximum attraction (weights of a grain).
 const MOST_ATTRACTION: f64 = 1000.0;
 
-/// A key that changes the first state.
-const fn first(table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Key {
-    Key::new(table, name, kind, unset).concerns(&[("grains", Scope::First)])
-}
-
-/// A key that changes every step.
-const fn step(table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Key {
-    Key::new(table, name, kind, unset).concerns(&[("grains", Scope::Step)])
-}
+const FIRST: Scopes = &[("grains", Scope::First)];
+const STEP: Scopes = &[("grains", Scope::Step)];
 
 /// All of them.
 pub const GRAIN_KEYS: &[Key] = &[
-    step("grains", "preset", Choice(&["powder", "packed", "wet"]), optional("\"powder\""))
+    key(STEP, "grains", "preset", Choice(&["powder", "packed", "wet"]), optional("\"powder\""))
         .means("kind of snow: sets the defaults of the keys below"),
-    first("grains", "radius", Cells(0.02, 0.5), or_cells(1.0 / 3.0))
+    key(FIRST, "grains", "radius", Cells(0.02, 0.5), or_cells(1.0 / 3.0))
         .means("radius of a grain (m); default: a third of a cell"),
-    step("grains", "compression", Number(0.0, 1.0, ""), or("0.75"))
+    key(STEP, "grains", "compression", Number(0.0, 1.0, ""), or("0.75"))
         .with_presets(&[("powder", "0.8"), ("packed", "0.5"), ("wet", "0.7")])
         .means("share of the removed snow that is compressed and does not become grains"),
-    step("grains", "repose_angle_deg", Number(0.0, grain_friction::STEEPEST, "degrees"), or("32.0"))
+    key(STEP, "grains", "repose_angle_deg", Number(0.0, grain_friction::STEEPEST, "degrees"), or("32.0"))
         .with_presets(&[("powder", "36.0"), ("packed", "38.0"), ("wet", "34.0")])
         .means("slope at which a poured pile comes to rest"),
-    step("grains", "stands", Number(0.0, 1000.0, "m"), or("0.0"))
+    key(STEP, "grains", "stands", Number(0.0, 1000.0, "m"), or("0.0"))
         .with_presets(&[("packed", "0.1"), ("wet", "0.25")])
         .means("height of the tallest wall of grains that stays up (m)"),
-    step("grains", "friction", Number(0.0, 1.0, ""), optional("0.2"))
+    key(STEP, "grains", "friction", Number(0.0, 1.0, ""), optional("0.2"))
         .means("between grains, instead of repose_angle_deg; grains do not rotate, so low values suffice"),
-    step("grains", "attraction", Number(0.0, MOST_ATTRACTION, "weights of a grain"), optional("4.0"))
+    key(STEP, "grains", "attraction", Number(0.0, MOST_ATTRACTION, "weights of a grain"), optional("4.0"))
         .means("between grains that nearly touch, instead of stands"),
-    step("grains", "restitution", Number(0.0, 1.0, ""), or("0.0"))
+    key(STEP, "grains", "restitution", Number(0.0, 1.0, ""), or("0.0"))
         .means("share of their speed that grains keep when they bounce"),
-    step("grains", "air", Number(0.0, 1.0, ""), or("0.5"))
+    key(STEP, "grains", "air", Number(0.0, 1.0, ""), or("0.5"))
         .with_presets(&[("powder", "0.3"), ("wet", "0.8")])
         .means("air drag: share of its velocity that a grain keeps over a second"),
-    step("grains", "air_by_density", Flag, or("false"))
+    key(STEP, "grains", "air_by_density", Flag, or("false"))
         .means("whether grains in dense groups feel less air drag than those in thin spray"),
-    step("grains", "gravity", Number(-100.0, 100.0, "m/s2"), or("-9.81")).means("along y (m/s2)"),
-    step("grains", "rest", Flag, or("true"))
+    key(STEP, "grains", "gravity", Number(-100.0, 100.0, "m/s2"), or("-9.81")).means("along y (m/s2)"),
+    key(STEP, "grains", "rest", Flag, or("true"))
         .means("whether grains that lie still come to rest until something wakes them"),
-    step("grains", "active_distance", Number(1.0e-5, FAR, "m"), optional("0.15"))
+    key(STEP, "grains", "active_distance", Number(1.0e-5, FAR, "m"), optional("0.15"))
         .means("slow grains farther than this (m) from objects and fast grains rest at once; no effect with rest = false"),
-    step("grains", "substeps", Whole(1, 1000), optional("20"))
+    key(STEP, "grains", "substeps", Whole(1, 1000), optional("20"))
         .means("sub-steps of a frame; default: from size, time and speed"),
     // No existing frame depends on it.
-    Key::new("grains", "max", Whole(1, 60_000_000), or("20000000"))
+    key(&[], "grains", "max", Whole(1, 60_000_000), or("20000000"))
         .means("maximum number of grains: a frame that would have more is an error"),
-    step("grains", "lifetime", Number(0.001, 1.0e6, "s"), optional("10.0"))
+    key(STEP, "grains", "lifetime", Number(0.001, 1.0e6, "s"), optional("10.0"))
         .means("age at which a grain is removed (s)"),
-    step("grains", "keep_box", Numbers(6, FAR, "m"), optional("[-3.0, -1.0, -3.0, 3.0, 3.0, 3.0]"))
+    key(STEP, "grains", "keep_box", Numbers(6, FAR, "m"), optional("[-3.0, -1.0, -3.0, 3.0, 3.0, 3.0]"))
         .means("grains outside this box are removed: x0, y0, z0, x1, y1, z1 (m)"),
-    first("grains", "initial", File(&["ply", "vdb"]), optional("\"drift.ply\""))
+    key(FIRST, "grains", "initial", File(&["ply", "vdb"]), optional("\"drift.ply\""))
         .means("points that become grains at the first frame, with their velocities v, if any"),
-    step("grains", "seed", Whole(0, i32::MAX as i64), or("0"))
+    key(STEP, "grains", "seed", Whole(0, i32::MAX as i64), or("0"))
         .means("another seed scatters new grains differently"),
-    step(OBJECT, "compression", Number(0.0, 1.0, ""), optional("0.9"))
+    key(STEP, OBJECT, "compression", Number(0.0, 1.0, ""), optional("0.9"))
         .means("instead of grains.compression, for the snow that it removes"),
-    step(OBJECT, "stick", Number(0.0, 1000.0, "weights of a grain"), or("0.0"))
+    key(STEP, OBJECT, "stick", Number(0.0, 1000.0, "weights of a grain"), or("0.0"))
         .means("attraction between it and the grains that touch it"),
-    step(OBJECT, "friction", Number(0.0, 10.0, ""), or("0.3"))
+    key(STEP, OBJECT, "friction", Number(0.0, 10.0, ""), or("0.3"))
         .means("between it and grains; loose grains that slide over it while it stands still have the friction between grains"),
 ];
 

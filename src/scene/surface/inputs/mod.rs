@@ -1,8 +1,6 @@
 //! Everything that a scene with `[surface]` reads before its first frame.
 
-#[cfg(feature = "vdb")]
 pub(in crate::scene::surface) mod particle_times;
-#[cfg(feature = "vdb")]
 pub(in crate::scene::surface) mod sculpts;
 
 use std::path::{Path, PathBuf};
@@ -118,7 +116,7 @@ impl Inputs {
             }
             None => {
                 let mesh = reconstructed(ctx, &particles, spacing, surface.cell)
-                    .map_err(|error| with_path(&first, error))?;
+                    .map_err(|error| error.in_file(&first))?;
                 DetailedMesh { mesh, ..DetailedMesh::default() }
             }
         };
@@ -165,8 +163,7 @@ pub(super) fn read_mesh(
         let warning = faults(path, &mesh.mesh).or_else(doubts);
         return Ok((mesh, warning));
     }
-    let (mesh, warning) =
-        closed(ctx, mesh, spacing * surface.cell).map_err(|error| with_path(path, error))?;
+    let (mesh, warning) = closed(ctx, mesh, spacing * surface.cell).map_err(|error| error.in_file(path))?;
     Ok((mesh, warning.map(|warning| format!("{}: {warning}", path.display())).or_else(doubts)))
 }
 
@@ -244,13 +241,6 @@ fn missing(scene: &Scene, surface: &Surface) -> Option<String> {
 fn reconstructed(ctx: &Context, particles: &Particles, spacing: f64, cell: f64) -> Result<TriMesh> {
     let phi = Implicit::new(ctx, &particles.positions, spacing, cell * spacing)?;
     Ok(Isosurface::new(&phi).mesh(&phi))
-}
-
-fn with_path(path: &Path, error: Error) -> Error {
-    match error {
-        Error::Argument(what) => Error::file(path, what),
-        other => other,
-    }
 }
 
 /// The mesh made ready for rebuilding: a closed 2-manifold by index without self-intersections, repaired in cells of an edge (m) if
