@@ -56,37 +56,37 @@ pub trait Settled: Sized {
     fn of(value: &Value) -> Option<Self>;
 }
 
-/// Declares the types that values convert to.
+/// Declares the types that values convert to: from which kind of value, and how.
 macro_rules! settled {
-    ($($type:ty: $value:ident => $read:expr;)*) => {
+    ($($type:ty: $value:pat => $read:expr;)*) => {
         $(impl Settled for $type {
-            fn of($value: &Value) -> Option<Self> {
-                $read
+            fn of(value: &Value) -> Option<Self> {
+                if let $value = value { $read } else { None }
             }
         })*
     };
 }
 
 settled! {
-    f64: value => value.number();
-    i64: value => value.whole();
-    i32: value => value.whole().map(|whole| whole as i32);
-    u32: value => value.whole().map(|whole| whole as u32);
-    u64: value => value.whole().map(|whole| whole as u64);
-    usize: value => value.whole().map(|whole| whole as usize);
-    bool: value => value.flag();
-    String: value => value.text().map(String::from);
-    PathBuf: value => value.path().map(Path::to_path_buf);
-    DVec3: value => value.numbers::<3>().map(DVec3::from);
-    Up: value => value.text().map(|up| if up == "z" { Up::Z } else { Up::Y });
-    Role: value => Role::ALL.into_iter().find(|role| value.text() == Some(role.name()));
-    Frames: value => if let Value::Frames(frames) = value { Some(*frames) } else { None };
-    Vec<KeyPose>: value => if let Value::Poses(poses) = value { Some(poses.clone()) } else { None };
+    f64: Value::Number(number) => Some(*number);
+    i64: Value::Whole(whole) => Some(*whole);
+    i32: Value::Whole(whole) => Some(*whole as i32);
+    u32: Value::Whole(whole) => Some(*whole as u32);
+    u64: Value::Whole(whole) => Some(*whole as u64);
+    usize: Value::Whole(whole) => Some(*whole as usize);
+    bool: Value::Flag(flag) => Some(*flag);
+    String: Value::Text(text) => Some(text.clone());
+    PathBuf: Value::File(path) => Some(path.clone());
+    DVec3: Value::Numbers(numbers) => numbers[..].try_into().ok().map(|xyz: [f64; 3]| xyz.into());
+    Up: Value::Text(up) => Some(if up == "z" { Up::Z } else { Up::Y });
+    Role: Value::Text(text) => Role::ALL.into_iter().find(|role| role.name() == text);
+    Frames: Value::Frames(frames) => Some(*frames);
+    Vec<KeyPose>: Value::Poses(poses) => Some(poses.clone());
 }
 
 impl<const N: usize> Settled for [f64; N] {
     fn of(value: &Value) -> Option<Self> {
-        value.numbers()
+        if let Value::Numbers(numbers) = value { numbers[..].try_into().ok() } else { None }
     }
 }
 
@@ -228,7 +228,7 @@ impl Values {
 
     /// A number by its key.
     pub fn number(&self, key: &str) -> Option<f64> {
-        self.get(key)?.number()
+        f64::of(self.get(key)?)
     }
 
     fn path_of(&self, object: Option<usize>, table: &str, name: &str) -> Option<&Path> {
@@ -259,29 +259,9 @@ impl Values {
 }
 
 impl Value {
-    /// As a number.
-    pub fn number(&self) -> Option<f64> {
-        if let Self::Number(number) = self { Some(*number) } else { None }
-    }
-
-    /// As a whole number.
-    pub fn whole(&self) -> Option<i64> {
-        if let Self::Whole(number) = self { Some(*number) } else { None }
-    }
-
-    /// As a list of numbers.
-    pub fn numbers<const N: usize>(&self) -> Option<[f64; N]> {
-        if let Self::Numbers(numbers) = self { numbers[..].try_into().ok() } else { None }
-    }
-
     /// As numbers by names.
     pub fn named(&self) -> Option<&BTreeMap<String, f64>> {
         if let Self::Named(numbers) = self { Some(numbers) } else { None }
-    }
-
-    /// As a flag.
-    pub fn flag(&self) -> Option<bool> {
-        if let Self::Flag(flag) = self { Some(*flag) } else { None }
     }
 
     /// As a text.

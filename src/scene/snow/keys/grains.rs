@@ -69,14 +69,14 @@ pub const GRAIN_KEYS: &[Key] = &[
 /// # Errors
 /// A box without a volume.
 pub fn check_grains(table: &Table, values: &Values) -> Result<()> {
-    let keep_box = values.get("grains.keep_box").and_then(|value| value.numbers());
-    if let Some([x0, y0, z0, x1, y1, z1]) = keep_box
+    let own = values.table("grains");
+    if let Some([x0, y0, z0, x1, y1, z1]) = own.find::<[f64; 6]>("keep_box")
         && (x1 <= x0 || y1 <= y0 || z1 <= z0)
     {
         let what = "must be [x0, y0, z0, x1, y1, z1] with x0 < x1, y0 < y1 and z0 < z1";
         return Err(table.error("keep_box", what));
     }
-    let Some(radius) = values.number("grains.radius") else { return Ok(()) };
+    let Some(radius) = own.find("radius") else { return Ok(()) };
     if material(values, radius)[1] > MOST_ATTRACTION {
         let repose = repose_of(values);
         let highest = grain_cohesion::wall_of(MOST_ATTRACTION, 2.0 * radius, repose);
@@ -95,19 +95,21 @@ pub fn check_grains(table: &Table, values: &Values) -> Result<()> {
 /// Friction between grains of a radius (m), and their attraction (weights of a grain): as given, or derived from the angle of repose and
 /// the height of a wall.
 pub fn material(values: &Values, radius: f64) -> [f64; 2] {
-    let number = |name: &str| values.number(&format!("grains.{name}"));
-    let repose = repose_of(values);
-    let of_wall = || grain_cohesion::of_wall(number("stands").unwrap_or_default(), 2.0 * radius, repose);
-    let attraction = number("attraction").unwrap_or_else(of_wall);
-    let friction = number("friction").unwrap_or_else(|| grain_friction::of_repose(repose, attraction > 0.0));
+    let (own, repose) = (values.table("grains"), repose_of(values));
+    let of_wall = || grain_cohesion::of_wall(own.get("stands"), 2.0 * radius, repose);
+    let attraction = own.find("attraction").unwrap_or_else(of_wall);
+    let of_repose = || grain_friction::of_repose(repose, attraction > 0.0);
+    let friction = own.find("friction").unwrap_or_else(of_repose);
     [friction, attraction]
 }
 
 /// The angle of repose (degrees): as given, or from the friction.
 fn repose_of(values: &Values) -> f64 {
-    let number = |name: &str| values.number(&format!("grains.{name}"));
-    let of_friction = number("friction").map(|friction| grain_friction::repose_of(friction, true));
-    of_friction.or_else(|| number("repose_angle_deg")).unwrap_or_default()
+    let own = values.table("grains");
+    match own.find("friction") {
+        Some(friction) => grain_friction::repose_of(friction, true),
+        None => own.get("repose_angle_deg"),
+    }
 }
 
 /// Whether a scene has grains.

@@ -93,8 +93,8 @@ impl Snow {
             (Some(Value::Number(_)), None) if !is_grid => {
                 return Err(snow.error("area", "is missing: a plane needs [x0, z0, x1, z1] (m)"));
             }
-            (Some(_), Some(area)) => {
-                let [x0, z0, x1, z1] = area.numbers().unwrap_or_default();
+            (Some(_), Some(_)) => {
+                let [x0, z0, x1, z1] = own.find::<[f64; 4]>("area").unwrap_or_default();
                 if x1 <= x0 || z1 <= z0 {
                     return Err(snow.error("area", "must be [x0, z0, x1, z1] with x0 < x1 and z0 < z1"));
                 }
