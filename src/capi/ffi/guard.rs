@@ -65,6 +65,11 @@ impl Failure {
     }
 }
 
+/// Refuses an argument with a fault.
+pub(in crate::capi) fn refuse<T: Into<String>>(fault: bool, text: impl FnOnce() -> T) -> Outcome {
+    if fault { Err(Failure::argument(text())) } else { Ok(()) }
+}
+
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let status = match &error {

@@ -68,6 +68,23 @@ pub(in crate::capi) unsafe fn clear<T>(out: *mut T) {
     }
 }
 
+/// Runs the work of a call whose result is a number, or an array of them, which `out` receives; zeroes after a failure.
+///
+/// # Safety
+/// `out` must be NULL or point to memory for it.
+pub(in crate::capi) unsafe fn answer<T>(
+    out: *mut T,
+    name: &str,
+    work: impl FnOnce() -> Outcome<T>,
+) -> Outcome {
+    // SAFETY: guaranteed by the caller.
+    unsafe {
+        clear(out);
+        required(out, name)?.write_unaligned(work()?);
+    }
+    Ok(())
+}
+
 /// Refuses NULL.
 pub(in crate::capi) fn required<T>(pointer: *mut T, name: &str) -> Outcome<*mut T> {
     if pointer.is_null() {

@@ -8,3 +8,5 @@ pub(in crate::capi) mod views;
 pub(in crate::capi) mod handle;
 
 pub(in crate::capi) mod saved;
+
+pub(in crate::capi) mod fields;

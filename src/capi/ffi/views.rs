@@ -37,12 +37,14 @@ pub struct frz_span {
 /// # Safety
 /// Every bit pattern must be valid.
 pub(in crate::capi) unsafe trait Plain: Copy {}
-// SAFETY: numbers and arrays of numbers.
+// SAFETY: a number.
 unsafe impl Plain for u8 {}
 // SAFETY: as above.
 unsafe impl Plain for u16 {}
 // SAFETY: as above.
 unsafe impl Plain for u32 {}
+// SAFETY: as above.
+unsafe impl Plain for u64 {}
 // SAFETY: as above.
 unsafe impl Plain for i32 {}
 // SAFETY: as above.
@@ -51,26 +53,10 @@ unsafe impl Plain for i64 {}
 unsafe impl Plain for f32 {}
 // SAFETY: as above.
 unsafe impl Plain for f64 {}
-// SAFETY: as above.
-unsafe impl Plain for [f32; 2] {}
-// SAFETY: as above.
-unsafe impl Plain for [f32; 3] {}
-// SAFETY: as above.
-unsafe impl Plain for [f32; 4] {}
-// SAFETY: as above.
-unsafe impl Plain for [f64; 3] {}
-// SAFETY: as above.
-unsafe impl Plain for [i32; 2] {}
-// SAFETY: as above.
-unsafe impl Plain for [i32; 3] {}
-// SAFETY: as above.
-unsafe impl Plain for [f32; 512] {}
-// SAFETY: as above.
-unsafe impl Plain for [[f32; 3]; 512] {}
-// SAFETY: as above.
-unsafe impl Plain for [u64; 8] {}
-// SAFETY: as above.
-unsafe impl Plain for [u32; 3] {}
+// SAFETY: elements for which any bytes are valid, without padding between them.
+unsafe impl<T: Plain, const N: usize> Plain for [T; N] {}
+// SAFETY: pointers, which are followed only under the host's guarantee.
+unsafe impl<T> Plain for *const T {}
 
 /// Maximum memory that one array may span (bytes): the largest pointer offset.
 const MOST: usize = isize::MAX as usize;
@@ -336,9 +322,38 @@ pub(in crate::capi) unsafe fn required_text<'a>(pointer: *const c_char, name: &s
 /// valid value.
 pub(in crate::capi) unsafe trait Sized32: Copy {
     /// Sizes that a header may state: the end of the fields of each version.
-    const SIZES: &'static [usize];
+    const SIZES: &'static [usize] = &[size_of::<Self>()];
     /// Its name in messages.
     const NAME: &'static str;
+
+    /// All fields 0 or NULL.
+    fn zeroed() -> Self {
+        // SAFETY: zero bytes are a valid value.
+        unsafe { std::mem::zeroed() }
+    }
+
+    /// What fields are that a host does not set.
+    fn defaults() -> Self {
+        Self::zeroed()
+    }
+}
+
+/// A host's struct; fields that its header does not have take their defaults.
+///
+/// # Safety
+/// As [`sized`].
+pub(in crate::capi) unsafe fn given<T: Sized32>(pointer: *const T) -> Outcome<T> {
+    // SAFETY: guaranteed by the caller.
+    unsafe { sized(pointer, T::defaults()) }
+}
+
+/// As [`given`]; the defaults for NULL.
+///
+/// # Safety
+/// As [`sized`].
+pub(in crate::capi) unsafe fn given_or_defaults<T: Sized32>(pointer: *const T) -> Outcome<T> {
+    // SAFETY: guaranteed by the caller.
+    if pointer.is_null() { Ok(T::defaults()) } else { unsafe { given(pointer) } }
 }
 
 /// Reads a host's struct over defaults, which fields that its header does not have keep.

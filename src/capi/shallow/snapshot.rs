@@ -2,8 +2,10 @@
 
 use super::read::probe;
 use super::spill::{ShallowHandle, frz_shallow};
-use super::surface::prepared::{Ledged, no_lifts};
-use super::surface::{Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target};
+use super::surface::prepared::{Ledged, wanted_lifts};
+use super::surface::{
+    FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target,
+};
 use crate::capi::ffi::guard::{frz_status, guard};
 use crate::capi::ffi::handle::{HandleType, change, destroy, read};
 use crate::capi::ffi::views::{frz_span, frz_view};
@@ -98,15 +100,13 @@ pub unsafe extern "C" fn frz_shallow_snapshot_take(
     snapshot: *mut frz_shallow_snapshot,
     shallow: *const frz_shallow,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut taken = change(snapshot)?;
-            let spill = read(shallow)?;
-            taken.snapshot.take(&spill.shallow);
-            taken.fit(&spill);
-            Ok(())
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let mut taken = change(snapshot)?;
+        let spill = read(shallow)?;
+        taken.snapshot.take(&spill.shallow);
+        taken.fit(&spill);
+        Ok(())
     })
 }
 
@@ -137,29 +137,25 @@ pub unsafe extern "C" fn frz_shallow_snapshot_surface(
     target: *const frz_shallow_target,
     size: *mut frz_shallow_size,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so are the spans.
-        unsafe {
-            let wanted = Wanted::new(layout, target, size)?;
-            let _call = enter_light(context)?;
-            let mut taken = change(snapshot)?;
-            let Taken { snapshot, surface, least, sunk, ledged, .. } = &mut *taken;
-            if wanted.is_lifted && least.is_empty() {
-                return Err(no_lifts("when the snapshot was taken"));
-            }
-            let ledges = ledged.wanted(wanted.is_skirted, "when the snapshot was taken")?;
-            let lifts: [&[i32]; 2] = if wanted.is_lifted { [least, sunk] } else { [&[]; 2] };
-            let depths = Depths {
-                depth: snapshot.depths(),
-                velocity: snapshot.velocities(),
-                active: Some(snapshot.active()),
-                least: lifts[0],
-                sunk: lifts[1],
-                carried: std::array::from_fn(|scalar| snapshot.concentrations(scalar)),
-                ledges,
-            };
-            wanted.write(surface, snapshot.columns(), &depths)
-        }
+    // SAFETY: the pointers are NULL or valid, and so are the spans.
+    guard(|| unsafe {
+        let wanted = Wanted::new(layout, target, size)?;
+        let _call = enter_light(context)?;
+        let Taken { snapshot, surface, least, sunk, ledged, .. } = &mut *change(snapshot)?;
+        let when = "when the snapshot was taken";
+        let known = (!least.is_empty()).then_some((&least[..], &sunk[..]));
+        let (least, sunk) = wanted_lifts(wanted.has(FRZ_SHALLOW_LIFTED), known, when)?;
+        let ledges = ledged.wanted(wanted.has(FRZ_SHALLOW_SKIRTED), when)?;
+        let depths = Depths {
+            depth: snapshot.depths(),
+            velocity: snapshot.velocities(),
+            active: Some(snapshot.active()),
+            least,
+            sunk,
+            carried: std::array::from_fn(|scalar| snapshot.concentrations(scalar)),
+            ledges,
+        };
+        wanted.write(surface, snapshot.columns(), &depths)
     })
 }
 

@@ -1,0 +1,13 @@
+//! Structs of the interface that repeat a struct of the library.
+
+/// Makes a struct of the interface from the library's own: the named fields, as the numbers that the interface has; all others are 0.
+macro_rules! fields_of {
+    ($own:ty => $host:ty { $($field:ident),+ }) => {
+        impl From<$own> for $host {
+            fn from(own: $own) -> Self {
+                Self { $($field: own.$field as _,)+ ..$crate::capi::ffi::views::Sized32::zeroed() }
+            }
+        }
+    };
+}
+pub(in crate::capi) use fields_of;
