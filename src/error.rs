@@ -72,6 +72,14 @@ impl Error {
         Self::Io { path: path.as_ref().to_path_buf(), action, source }
     }
 
+    /// Refuses work, named by `what`, that needs more bytes than the limit.
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn check_memory(needed: u64, limit: u64, what: impl FnOnce() -> String) -> Result<()> {
+        if needed <= limit { Ok(()) } else { Err(Self::Memory { what: what(), needed, limit }) }
+    }
+
     /// A parameter outside its range.
     pub fn argument(what: impl Into<String>) -> Self {
         Self::Argument(what.into())

@@ -145,11 +145,7 @@ impl Context {
     /// # Errors
     /// `Memory`, naming `what`, when `bytes` are more than the limit.
     pub fn allow(&self, what: &str, bytes: u64) -> Result<()> {
-        let limit = self.memory_limit.load(Ordering::Relaxed);
-        if bytes > limit {
-            return Err(Error::Memory { what: what.to_string(), needed: bytes, limit });
-        }
-        Ok(())
+        Error::check_memory(bytes, self.memory_limit(), || what.to_string())
     }
 
     /// `Err(Cancelled)` once cancelled: long loops call it once per block of work.

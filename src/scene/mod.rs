@@ -104,6 +104,13 @@ pub struct Shot {
     pub fps: f64,
 }
 
+impl Shot {
+    /// The time of a frame (s).
+    pub fn time(&self, frame: i32) -> f64 {
+        f64::from(frame) / self.fps
+    }
+}
+
 /// The layer of snow before the first frame, and how it is edited.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snow {
@@ -198,6 +205,9 @@ pub enum Role {
 }
 
 impl Role {
+    /// All of them.
+    pub(crate) const ALL: [Self; 5] = [Self::Collide, Self::Base, Self::Grains, Self::Static, Self::Ignore];
+
     /// The roles of objects that move.
     pub const MOVING: [Self; 3] = [Self::Collide, Self::Base, Self::Grains];
 
@@ -333,9 +343,7 @@ impl Scene {
     /// # Errors
     /// A scene without snow.
     pub fn snow(&self) -> Result<&Snow> {
-        self.snow
-            .as_ref()
-            .ok_or_else(|| Error::argument(format!("{}: `snow` is missing", self.path.display())))
+        self.part(System::Snow, self.snow.as_ref())
     }
 
     /// How its mesh follows a liquid.
@@ -343,9 +351,7 @@ impl Scene {
     /// # Errors
     /// A scene without such a mesh.
     pub fn surface(&self) -> Result<&Surface> {
-        self.surface
-            .as_ref()
-            .ok_or_else(|| Error::argument(format!("{}: `surface` is missing", self.path.display())))
+        self.part(System::Surface, self.surface.as_ref())
     }
 
     /// How its liquid flows over a terrain.
@@ -353,9 +359,12 @@ impl Scene {
     /// # Errors
     /// A scene without such a liquid.
     pub fn shallow(&self) -> Result<&Shallow> {
-        self.shallow
-            .as_ref()
-            .ok_or_else(|| Error::argument(format!("{}: `shallow` is missing", self.path.display())))
+        self.part(System::Shallow, self.shallow.as_ref())
+    }
+
+    fn part<'a, T>(&self, of: System, part: Option<&'a T>) -> Result<&'a T> {
+        let missing = || Error::argument(format!("{}: `{}` is missing", self.path.display(), of.name()));
+        part.ok_or_else(missing)
     }
 
     /// The files that it reads; for sequences those of its own first frame.
@@ -376,8 +385,8 @@ impl Scene {
         if let Some(snow) = &self.snow {
             out.extend(snow.files().map(|(_, path)| path.clone()));
         }
-        out.extend(self.values.get("mist.wind").and_then(Value::path).map(Path::to_path_buf));
-        out.extend(self.values.get("grains.initial").and_then(Value::path).map(Path::to_path_buf));
+        out.extend(self.values.table("mist").find::<PathBuf>("wind"));
+        out.extend(self.values.table("grains").find::<PathBuf>("initial"));
         for object in &self.objects {
             let first = f64::from(self.shot.frames.first) - object.offset;
             out.push(match Pattern::parse(&object.file) {
@@ -407,6 +416,15 @@ impl Snow {
 impl Output {
     /// Whether a run can resume from the files of the base alone.
     pub fn base_restarts(&self) -> bool {
-        self.base && !self.half
+        self.inexact_base().is_none()
+    }
+
+    /// The key that leaves exact values of the base out of its files, if one does.
+    pub(crate) fn inexact_base(&self) -> Option<&'static str> {
+        match self {
+            Self { half: true, .. } => Some("half"),
+            Self { base: false, .. } => Some("base"),
+            _ => None,
+        }
     }
 }

@@ -40,6 +40,17 @@ impl InputHashes {
         }
     }
 
+    /// Runs a reader that opens the file itself: its content must be the same before and after.
+    ///
+    /// # Errors
+    /// As [`InputHashes::note`]; errors of the reader.
+    pub fn around<T>(&self, path: &Path, read: impl FnOnce() -> Result<T>) -> Result<T> {
+        self.hash(path)?;
+        let read = read()?;
+        self.note(path, hash::of_file(path)?)?;
+        Ok(read)
+    }
+
     /// The hash of a file: of the bytes that were used, or of its current bytes, which then must be used.
     ///
     /// # Errors

@@ -95,9 +95,7 @@ impl FrameChoice {
     pub fn contains(&self, frame: i32) -> bool {
         self.frames.binary_search(&frame).is_ok()
     }
-}
 
-impl FrameChoice {
     /// No frames.
     pub(in crate::scene) fn none() -> Self {
         Self { frames: Vec::new() }

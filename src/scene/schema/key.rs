@@ -134,22 +134,13 @@ pub struct Key {
     pub scopes: Scopes,
 }
 
-impl Key {
-    /// A key that no stage depends on.
-    pub const fn new(table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Self {
-        Self {
-            table,
-            name,
-            kind,
-            fallback: unset.fallback,
-            presets: &[],
-            example: unset.example,
-            of_characters: false,
-            meaning: "",
-            scopes: &[],
-        }
-    }
+/// A key of a table, with the stages that depend on it.
+pub const fn key(scopes: Scopes, table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Key {
+    let Unset { fallback, example } = unset;
+    Key { table, name, kind, fallback, presets: &[], example, of_characters: false, meaning: "", scopes }
+}
 
+impl Key {
     /// Its meaning.
     pub const fn means(self, meaning: &'static str) -> Self {
         Self { meaning, ..self }
@@ -163,11 +154,6 @@ impl Key {
     /// It applies to characters only.
     pub const fn of_characters(self) -> Self {
         Self { of_characters: true, ..self }
-    }
-
-    /// The stages that depend on it.
-    pub const fn concerns(self, scopes: Scopes) -> Self {
-        Self { scopes, ..self }
     }
 
     /// The part of a stage that depends on it.

@@ -59,13 +59,9 @@ impl Override {
             table = match entry.get_mut() {
                 DeValue::Table(inner) => inner,
                 DeValue::Array(items) => {
-                    let number = parts.next().map_or("", String::as_str);
+                    let number = parts.next().and_then(|number| number.parse::<usize>().ok());
                     let count = items.len();
-                    let item = number
-                        .parse::<usize>()
-                        .ok()
-                        .and_then(|n| n.checked_sub(1))
-                        .and_then(|n| items.get_mut(n));
+                    let item = number.and_then(|number| items.get_mut(number.checked_sub(1)?));
                     match item.map(Spanned::get_mut) {
                         Some(DeValue::Table(inner)) => inner,
                         _ => return Err(refused(format!("`{part}` needs a number from 1 to {count}"))),

@@ -70,18 +70,13 @@ impl<'a, 'i> Table<'a, 'i> {
     ) -> Result<Self> {
         let table = Self { document, name: name.to_string(), entries: Some(entries), offset };
         let unknown = entries.keys().filter(|key| !known.contains(&&**key.get_ref()));
-        match unknown.min_by_key(|key| key.span().start) {
-            None => Ok(table),
-            Some(key) => {
-                let position = if name.is_empty() { String::new() } else { format!(" in {name}") };
-                let hint = match nearest(key.get_ref(), known) {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None => format!("the keys are {}", listed(known)),
-                };
-                Err(document
-                    .error(key.span().start, format!("unknown key `{}`{position}; {hint}", key.get_ref())))
-            }
-        }
+        let Some(key) = unknown.min_by_key(|key| key.span().start) else { return Ok(table) };
+        let position = if name.is_empty() { String::new() } else { format!(" in {name}") };
+        let hint = match nearest(key.get_ref(), known) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("the keys are {}", listed(known)),
+        };
+        Err(document.error(key.span().start, format!("unknown key `{}`{position}; {hint}", key.get_ref())))
     }
 
     /// A missing table: it has no keys.
@@ -100,39 +95,43 @@ impl<'a, 'i> Table<'a, 'i> {
 
     /// An error about a key's value, at its line; at the table's own line if the key is missing.
     pub fn error(&self, key: &str, what: impl std::fmt::Display) -> Error {
-        let offset = self.entry(key).map_or(self.offset, |value| value.span().start);
         let position = if self.name.is_empty() { String::new() } else { format!(" in {}", self.name) };
-        self.document.error(offset, format!("`{key}`{position} {what}"))
+        self.document.error(self.offset_of(key), format!("`{key}`{position} {what}"))
+    }
+
+    /// The position of a key's value; the table's own if the key is missing.
+    fn offset_of(&self, key: &str) -> usize {
+        self.entry(key).map_or(self.offset, |value| value.span().start)
     }
 
     fn wrong_type(&self, key: &str, wanted: &str, found: &DeValue) -> Error {
         self.error(key, format!("must be {wanted}, not {}", kind_of(found)))
     }
 
+    /// A value, read by a function that returns `None` for one of another type.
+    fn typed<T>(
+        &self,
+        key: &str,
+        wanted: &str,
+        read: impl FnOnce(&'a DeValue<'i>) -> Option<T>,
+    ) -> Result<Option<T>> {
+        let Some(value) = self.entry(key).map(Spanned::get_ref) else { return Ok(None) };
+        read(value).map(Some).ok_or_else(|| self.wrong_type(key, wanted, value))
+    }
+
     /// A text.
     pub fn text(&self, key: &str) -> Result<Option<&'a str>> {
-        match self.entry(key).map(|value| value.get_ref()) {
-            None => Ok(None),
-            Some(DeValue::String(text)) => Ok(Some(text)),
-            Some(other) => Err(self.wrong_type(key, "a text", other)),
-        }
+        self.typed(key, "a text", DeValue::as_str)
     }
 
     /// The absolute path of a file.
     pub fn path(&self, key: &str) -> Result<Option<PathBuf>> {
-        let offset = self.entry(key).map_or(0, |value| value.span().start);
-        Ok(self.text(key)?.map(|name| self.document.path_at(offset, name)))
+        Ok(self.text(key)?.map(|name| self.document.path_at(self.offset_of(key), name)))
     }
 
     /// A finite number, written with or without a decimal point.
     pub fn number(&self, key: &str) -> Result<Option<f64>> {
-        match self.entry(key).map(|value| value.get_ref()) {
-            None => Ok(None),
-            Some(value) => match number_of(value) {
-                Some(number) => Ok(Some(number)),
-                None => Err(self.wrong_type(key, "a finite number", value)),
-            },
-        }
+        self.typed(key, "a finite number", number_of)
     }
 
     /// A number inside a range that the message names.
@@ -153,13 +152,7 @@ impl<'a, 'i> Table<'a, 'i> {
 
     /// A whole number inside a range that the message names.
     pub fn integer_in(&self, key: &str, range: std::ops::RangeInclusive<i64>) -> Result<Option<i64>> {
-        let value = match self.entry(key).map(|value| value.get_ref()) {
-            None => return Ok(None),
-            Some(value) => value,
-        };
-        let DeValue::Integer(written) = value else {
-            return Err(self.wrong_type(key, "a whole number", value));
-        };
+        let Some(written) = self.typed(key, "a whole number", DeValue::as_integer)? else { return Ok(None) };
         match i64::from_str_radix(written.as_str(), written.radix()) {
             Ok(number) if range.contains(&number) => Ok(Some(number)),
             _ => {
@@ -171,110 +164,79 @@ impl<'a, 'i> Table<'a, 'i> {
 
     /// `true` or `false`.
     pub fn flag(&self, key: &str) -> Result<Option<bool>> {
-        match self.entry(key).map(|value| value.get_ref()) {
-            None => Ok(None),
-            Some(DeValue::Boolean(flag)) => Ok(Some(*flag)),
-            Some(other) => Err(self.wrong_type(key, "true or false", other)),
-        }
+        self.typed(key, "true or false", DeValue::as_bool)
     }
 
     /// One of a few texts.
     pub fn choice(&self, key: &str, choices: &[&'static str]) -> Result<Option<&'static str>> {
-        let Some(text) = self.text(key)? else { return Ok(None) };
-        self.chosen(key, text, choices).map(Some)
+        self.text(key)?.map(|text| self.chosen(key, text, choices)).transpose()
     }
 
     /// A list of texts from a fixed set.
     pub fn choices(&self, key: &str, choices: &[&'static str]) -> Result<Option<Vec<&'static str>>> {
-        let values = match self.entry(key).map(|value| value.get_ref()) {
-            None => return Ok(None),
-            Some(DeValue::Array(values)) => values,
-            Some(other) => return Err(self.wrong_type(key, "a list of texts", other)),
-        };
+        const WANTED: &str = "a list of texts";
+        let Some(values) = self.typed(key, WANTED, DeValue::as_array)? else { return Ok(None) };
         let read = |value: &Spanned<DeValue>| match value.get_ref() {
             DeValue::String(text) => self.chosen(key, text, choices),
-            other => Err(self.wrong_type(key, "a list of texts", other)),
+            other => Err(self.wrong_type(key, WANTED, other)),
         };
         values.iter().map(read).collect::<Result<Vec<_>>>().map(Some)
     }
 
     fn chosen(&self, key: &str, text: &str, choices: &[&'static str]) -> Result<&'static str> {
-        match choices.iter().find(|choice| **choice == text) {
-            Some(choice) => Ok(choice),
-            None => {
-                let hint = match nearest(text, choices) {
-                    Some(near) => format!("; did you mean \"{near}\"?"),
-                    None => String::new(),
-                };
-                let names: Vec<String> = choices.iter().map(|name| format!("\"{name}\"")).collect();
-                Err(self.error(key, format!("must be {}, not \"{text}\"{hint}", names.join(" or "))))
-            }
-        }
+        choices.iter().find(|choice| **choice == text).copied().ok_or_else(|| {
+            let hint = nearest(text, choices).map(|near| format!("; did you mean \"{near}\"?"));
+            let names: Vec<String> = choices.iter().map(|name| format!("\"{name}\"")).collect();
+            let (names, hint) = (names.join(" or "), hint.unwrap_or_default());
+            self.error(key, format!("must be {names}, not \"{text}\"{hint}"))
+        })
     }
 
     /// Finite numbers by names.
     pub fn named_numbers(&self, key: &str) -> Result<Option<BTreeMap<String, f64>>> {
-        let Some(value) = self.entry(key).map(|value| value.get_ref()) else { return Ok(None) };
-        let DeValue::Table(entries) = value else {
-            return Err(self.wrong_type(key, "a table of numbers", value));
+        let Some(entries) = self.typed(key, "a table of numbers", DeValue::as_table)? else {
+            return Ok(None);
         };
-        let read =
-            |(name, value): (&Spanned<Cow<'i, str>>, &Spanned<DeValue<'i>>)| match number_of(value.get_ref())
-            {
-                Some(number) => Ok((name.get_ref().to_string(), number)),
-                None => {
-                    let what = format!(
-                        "must hold finite numbers, not {}, `{}`",
-                        kind_of(value.get_ref()),
-                        name.get_ref()
-                    );
-                    Err(self.error(key, what))
-                }
-            };
+        let read = |(name, value): (&Spanned<Cow<'i, str>>, &Spanned<DeValue<'i>>)| {
+            let (name, value) = (name.get_ref(), value.get_ref());
+            number_of(value).map(|number| (name.to_string(), number)).ok_or_else(|| {
+                self.error(key, format!("must hold finite numbers, not {}, `{name}`", kind_of(value)))
+            })
+        };
         entries.iter().map(read).collect::<Result<_>>().map(Some)
     }
 
     /// A list of `count` finite numbers.
     pub fn numbers(&self, key: &str, count: usize) -> Result<Option<Vec<f64>>> {
-        let Some(value) = self.entry(key).map(|value| value.get_ref()) else { return Ok(None) };
-        let read = || -> Option<Vec<f64>> {
-            let DeValue::Array(values) = value else { return None };
-            let numbers = values.iter().map(|value| number_of(value.get_ref())).collect::<Option<Vec<f64>>>();
-            numbers.filter(|numbers| numbers.len() == count)
-        };
-        match read() {
-            Some(numbers) => Ok(Some(numbers)),
-            None => {
-                let found = match value {
-                    DeValue::Array(values) if values.len() != count => format!("a list of {}", values.len()),
-                    DeValue::Array(_) => "a list with something else in it".to_string(),
-                    other => kind_of(other).to_string(),
-                };
-                Err(self.error(key, format!("must be a list of {count} finite numbers, not {found}")))
-            }
-        }
+        let Some(value) = self.entry(key).map(Spanned::get_ref) else { return Ok(None) };
+        let values = value.as_array();
+        let numbers = values.and_then(|values| {
+            values.iter().map(|value| number_of(value.get_ref())).collect::<Option<Vec<f64>>>()
+        });
+        numbers.filter(|numbers| numbers.len() == count).map(Some).ok_or_else(|| {
+            let found = match values {
+                Some(values) if values.len() != count => format!("a list of {}", values.len()),
+                Some(_) => "a list with something else in it".to_string(),
+                None => kind_of(value).to_string(),
+            };
+            self.error(key, format!("must be a list of {count} finite numbers, not {found}"))
+        })
     }
 
     /// A table inside this one.
     pub fn table(&self, key: &str, name: &str, known: &[&str]) -> Result<Option<Table<'a, 'i>>> {
-        let Some(value) = self.entry(key) else { return Ok(None) };
-        let DeValue::Table(entries) = value.get_ref() else {
-            return Err(self.wrong_type(key, "a table", value.get_ref()));
-        };
-        Table::open(self.document, name, entries, value.span().start, known).map(Some)
+        let Some(entries) = self.typed(key, "a table", DeValue::as_table)? else { return Ok(None) };
+        Table::open(self.document, name, entries, self.offset_of(key), known).map(Some)
     }
 
     /// A list of tables inside this one.
     pub fn tables(&self, key: &str, name: &str, known: &[&str]) -> Result<Vec<Table<'a, 'i>>> {
-        let Some(value) = self.entry(key) else { return Ok(Vec::new()) };
-        let DeValue::Array(values) = value.get_ref() else {
-            return Err(self.wrong_type(key, "a list of tables", value.get_ref()));
-        };
+        const WANTED: &str = "a list of tables";
         let open = |value: &'a Spanned<DeValue<'i>>| match value.get_ref() {
             DeValue::Table(entries) => Table::open(self.document, name, entries, value.span().start, known),
-            other => Err(self.wrong_type(key, "a list of tables", other)),
+            other => Err(self.wrong_type(key, WANTED, other)),
         };
-        values.iter().map(open).collect()
+        self.typed(key, WANTED, DeValue::as_array)?.into_iter().flatten().map(open).collect()
     }
 }
 
@@ -309,10 +271,14 @@ fn kind_of(value: &DeValue) -> &'static str {
 
 /// "`a`, `b` and `c`".
 fn listed(names: &[&str]) -> String {
-    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
-    match quoted.split_last() {
-        Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
-        _ => quoted.join(""),
+    joined(names.iter().map(|name| format!("`{name}`")).collect(), "and")
+}
+
+/// Words joined by commas, the last two by a word: "a, b or c".
+pub fn joined(words: Vec<String>, last: &str) -> String {
+    match words.split_last() {
+        Some((end, rest)) if !rest.is_empty() => format!("{} {last} {end}", rest.join(", ")),
+        _ => words.join(""),
     }
 }
 

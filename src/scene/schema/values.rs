@@ -7,18 +7,20 @@ use std::path::{Path, PathBuf};
 use serde::{Serialize, Serializer};
 
 use super::key::{Fallback, Key, Kind};
-use super::toml_table::{Table, with_value};
+use super::toml_table::{Table, joined, with_value};
 use crate::error::{Error, Result};
+use crate::geometry::DVec3;
 use crate::io::mesh::extension;
 use crate::io::particles;
-use crate::motion::is_gltf;
-use crate::scene::{Frames, KeyPose};
+use crate::motion::{Space, Up, is_gltf};
+use crate::scene::{Frames, KeyPose, Role};
 
 /// The value of a scene's key. As text, it is TOML in one line.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Value {
     /// First and last frame.
-    Frames(Frames),
+    Frames(#[serde(serialize_with = "as_range")] Frames),
     /// `true` or `false`.
     Flag(bool),
     /// A text, or one of a fixed set.
@@ -34,7 +36,7 @@ pub enum Value {
     /// Numbers by names.
     Named(BTreeMap<String, f64>),
     /// The absolute path of a file.
-    File(PathBuf),
+    File(#[serde(serialize_with = "as_text")] PathBuf),
     /// Rigid poses, by ascending frames.
     Poses(Vec<KeyPose>),
 }
@@ -54,33 +56,82 @@ pub trait Settled: Sized {
     fn of(value: &Value) -> Option<Self>;
 }
 
-impl Settled for f64 {
-    fn of(value: &Value) -> Option<Self> {
-        value.number()
-    }
+/// Declares the types that values convert to: from which kind of value, and how.
+macro_rules! settled {
+    ($($type:ty: $value:pat => $read:expr;)*) => {
+        $(impl Settled for $type {
+            fn of(value: &Value) -> Option<Self> {
+                if let $value = value { $read } else { None }
+            }
+        })*
+    };
 }
 
-impl Settled for i64 {
-    fn of(value: &Value) -> Option<Self> {
-        value.whole()
-    }
-}
-
-impl Settled for bool {
-    fn of(value: &Value) -> Option<Self> {
-        value.flag()
-    }
-}
-
-impl Settled for String {
-    fn of(value: &Value) -> Option<Self> {
-        value.text().map(String::from)
-    }
+settled! {
+    f64: Value::Number(number) => Some(*number);
+    i64: Value::Whole(whole) => Some(*whole);
+    i32: Value::Whole(whole) => Some(*whole as i32);
+    u32: Value::Whole(whole) => Some(*whole as u32);
+    u64: Value::Whole(whole) => Some(*whole as u64);
+    usize: Value::Whole(whole) => Some(*whole as usize);
+    bool: Value::Flag(flag) => Some(*flag);
+    String: Value::Text(text) => Some(text.clone());
+    PathBuf: Value::File(path) => Some(path.clone());
+    DVec3: Value::Numbers(numbers) => numbers[..].try_into().ok().map(|xyz: [f64; 3]| xyz.into());
+    Up: Value::Text(up) => Some(if up == "z" { Up::Z } else { Up::Y });
+    Role: Value::Text(text) => Role::ALL.into_iter().find(|role| role.name() == text);
+    Frames: Value::Frames(frames) => Some(*frames);
+    Vec<KeyPose>: Value::Poses(poses) => Some(poses.clone());
 }
 
 impl<const N: usize> Settled for [f64; N] {
     fn of(value: &Value) -> Option<Self> {
-        value.numbers()
+        if let Value::Numbers(numbers) = value { numbers[..].try_into().ok() } else { None }
+    }
+}
+
+/// The values of a table: the only one of its name, or one of many.
+#[derive(Debug, Clone, Copy)]
+pub struct TableValues<'v> {
+    values: &'v Values,
+    table: &'v str,
+    index: Option<usize>,
+}
+
+impl<'v> TableValues<'v> {
+    /// A value.
+    pub fn value(&self, name: &str) -> Option<&'v Value> {
+        self.values.of(self.index, self.table, name)
+    }
+
+    /// The value of a key that has a default or is required. The default comes only from the key's declaration.
+    ///
+    /// # Panics
+    /// A key that is not declared, has no default, or holds something else: a programming error, whatever the scene.
+    pub fn get<T: Settled>(&self, name: &str) -> T {
+        let value = self.value(name).cloned().or_else(|| self.values.declared(self.table, name));
+        let value = value.as_ref().and_then(T::of);
+        value.unwrap_or_else(|| panic!("{}.{name} has no default of this type", self.table))
+    }
+
+    /// The value of an optional key, if it has this type.
+    pub fn find<T: Settled>(&self, name: &str) -> Option<T> {
+        T::of(self.value(name)?)
+    }
+
+    /// A text.
+    pub fn text(&self, name: &str) -> Option<&'v str> {
+        self.value(name)?.text()
+    }
+
+    /// Whether a list contains a text.
+    pub fn holds(&self, name: &str, text: &str) -> bool {
+        self.value(name).is_some_and(|value| value.holds(text))
+    }
+
+    /// The unit, axis and origin of the table's files.
+    pub fn space(&self) -> Space {
+        Space { scale: self.get("scale"), up: self.get("up"), origin: self.get("origin") }
     }
 }
 
@@ -150,32 +201,23 @@ impl Values {
         self.of(None, table, name)
     }
 
-    /// A value of an object.
-    pub fn of_object(&self, index: usize, name: &str) -> Option<&Value> {
-        self.of_many(super::key::OBJECT, index, name)
+    /// The values of a table that a scene has once.
+    pub fn table<'v>(&'v self, table: &'v str) -> TableValues<'v> {
+        TableValues { values: self, table, index: None }
     }
 
-    /// A value of one of many tables, such as `source`; the first has index 0.
-    pub fn of_many(&self, table: &str, index: usize, name: &str) -> Option<&Value> {
-        self.of(Some(index), table, name)
+    /// The values of one of many tables of a name; the first has index 0.
+    pub fn one<'v>(&'v self, table: &'v str, index: usize) -> TableValues<'v> {
+        TableValues { values: self, table, index: Some(index) }
     }
 
-    /// The value of a key that has a default or is required, with the index of its table if there may be many. The default comes only from
-    /// the key's declaration.
-    ///
-    /// # Panics
-    /// A key that is not declared, has no default, or holds something else: a programming error, whatever the scene.
-    pub fn settled<T: Settled>(&self, table: &str, index: Option<usize>, name: &str) -> T {
-        let value = self.of(index, table, name).cloned().or_else(|| self.declared(table, name));
-        let value = value.as_ref().and_then(T::of);
-        value.unwrap_or_else(|| panic!("{table}.{name} has no default of this type"))
-    }
-
-    /// A key's default by its declaration.
-    fn declared(&self, table: &str, name: &str) -> Option<Value> {
+    /// A key's default by its declaration, and by its table's preset.
+    pub(in crate::scene) fn declared(&self, table: &str, name: &str) -> Option<Value> {
         let key = self.keys.iter().find(|key| key.table == table && key.name == name)?;
-        let Fallback::Is(text) = key.fallback else { return None };
-        with_value(key.name, text, |table| read(key, table, None)).ok()?
+        match self.preset(key).map_or(key.fallback, Fallback::Is) {
+            Fallback::Is(text) => with_value(key.name, text, |table| read(key, table, None)).ok()?,
+            _ => None,
+        }
     }
 
     /// Number of tables of a name, for tables of which there may be many.
@@ -186,7 +228,7 @@ impl Values {
 
     /// A number by its key.
     pub fn number(&self, key: &str) -> Option<f64> {
-        self.get(key)?.number()
+        f64::of(self.get(key)?)
     }
 
     fn path_of(&self, object: Option<usize>, table: &str, name: &str) -> Option<&Path> {
@@ -217,29 +259,9 @@ impl Values {
 }
 
 impl Value {
-    /// As a number.
-    pub fn number(&self) -> Option<f64> {
-        if let Self::Number(number) = self { Some(*number) } else { None }
-    }
-
-    /// As a whole number.
-    pub fn whole(&self) -> Option<i64> {
-        if let Self::Whole(number) = self { Some(*number) } else { None }
-    }
-
-    /// As a list of numbers.
-    pub fn numbers<const N: usize>(&self) -> Option<[f64; N]> {
-        if let Self::Numbers(numbers) = self { numbers[..].try_into().ok() } else { None }
-    }
-
     /// As numbers by names.
     pub fn named(&self) -> Option<&BTreeMap<String, f64>> {
         if let Self::Named(numbers) = self { Some(numbers) } else { None }
-    }
-
-    /// As a flag.
-    pub fn flag(&self) -> Option<bool> {
-        if let Self::Flag(flag) = self { Some(*flag) } else { None }
     }
 
     /// As a text.
@@ -258,21 +280,12 @@ impl Value {
     }
 }
 
-impl Serialize for Value {
-    fn serialize<S: Serializer>(&self, to: S) -> std::result::Result<S::Ok, S::Error> {
-        match self {
-            Self::Frames(frames) => to.collect_str(frames),
-            Self::Flag(flag) => to.serialize_bool(*flag),
-            Self::Text(text) => to.serialize_str(text),
-            Self::Choices(texts) => texts.serialize(to),
-            Self::Number(number) => to.serialize_f64(*number),
-            Self::Whole(number) => to.serialize_i64(*number),
-            Self::Numbers(numbers) => numbers.serialize(to),
-            Self::Named(numbers) => numbers.serialize(to),
-            Self::File(path) => to.serialize_str(&path.to_string_lossy()),
-            Self::Poses(poses) => poses.serialize(to),
-        }
-    }
+fn as_range<S: Serializer>(frames: &Frames, to: S) -> std::result::Result<S::Ok, S::Error> {
+    to.collect_str(frames)
+}
+
+fn as_text<S: Serializer>(path: &Path, to: S) -> std::result::Result<S::Ok, S::Error> {
+    to.collect_str(&path.display())
 }
 
 impl fmt::Display for Value {
@@ -321,13 +334,10 @@ fn quoted(text: &str) -> String {
 fn read(key: &Key, table: &Table, cell: Option<f64>) -> Result<Option<Value>> {
     let name = key.name;
     Ok(match key.kind {
-        Kind::Frames => match table.text(name)? {
-            None => None,
-            Some(text) => {
-                let frames = text.parse().map_err(|what| table.error(name, format!("is wrong: {what}")))?;
-                Some(Value::Frames(frames))
-            }
-        },
+        Kind::Frames => {
+            let frames = table.text(name)?.map(str::parse).transpose();
+            frames.map_err(|what| table.error(name, format!("is wrong: {what}")))?.map(Value::Frames)
+        }
         Kind::Flag => table.flag(name)?.map(Value::Flag),
         Kind::Text => table.text(name)?.map(|text| Value::Text(text.to_string())),
         Kind::Choice(texts) => table.choice(name, texts)?.map(|text| Value::Text(text.to_string())),
@@ -348,10 +358,9 @@ fn read(key: &Key, table: &Table, cell: Option<f64>) -> Result<Option<Value>> {
             }
             named => named.map(Value::Named),
         },
-        Kind::File(extensions) => match table.path(name)? {
-            None => None,
-            Some(path) => Some(file(key, table, path, extensions, "")?),
-        },
+        Kind::File(extensions) => {
+            table.path(name)?.map(|path| file(key, table, path, extensions, "")).transpose()?
+        }
         Kind::HeightOrFile(far, extensions) => match (table.path(name), table.number(name)) {
             (Ok(Some(path)), _) => Some(file(key, table, path, extensions, "a number or ")?),
             (_, Ok(None)) => None,
@@ -363,13 +372,8 @@ fn read(key: &Key, table: &Table, cell: Option<f64>) -> Result<Option<Value>> {
             Ok(Some(path)) => Some(file(key, table, path, extensions, &format!("{count} numbers or "))?),
             _ => numbers(name, table, count, far, unit)?,
         },
-        Kind::Poses(far) => {
-            if table.has(name) {
-                Some(Value::Poses(poses(name, table, far)?))
-            } else {
-                None
-            }
-        }
+        Kind::Poses(far) if table.has(name) => Some(Value::Poses(poses(name, table, far)?)),
+        Kind::Poses(_) => None,
     })
 }
 
@@ -393,11 +397,7 @@ fn file(key: &Key, table: &Table, path: PathBuf, extensions: &[&str], or: &str) 
 
 /// ".glb, .gltf or .obj".
 pub fn any_of(extensions: &[&str]) -> String {
-    let dotted: Vec<String> = extensions.iter().map(|extension| format!(".{extension}")).collect();
-    match dotted.split_last() {
-        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
-        _ => dotted.join(""),
-    }
+    joined(extensions.iter().map(|extension| format!(".{extension}")).collect(), "or")
 }
 
 fn poses(name: &str, object: &Table, far: f64) -> Result<Vec<KeyPose>> {

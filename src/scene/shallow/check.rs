@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::estimate::{disk, memory};
+use super::estimate;
 use super::inputs::area;
 use super::stage::liquid_over_time::LiquidState;
 use super::{Inputs, ML, Shallow};
@@ -80,12 +80,10 @@ impl Report {
     /// # Errors
     /// [`Error::Memory`] names the counts of cells and columns.
     pub fn check_memory(&self, limit: u64) -> Result<()> {
-        if self.memory_bytes <= limit {
-            return Ok(());
-        }
         let [across, along] = self.cells;
-        let what = format!("liquid on {across} x {along} cells, {} columns,", self.columns);
-        Err(Error::Memory { what, needed: self.memory_bytes, limit })
+        Error::check_memory(self.memory_bytes, limit, || {
+            format!("liquid on {across} x {along} cells, {} columns,", self.columns)
+        })
     }
 }
 
@@ -105,7 +103,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
     let deepest = course.liquid.depths().iter().copied().max().unwrap_or(0);
     let count = columns.count();
     let triangles = inputs.triangles.unwrap_or(0) as u64;
-    let frame_bytes = disk::frame(of, count as u64, triangles);
+    let frame_bytes = estimate::frame_bytes(of, count as u64, triangles);
     let mut warnings = inputs.warnings.clone();
     warnings.extend(odd(of, inputs, &course, void_cells));
     warnings.extend(later(ctx, scene, course)?);
@@ -130,7 +128,7 @@ pub fn check(ctx: &Context, scene: &Scene, inputs: &Inputs) -> Result<Report> {
         deepest_m: heights.length(deepest.into()),
         falls: of.params.falls.is_some(),
         scalars: of.scalars.iter().map(|carried| carried.scalar.name.clone()).collect(),
-        memory_bytes: memory::estimate(of, &grid, count as u64, triangles),
+        memory_bytes: estimate::memory(of, &grid, count as u64, triangles),
         disk_bytes: frames.count() as u64 * frame_bytes,
         frame_bytes,
         warnings,

@@ -19,10 +19,11 @@ pub(super) use keys::{KEYS, MANY_KEYS};
 pub use plan::plan;
 pub use surroundings::Around;
 
-use super::schema::{Value, Values};
+use super::schema::Values;
+use super::schema::key::OBJECT;
 use super::{KeyPose, Role};
 use crate::io::files::sequence::Pattern;
-use crate::motion::{Space, Up};
+use crate::motion::Space;
 use crate::shallow::free_fall::Falls;
 use crate::shallow::material::Liquid;
 use crate::shallow::params::{Friction, Section, TimeStepping};
@@ -169,48 +170,42 @@ pub struct Files {
 impl Shallow {
     /// The liquid of a scene; `None` if it has no such table.
     pub(super) fn of(values: &Values) -> Option<Self> {
-        let value = |name: &str| values.get(&format!("shallow.{name}"));
-        let number = |name: &str| value(name).and_then(Value::number);
-        let text = |name: &str| value(name).and_then(Value::text);
-        let asked = |name: &str, text: &str| values.get(name).is_some_and(|value| value.holds(text));
-        let (size, heights) = (
-            value("terrain_size").and_then(Value::numbers),
-            value("terrain_height").and_then(Value::numbers),
-        );
+        let (own, output) = (values.table("shallow"), values.table("output"));
+        let (size, heights) = (own.find("terrain_size"), own.find("terrain_height"));
         Some(Self {
-            terrain: value("terrain")?.path()?.to_path_buf(),
+            terrain: own.find("terrain")?,
             image: size.zip(heights).map(|(size, heights)| ImagePlace { size, heights }),
-            space: space(number("scale"), text("up"), value("origin")),
-            offset: values.settled::<i64>("shallow", None, "offset") as i32,
-            cell: number("cell")?,
-            area: value("area").and_then(Value::numbers),
-            bottom: number("bottom"),
-            top: number("top"),
-            look: values.settled("shallow", None, "liquid"),
+            space: own.space(),
+            offset: own.get("offset"),
+            cell: own.find("cell")?,
+            area: own.find("area"),
+            bottom: own.find("bottom"),
+            top: own.find("top"),
+            look: own.get("liquid"),
             params: params(values),
-            fill: number("fill"),
+            fill: own.find("fill"),
             scalars: Carried::all_of(values),
             pours: (0..values.count("pour")).map(|index| Pour::of(values, index)).collect(),
             points: Point::all_of(values),
-            obstacles: (0..values.count("object")).filter_map(|index| Obstacle::of(values, index)).collect(),
-            staining: value("stains").and_then(Value::flag).filter(|stains| *stains).map(|_| Staining {
+            obstacles: (0..values.count(OBJECT)).filter_map(|index| Obstacle::of(values, index)).collect(),
+            staining: own.get::<bool>("stains").then(|| Staining {
                 scalar: inputs::scalars::staining(values),
-                half_life: values.settled("shallow", None, "stain_half_life"),
+                half_life: own.get("stain_half_life"),
                 ..Staining::default()
             }),
-            lifts: values.settled("shallow", None, "lifts"),
-            skirts: values.settled("shallow", None, "skirts"),
-            opaque_depth: values.settled("shallow", None, "opaque_depth"),
+            lifts: own.get("lifts"),
+            skirts: own.get("skirts"),
+            opaque_depth: own.get("opaque_depth"),
             output: Files {
-                ply: asked("output.liquid", "ply"),
-                usd: asked("output.liquid", "usd"),
-                vdb: asked("output.volume", "vdb"),
-                velocities: asked("output.attributes", "v"),
-                depth: asked("output.attributes", "depth"),
-                layer: asked("output.attributes", "layer"),
-                alpha: asked("output.attributes", "alpha"),
-                falling: asked("output.attributes", "falling"),
-                scalars: asked("output.attributes", "scalars"),
+                ply: output.holds("liquid", "ply"),
+                usd: output.holds("liquid", "usd"),
+                vdb: output.holds("volume", "vdb"),
+                velocities: output.holds("attributes", "v"),
+                depth: output.holds("attributes", "depth"),
+                layer: output.holds("attributes", "layer"),
+                alpha: output.holds("attributes", "alpha"),
+                falling: output.holds("attributes", "falling"),
+                scalars: output.holds("attributes", "scalars"),
             },
         })
     }
@@ -231,13 +226,12 @@ impl Shallow {
 
 impl Pour {
     fn of(values: &Values, index: usize) -> Self {
-        let value = |name: &str| values.of_many("pour", index, name);
-        let number = |name: &str| value(name).and_then(Value::number).unwrap_or(0.0);
+        let own = values.one("pour", index);
         Self {
-            at: value("at").and_then(Value::numbers).unwrap_or_default(),
-            radius: number("radius"),
-            volume: number("volume_ml") * ML,
-            frame: value("frame").and_then(Value::whole).map(|frame| frame as i32),
+            at: own.get("at"),
+            radius: own.get("radius"),
+            volume: own.get::<f64>("volume_ml") * ML,
+            frame: own.find("frame"),
             carries: inputs::scalars::brought(values, "pour", index),
         }
     }
@@ -251,28 +245,34 @@ impl Point {
     }
 
     fn of(values: &Values, table: &'static str, index: usize) -> Self {
-        let value = |name: &str| values.of_many(table, index, name);
-        let number = |name: &str| value(name).and_then(Value::number).unwrap_or(0.0);
-        let frame = |name: &str| value(name).and_then(Value::whole).map(|frame| frame as i32);
+        let own = values.one(table, index);
         let kind = match table {
             "source" => sources::Kind::Source,
-            "drain" => match value("orifice_mm2").and_then(Value::number) {
-                Some(area) => sources::Kind::Orifice(area * 1e-6 * number("discharge")),
+            "drain" => match own.find::<f64>("orifice_mm2") {
+                Some(area) => sources::Kind::Orifice(area * 1e-6 * own.get::<f64>("discharge")),
                 None => sources::Kind::Drain,
             },
-            _ => sources::Kind::Absorber(number("capacity_ml") * ML),
+            _ => sources::Kind::Absorber(own.get::<f64>("capacity_ml") * ML),
         };
-        let (frequency, share) = (number("frequency"), number("swing"));
+        // Absorbers do not pulse.
+        let pulse = own.find("frequency").zip(own.find("swing"));
         let point = FlowPoint {
             kind,
-            at: value("at").and_then(Value::numbers).unwrap_or_default(),
-            radius: number("radius"),
-            rate: number("rate_ml") * ML,
-            pulse: (frequency > 0.0 && share > 0.0).then_some(sources::Pulse { frequency, share }),
+            at: own.get("at"),
+            radius: own.get("radius"),
+            rate: own.get::<f64>("rate_ml") * ML,
+            pulse: pulse
+                .filter(|(frequency, share)| *frequency > 0.0 && *share > 0.0)
+                .map(|(frequency, share)| sources::Pulse { frequency, share }),
         };
-        let follows = values.settled(table, Some(index), "follows");
-        let carries = inputs::scalars::brought(values, table, index);
-        Self { name: (table, index), point, carries, follows, from: frame("from"), until: frame("until") }
+        Self {
+            name: (table, index),
+            point,
+            carries: inputs::scalars::brought(values, table, index),
+            follows: own.get("follows"),
+            from: own.find("from"),
+            until: own.find("until"),
+        }
     }
 
     /// Whether it acts over the step to a frame.
@@ -288,19 +288,14 @@ impl Point {
 
 impl Obstacle {
     fn of(values: &Values, index: usize) -> Option<Self> {
-        let value = |name: &str| values.of_object(index, name);
-        let number = |name: &str| value(name).and_then(Value::number);
-        let text = |name: &str| value(name).and_then(Value::text);
-        let form = match (text("shape"), value("file").and_then(Value::path)) {
-            (Some("sphere"), _) => Form::Sphere(number("radius")?),
-            (Some("capsule"), _) => Form::Capsule(number("radius")?, number("length")?),
-            (Some(_), _) => Form::Cuboid(value("size")?.numbers()?),
-            (None, file) => {
-                Form::Mesh(file?.to_path_buf(), space(number("scale"), text("up"), value("origin")))
-            }
+        let own = values.one(OBJECT, index);
+        let form = match own.text("shape") {
+            Some("sphere") => Form::Sphere(own.find("radius")?),
+            Some("capsule") => Form::Capsule(own.find("radius")?, own.find("length")?),
+            Some(_) => Form::Cuboid(own.find("size")?),
+            None => Form::Mesh(own.find("file")?, own.space()),
         };
-        let keys = if let Some(Value::Poses(poses)) = value("keys") { poses.clone() } else { Vec::new() };
-        Some(Self { form, keys, ease: values.settled("object", Some(index), "ease") })
+        Some(Self { form, keys: own.get("keys"), ease: own.get("ease") })
     }
 
     /// The file of a mesh.
@@ -309,47 +304,32 @@ impl Obstacle {
     }
 }
 
-fn space(scale: Option<f64>, up: Option<&str>, origin: Option<&Value>) -> Space {
-    Space {
-        scale: scale.unwrap_or(1.0),
-        up: if up == Some("z") { Up::Z } else { Up::Y },
-        origin: origin.and_then(Value::numbers::<3>).unwrap_or_default().into(),
-    }
-}
-
 /// Parameters of a scene's liquid.
 fn params(values: &Values) -> Params {
-    let value = |name: &str| values.get(&format!("shallow.{name}"));
-    let number = |name: &str| value(name).and_then(Value::number);
-    let text = |name: &str| value(name).and_then(Value::text);
-    let is_thinning: bool = values.settled("shallow", None, "thinning");
+    let own = values.table("shallow");
     Params {
-        liquid: match number("viscosity") {
-            _ if is_thinning => Liquid::THINNING_BLOOD,
-            Some(viscosity) => Liquid::new(viscosity),
-            None => Liquid::BLOOD,
-        },
-        gravity: values.settled("shallow", None, "gravity"),
-        kept: values.settled("shallow", None, "kept"),
-        pace: match text("pace") {
-            Some("realtime") => TimeStepping::Realtime(values.settled("shallow", None, "step")),
+        liquid: if own.get("thinning") { Liquid::THINNING_BLOOD } else { Liquid::new(own.get("viscosity")) },
+        gravity: own.get("gravity"),
+        kept: own.get("kept"),
+        pace: match own.text("pace") {
+            Some("realtime") => TimeStepping::Realtime(own.get("step")),
             _ => TimeStepping::Exact,
         },
-        border: match text("border") {
+        border: match own.text("border") {
             Some("closed") => Border::Closed,
             Some("absorbing") => Border::Absorbing,
             _ => Border::Open,
         },
         section: Section::default(),
-        friction: if text("friction") == Some("walls") { Friction::Walls } else { Friction::Ground },
+        friction: if own.text("friction") == Some("walls") { Friction::Walls } else { Friction::Ground },
         thickening: inputs::scalars::thickening(values),
-        falls: value("falls").and_then(Value::flag).filter(|falls| *falls).map(|_| Falls {
-            height: values.settled("shallow", None, "falls_height"),
-            interval: values.settled("shallow", None, "falls_interval"),
-            drop: values.settled::<f64>("shallow", None, "falls_drop_ml") * ML,
-            most: values.settled::<i64>("shallow", None, "falls_most") as usize,
+        falls: own.get::<bool>("falls").then(|| Falls {
+            height: own.get("falls_height"),
+            interval: own.get("falls_interval"),
+            drop: own.get::<f64>("falls_drop_ml") * ML,
+            most: own.get("falls_most"),
         }),
-        rest: values.settled("shallow", None, "rest"),
+        rest: own.get("rest"),
     }
 }
 

@@ -7,28 +7,25 @@ use crate::snow::grains::Params;
 
 /// Parameters of the grains of a scene with cells of `cell` m.
 pub(in crate::scene::snow) fn params(scene: &Scene, cell: f64) -> Params {
-    let values = &scene.values;
-    let number = |name: &str| values.number(&format!("grains.{name}"));
-    let whole = |name: &str| values.get(&format!("grains.{name}")).and_then(|value| value.whole());
-    let defaults = Params::for_cell(cell);
-    let radius = number("radius").unwrap_or(defaults.radius);
-    let [friction, attraction] = material(values, radius);
-    let keep_box = values.get("grains.keep_box").and_then(|value| value.numbers());
+    let own = scene.values.table("grains");
+    let radius = own.find("radius").unwrap_or(Params::for_cell(cell).radius);
+    let [friction, attraction] = material(&scene.values, radius);
+    let keep_box: Option<[f64; 6]> = own.find("keep_box");
     Params {
         radius,
-        compression: values.settled("grains", None, "compression"),
+        compression: own.get("compression"),
         friction,
         attraction,
-        restitution: values.settled("grains", None, "restitution"),
-        air: values.settled("grains", None, "air"),
-        air_by_density: values.settled("grains", None, "air_by_density"),
-        gravity: values.settled("grains", None, "gravity"),
-        rests: values.settled("grains", None, "rest"),
-        active_distance: number("active_distance"),
-        lifetime: number("lifetime"),
+        restitution: own.get("restitution"),
+        air: own.get("air"),
+        air_by_density: own.get("air_by_density"),
+        gravity: own.get("gravity"),
+        rests: own.get("rest"),
+        active_distance: own.find("active_distance"),
+        lifetime: own.find("lifetime"),
         keep_box: keep_box.map(|[a, b, c, d, e, f]| [DVec3::new(a, b, c), DVec3::new(d, e, f)]),
-        sub_steps: whole("substeps").map(|count| count as u32),
-        most: values.settled::<i64>("grains", None, "max") as usize,
-        seed: values.settled::<i64>("grains", None, "seed") as u64,
+        sub_steps: own.find("substeps"),
+        most: own.get("max"),
+        seed: own.get("seed"),
     }
 }

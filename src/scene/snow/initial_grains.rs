@@ -36,7 +36,7 @@ pub struct Drift {
 
 /// The file of a scene's initial grains.
 pub fn file(scene: &Scene) -> Option<&Path> {
-    scene.values.get("grains.initial").and_then(|value| value.path())
+    scene.values.table("grains").value("initial")?.path()
 }
 
 impl Drift {

@@ -12,7 +12,6 @@ use crate::geometry::check::orientation::{Closing, Orientation};
 use crate::geometry::mesh::weld::Weld;
 use crate::geometry::mesh::{BY_KEY, farthest, too_far as far_mesh};
 use crate::geometry::{DVec3, TriMesh};
-use crate::io::files::hash;
 use crate::io::files::sequence::Pattern;
 use crate::io::mesh;
 use crate::io::records::input_hashes::InputHashes;
@@ -24,6 +23,9 @@ use crate::vdb::{FloatGrid, GridClass, VectorGrid, distances, file};
 
 /// Half width of the snow's narrow band (cells).
 const HALF_WIDTH: f32 = 3.0;
+
+/// Advice about a mesh of ground or top that lies far from the origin: no key moves it.
+const FOR_SNOW: &str = "give snow.origin nearby, which is subtracted in 64 bits, or save it near the origin and move the scene there too";
 
 /// Contents of a scene's files.
 pub struct Inputs {
@@ -88,51 +90,40 @@ impl Inputs {
             initial::fits(ground, cover, snow.cell)
                 .map_err(|error| Error::argument(format!("{}: {error}", scene.path.display())))?;
         }
-        warnings.extend(far_meshes(&snow, &source));
-        warnings.extend(unclear_corners(&snow, &source));
-        let start = f64::from(scene.shot.frames.first) / scene.shot.fps;
+        let meshes = || snow.files().filter_map(|(key, path)| Some((&**path, source.mesh(key)?)));
+        warnings.extend(meshes().filter_map(|(path, mesh)| {
+            far_mesh(&path.display().to_string(), mesh.farthest(), 1.0, snow.cell, FOR_SNOW)
+        }));
+        warnings.extend(meshes().filter_map(|(path, mesh)| unclear_corners(path, mesh)));
+        let start = scene.shot.time(scene.shot.frames.first);
         let (mut statics, mut bodies) = (Vec::new(), Vec::new());
         for (index, object) in scene.objects.iter().enumerate() {
             if object.role == Role::Ignore {
                 continue;
             }
             let motion = motion(scene, object, &seen, &mut warnings)?;
-            match object.role {
-                Role::Static => {
-                    let (mesh, unclear) = posed(&*motion, start)?;
-                    warnings.extend(unclear.map(|what| format!("{}: {what}", object.file.display())));
-                    statics.push(oriented(mesh, &object_name(index, object), &mut warnings));
-                }
-                _ => {
-                    let name = object_name(index, object);
-                    let body = Body::new(motion, start)?.with_noise(object.noise).with_name(name);
-                    log::info!(
-                        "{}: {} triangles, {} open loops closed",
-                        object.file.display(),
-                        body.motion().triangles().len(),
-                        body.closed_loops()
-                    );
-                    if let Some(what) = body.warning() {
-                        log::warn!("{}: {what}", object.file.display());
-                    }
-                    warnings
-                        .extend(body.weld_warning().map(|what| format!("{}: {what}", object.file.display())));
-                    warnings.extend(too_small(scene, object, &body, start)?);
-                    bodies.push(body);
-                }
+            let (name, file) = (object_name(index, object), object.file.display());
+            if object.role == Role::Static {
+                let (mesh, unclear) = posed(&*motion, start)?;
+                warnings.extend(unclear.map(|what| format!("{file}: {what}")));
+                statics.push(oriented(mesh, &name, &mut warnings));
+                continue;
             }
+            let body = Body::new(motion, start)?.with_noise(object.noise).with_name(name);
+            let (triangles, closed) = (body.motion().triangles().len(), body.closed_loops());
+            log::info!("{file}: {triangles} triangles, {closed} open loops closed");
+            if let Some(what) = body.warning() {
+                log::warn!("{file}: {what}");
+            }
+            warnings.extend(body.weld_warning().map(|what| format!("{file}: {what}")));
+            warnings.extend(too_small(scene, object, &body, start)?);
+            bodies.push(body);
         }
         warnings.extend(replaced(&scene.values));
         let drift = Drift::of(scene, snow.cell, &seen, &mut warnings)?;
         let wind = match wind::wind_file(scene) {
             None => None,
-            Some(path) => {
-                // OpenVDB reads the file itself: its content must be the same before and after.
-                seen.hash(path)?;
-                let wind = wind::wind(path)?;
-                seen.note(path, hash::of_file(path)?)?;
-                Some(wind)
-            }
+            Some(path) => Some(seen.around(path, || wind::wind(path))?),
         };
         warnings.iter().for_each(|warning| log::warn!("{warning}"));
         Ok(Self { snow, source, statics, bodies, drift, wind, seen, warnings })
@@ -141,10 +132,9 @@ impl Inputs {
     /// Minimum and maximum x and z of the snow (m), if known before it is made.
     pub fn area(&self) -> Option<[f64; 4]> {
         match &self.source {
-            Source::Made { ground: initial::Ground::Plane { area, .. }, .. } => Some(*area),
-            Source::Made { ground: initial::Ground::Mesh(mesh), .. } => {
-                let (low, high) = mesh.bounds()?;
-                Some([low.x, low.z, high.x, high.z].map(f64::from))
+            Source::Made { ground, .. } => {
+                let (low, high) = bounds_of(ground)?;
+                Some([low.x, low.z, high.x, high.z])
             }
             Source::Given { .. } => None,
         }
@@ -156,12 +146,9 @@ impl Inputs {
         match (&self.source, &self.snow.layer) {
             (Source::Made { cover: Cover::Top(top), .. }, _) => highest(top),
             (Source::Made { ground, .. }, Layer::Depth(depth)) => {
-                let ground = match ground {
-                    initial::Ground::Plane { height, .. } => Some(*height),
-                    initial::Ground::Mesh(mesh) => highest(mesh),
-                };
+                let (_, ground) = bounds_of(ground)?;
                 let statics = self.statics.iter().filter_map(highest).fold(f64::NEG_INFINITY, f64::max);
-                Some(ground?.max(statics) + depth)
+                Some(ground.y.max(statics) + depth)
             }
             _ => None,
         }
@@ -169,8 +156,6 @@ impl Inputs {
 
     /// Minimum and maximum corner of the snow's ground, top and static objects (m); for a given layer, of its active voxels.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        let of_mesh =
-            |mesh: &TriMesh| mesh.bounds().map(|(low, high)| (low.cast::<f64>(), high.cast::<f64>()));
         let (ground, top) = match &self.source {
             Source::Given { grid, .. } => {
                 let (low, high) = grid.active_bbox()?;
@@ -181,14 +166,8 @@ impl Inputs {
                 (ground, if let Cover::Top(top) = cover { of_mesh(top) } else { None })
             }
         };
-        let ground = match ground {
-            initial::Ground::Plane { height, area: [x0, z0, x1, z1] } => {
-                Some((DVec3::new(*x0, *height, *z0), DVec3::new(*x1, *height, *z1)))
-            }
-            initial::Ground::Mesh(mesh) => of_mesh(mesh),
-        };
         let all = self.statics.iter().map(of_mesh).chain([top]).flatten();
-        let (low, mut high) = all.fold(ground?, |(low, high), (l, h)| (low.inf(&l), high.sup(&h)));
+        let (low, mut high) = all.fold(bounds_of(ground)?, |(low, high), (l, h)| (low.inf(&l), high.sup(&h)));
         if let Layer::Depth(depth) = &self.snow.layer {
             high.y += depth;
         }
@@ -237,7 +216,7 @@ impl Inputs {
 
     /// The ground, if it is a mesh.
     pub(super) fn ground(&self) -> Option<&TriMesh> {
-        self.source.ground()
+        self.source.mesh("snow.ground")
     }
 
     /// Static objects, which the snow lies on.
@@ -268,16 +247,29 @@ impl Inputs {
 }
 
 impl Source {
-    fn ground(&self) -> Option<&TriMesh> {
-        match self {
-            Self::Made { ground: initial::Ground::Mesh(mesh), .. } => Some(mesh),
-            Self::Given { ground: Some(Under::Mesh(mesh)), .. } => Some(mesh),
+    /// The mesh of a key: `snow.ground` or `snow.top`.
+    fn mesh(&self, key: &str) -> Option<&TriMesh> {
+        match (key, self) {
+            ("snow.ground", Self::Made { ground: initial::Ground::Mesh(mesh), .. })
+            | ("snow.ground", Self::Given { ground: Some(Under::Mesh(mesh)), .. })
+            | ("snow.top", Self::Made { cover: Cover::Top(mesh), .. }) => Some(mesh),
             _ => None,
         }
     }
+}
 
-    fn top(&self) -> Option<&TriMesh> {
-        if let Self::Made { cover: Cover::Top(mesh), .. } = self { Some(mesh) } else { None }
+/// Minimum and maximum corner of a mesh (m).
+fn of_mesh(mesh: &TriMesh) -> Option<(DVec3, DVec3)> {
+    mesh.bounds().map(|(low, high)| (low.cast(), high.cast()))
+}
+
+/// Minimum and maximum corner of the snow's ground (m).
+fn bounds_of(ground: &initial::Ground) -> Option<(DVec3, DVec3)> {
+    match ground {
+        initial::Ground::Plane { height, area: [x0, z0, x1, z1] } => {
+            Some((DVec3::new(*x0, *height, *z0), DVec3::new(*x1, *height, *z1)))
+        }
+        initial::Ground::Mesh(mesh) => of_mesh(mesh),
     }
 }
 
@@ -317,46 +309,15 @@ fn under(snow: &Snow, seen: &InputHashes, warnings: &mut Vec<String>) -> Result<
     })
 }
 
-/// Warnings about a mesh of ground or top that lies far from the origin.
-fn far_meshes(snow: &Snow, source: &Source) -> Vec<String> {
-    let warning = |path: &Path, mesh: &TriMesh| {
-        far_mesh(&path.display().to_string(), mesh.farthest(), 1.0, snow.cell, FOR_SNOW)
-    };
-    /// No key moves these.
-    const FOR_SNOW: &str = "give snow.origin nearby, which is subtracted in 64 bits, or save it near the origin and move the scene there too";
-    let mut out = Vec::new();
-    if let (Some(Ground::Mesh(path)), Some(mesh)) = (&snow.ground, source.ground()) {
-        out.extend(warning(path, mesh));
-    }
-    if let (Layer::Top(path), Some(mesh)) = (&snow.layer, source.top()) {
-        out.extend(warning(path, mesh));
-    }
-    out
-}
-
-/// Warnings about corners of a mesh of ground or top that rounding does not decide.
-fn unclear_corners(snow: &Snow, source: &Source) -> Vec<String> {
-    let warning = |path: &Path, mesh: &TriMesh| {
-        let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
-        let what = Weld::of(&positions, &mesh.triangles).warning();
-        what.map(|what| format!("{}: {what}", path.display()))
-    };
-    let ground = match (&snow.ground, source.ground()) {
-        (Some(Ground::Mesh(path)), Some(mesh)) => warning(path, mesh),
-        _ => None,
-    };
-    let top = match (&snow.layer, source.top()) {
-        (Layer::Top(path), Some(mesh)) => warning(path, mesh),
-        _ => None,
-    };
-    ground.into_iter().chain(top).collect()
+/// The warning about corners of a mesh of ground or top that rounding does not decide.
+fn unclear_corners(path: &Path, mesh: &TriMesh) -> Option<String> {
+    let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.cast()).collect();
+    let what = Weld::of(&positions, &mesh.triangles).warning();
+    what.map(|what| format!("{}: {what}", path.display()))
 }
 
 fn layer_grid(path: &Path, cell: f64, seen: &InputHashes) -> Result<FloatGrid> {
-    // OpenVDB reads the file itself: its content must be the same before and after.
-    seen.hash(path)?;
-    let grid = file::read_named(path, None)?;
-    seen.note(path, hash::of_file(path)?)?;
+    let grid = seen.around(path, || file::read_named(path, None))?;
     if grid.class() != GridClass::LevelSet {
         return Err(Error::file(path, format!("grid \"{}\" is not a level set", grid.name())));
     }
@@ -403,7 +364,7 @@ fn motion(
         }
     };
     let mut pose = Vec::new();
-    own.pose(f64::from(scene.shot.frames.first) / fps, &mut pose)?;
+    own.pose(scene.shot.time(scene.shot.frames.first), &mut pose)?;
     // Meshes are read minus the origin.
     let space = if is_gltf(&object.file) { object.space } else { object.space.without_origin() };
     pose.iter_mut().for_each(|position| *position -= space.origin);

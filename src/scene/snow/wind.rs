@@ -8,7 +8,7 @@ use crate::vdb::{AnyGrid, VectorGrid, file};
 
 /// The file of a scene's wind, if it is a grid.
 pub(in crate::scene::snow) fn wind_file(scene: &Scene) -> Option<&Path> {
-    scene.values.get("mist.wind").and_then(|value| value.path())
+    scene.values.table("mist").value("wind")?.path()
 }
 
 /// The wind of a file: its first grid of vectors.

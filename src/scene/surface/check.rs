@@ -60,11 +60,10 @@ impl Report {
     /// # Errors
     /// [`Error::Memory`] names the counts of particles and triangles.
     pub fn check_memory(&self, limit: u64) -> Result<()> {
-        if self.memory_bytes <= limit {
-            return Ok(());
-        }
-        let what = format!("surface of {} particles and {} triangles", self.particles[1], self.triangles);
-        Err(Error::Memory { what, needed: self.memory_bytes, limit })
+        let [particles, triangles] = [self.particles[1], self.triangles];
+        Error::check_memory(self.memory_bytes, limit, || {
+            format!("surface of {particles} particles and {triangles} triangles")
+        })
     }
 }
 

@@ -3,6 +3,7 @@
 
 #[cfg(feature = "vdb")]
 mod check;
+#[cfg(feature = "vdb")]
 mod estimate;
 #[cfg(feature = "vdb")]
 mod inputs;
@@ -23,9 +24,9 @@ pub use {
 };
 
 use super::Frames;
-use super::schema::{Value, Values};
+use super::schema::Values;
 use crate::io::files::sequence::Pattern;
-use crate::motion::{Space, Up};
+use crate::motion::Space;
 use crate::surface::Weighting;
 
 /// A mesh that follows the particles of a liquid, and its output.
@@ -89,42 +90,35 @@ pub struct Files {
 impl Surface {
     /// The mesh of a scene; `None` if it has no such table.
     pub(super) fn of(values: &Values) -> Option<Self> {
-        let value = |name: &str| values.get(&format!("surface.{name}"));
-        let number = |name: &str| value(name).and_then(Value::number);
-        let text = |name: &str| value(name).and_then(Value::text);
-        let asked = |name: &str, text: &str| values.get(name).is_some_and(|value| value.holds(text));
+        let (own, output) = (values.table("surface"), values.table("output"));
         Some(Self {
-            particles: value("particles")?.path()?.to_path_buf(),
-            mesh: value("mesh").and_then(Value::path).map(Into::into),
-            resculpt: value("resculpt").and_then(Value::path).map(Into::into),
-            space: Space {
-                scale: values.settled("surface", None, "scale"),
-                up: if text("up") == Some("z") { Up::Z } else { Up::Y },
-                origin: value("origin").and_then(Value::numbers::<3>).unwrap_or_default().into(),
-            },
-            offset: values.settled("surface", None, "offset"),
-            speed: values.settled("surface", None, "speed"),
-            spacing: number("spacing"),
-            cell: values.settled("surface", None, "cell"),
-            change: values.settled("surface", None, "change"),
-            rebuild: values.settled("surface", None, "rebuild"),
-            every: text("match") == Some("every"),
-            min_drop: values.settled::<i64>("surface", None, "min_drop") as usize,
-            ahead: values.settled::<i64>("surface", None, "ahead") as i32,
-            weighting: match text("weighting") {
+            particles: own.find("particles")?,
+            mesh: own.find("mesh"),
+            resculpt: own.find("resculpt"),
+            space: own.space(),
+            offset: own.get("offset"),
+            speed: own.get("speed"),
+            spacing: own.find("spacing"),
+            cell: own.get("cell"),
+            change: own.get("change"),
+            rebuild: own.get("rebuild"),
+            every: own.text("match") == Some("every"),
+            min_drop: own.get("min_drop"),
+            ahead: own.get("ahead"),
+            weighting: match own.text("weighting") {
                 Some("mean") => Weighting::Mean,
                 _ => Weighting::Affine,
             },
-            half_life: number("half_life"),
-            fade: values.settled("surface", None, "fade"),
+            half_life: own.find("half_life"),
+            fade: own.get("fade"),
             output: Files {
-                ply: asked("output.surface", "ply"),
-                obj: asked("output.surface", "obj"),
-                usd: asked("output.surface", "usd"),
-                velocities: asked("output.attributes", "v"),
-                delta: asked("output.attributes", "delta"),
-                flagged: asked("output.attributes", "flagged"),
-                rebuilt: asked("output.attributes", "rebuilt"),
+                ply: output.holds("surface", "ply"),
+                obj: output.holds("surface", "obj"),
+                usd: output.holds("surface", "usd"),
+                velocities: output.holds("attributes", "v"),
+                delta: output.holds("attributes", "delta"),
+                flagged: output.holds("attributes", "flagged"),
+                rebuilt: output.holds("attributes", "rebuilt"),
             },
         })
     }

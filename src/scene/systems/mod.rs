@@ -15,7 +15,7 @@ mod tests {
     use crate::io::records::input_hashes::InputHashes;
     use crate::scene::run::settings::settings_of;
     use crate::scene::schema::Value;
-    use crate::scene::schema::key::{Key, Kind, Scope, or};
+    use crate::scene::schema::key::{Key, Kind, Scope, key, or};
     use crate::scene::schema::values::path;
     use crate::scene::schema::{reference_of, template_of};
     use std::path::Path;
@@ -25,9 +25,9 @@ mod tests {
 
     /// All keys of snow and a new one, which is declared only here.
     fn with_a_new_key() -> &'static [Key] {
-        let new = Key::new("snow", "glitter", Kind::Number(0.0, 2.0, "m"), or("0.5"))
-            .means("how far it can be seen")
-            .concerns(&[("base", Scope::Step)]);
+        let glitter = Kind::Number(0.0, 2.0, "m");
+        let new = key(&[("base", Scope::Step)], "snow", "glitter", glitter, or("0.5"))
+            .means("how far it can be seen");
         let mut keys = keys::of(System::Snow).to_vec();
         let last = keys.iter().rposition(|key| key.table == "snow").unwrap();
         keys.insert(last + 1, new);

@@ -1,84 +1,67 @@
 //! Typed data shared by all systems, from the values of a scene: the shot, the objects, the output.
 
 use crate::error::Result;
-use crate::motion::{Space, Up};
+use crate::scene::schema::key::OBJECT;
 use crate::scene::schema::toml_table::Table;
-use crate::scene::schema::values::{Value, Values};
-use crate::scene::{BaseMode, Frames, Object, Output, Role, Shot, VolumesOutput, snow};
+use crate::scene::schema::values::{TableValues, Values};
+use crate::scene::{BaseMode, Object, Output, Shot, VolumesOutput, snow};
 
 impl Shot {
     pub(in crate::scene) fn of(values: &Values) -> Self {
-        let frames = match values.get("shot.frames") {
-            Some(Value::Frames(frames)) => *frames,
-            _ => Frames { first: 0, last: 0 },
-        };
-        Self { frames, fps: values.settled("shot", None, "fps") }
+        let shot = values.table("shot");
+        Self { frames: shot.get("frames"), fps: shot.get("fps") }
     }
 }
 
 impl Object {
     /// The objects of a scene, in the file's order.
     pub(in crate::scene) fn all_of(values: &Values) -> Vec<Self> {
-        let is_there = |index: &usize| values.of_object(*index, "file").is_some();
-        (0..).take_while(is_there).map(|index| Self::of(values, index)).collect()
+        (0..values.count(OBJECT)).map(|index| Self::of(values.one(OBJECT, index))).collect()
     }
 
-    fn of(values: &Values, index: usize) -> Self {
-        let value = |name: &str| values.of_object(index, name);
-        let text = |name: &str| value(name).and_then(Value::text);
-        let flag = |name: &str| value(name).and_then(Value::flag).unwrap_or(false);
-        let number = |name: &str| value(name).and_then(Value::number).unwrap_or(0.0);
+    fn of(values: TableValues) -> Self {
         Self {
-            file: value("file").and_then(Value::path).map(Into::into).unwrap_or_default(),
-            node: text("node").map(str::to_string),
-            clip: text("clip").map(str::to_string),
-            repeat: value("loop").is_none() || flag("loop"),
-            offset: number("offset"),
-            space: Space {
-                scale: number("scale"),
-                up: if text("up") == Some("z") { Up::Z } else { Up::Y },
-                origin: value("origin").and_then(Value::numbers::<3>).unwrap_or_default().into(),
-            },
-            role: match text("role") {
-                Some("base") => Role::Base,
-                Some("grains") => Role::Grains,
-                Some("static") => Role::Static,
-                Some("ignore") => Role::Ignore,
-                _ => Role::Collide,
-            },
-            noise: flag("noise"),
-            keys: if let Some(Value::Poses(poses)) = value("keys") { poses.clone() } else { Vec::new() },
-            ease: flag("ease"),
+            file: values.get("file"),
+            node: values.find("node"),
+            clip: values.find("clip"),
+            repeat: values.get("loop"),
+            offset: values.get("offset"),
+            space: values.space(),
+            role: values.get("role"),
+            noise: values.get("noise"),
+            keys: values.get("keys"),
+            ease: values.get("ease"),
         }
     }
 }
 
 impl Output {
     pub(in crate::scene) fn of(values: &Values) -> Self {
-        let holds = |name: &str, text: &str| values.get(name).is_some_and(|value| value.holds(text));
-        let flag = |name: &str| values.get(name).and_then(Value::flag).unwrap_or(false);
-        let mode = values.get("output.base_mode").and_then(Value::text);
+        // A system declares only the keys of files that it has.
+        let output = values.table("output");
+        let is_on = |name: &str| output.find(name) == Some(true);
+        let is_delta = |name: &str| output.text(name) == Some("delta");
         Self {
-            base: holds("output.base", "vdb"),
-            base_mode: if mode == Some("delta") { BaseMode::Delta } else { BaseMode::Full },
-            half: flag("output.half"),
-            removed: holds("output.removed", "vdb"),
-            grains_vdb: holds("output.grains", "vdb"),
-            grains_ply: holds("output.grains", "ply"),
-            grains_usd: holds("output.grains", "usd"),
-            grains_delta: values.get("output.grains_mode").and_then(Value::text) == Some("delta"),
-            mist: holds("output.mist", "vdb"),
+            base: output.holds("base", "vdb"),
+            base_mode: if is_delta("base_mode") { BaseMode::Delta } else { BaseMode::Full },
+            half: is_on("half"),
+            removed: output.holds("removed", "vdb"),
+            grains_vdb: output.holds("grains", "vdb"),
+            grains_ply: output.holds("grains", "ply"),
+            grains_usd: output.holds("grains", "usd"),
+            grains_delta: is_delta("grains_mode"),
+            mist: output.holds("mist", "vdb"),
             volumes: VolumesOutput {
-                fog_base: holds("output.fog", "base"),
-                fog_grains: holds("output.fog", "grains"),
-                fog_mist: holds("output.fog", "mist"),
-                snow: flag("output.snow"),
-                mesh_ply: holds("output.mesh", "ply"),
-                mesh_usd: holds("output.mesh", "usd"),
+                fog_base: output.holds("fog", "base"),
+                fog_grains: output.holds("fog", "grains"),
+                fog_mist: output.holds("fog", "mist"),
+                snow: is_on("snow"),
+                mesh_ply: output.holds("mesh", "ply"),
+                mesh_usd: output.holds("mesh", "usd"),
             },
-            objects_usd: holds("output.objects", "usd"),
-            objects_ply: holds("output.objects", "ply"),
-            usd: flag("output.usd"),
+            objects_usd: output.holds("objects", "usd"),
+            objects_ply: output.holds("objects", "ply"),
+            usd: is_on("usd"),
         }
     }
 
@@ -88,8 +71,9 @@ impl Output {
     /// 16-bit values where changes are stored, which must be exact.
     pub(in crate::scene) fn check(table: &Table, values: &Values) -> Result<()> {
         let output = Self::of(values);
-        if snow::has_grains(values) && (output.half || !output.base) {
-            let key = if output.half { "half" } else { "base" };
+        if snow::has_grains(values)
+            && let Some(key) = output.inexact_base()
+        {
             return Err(
                 table.error(key, "leaves out what `[grains]` reads of every frame: exact values of the base")
             );

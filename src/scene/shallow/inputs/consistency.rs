@@ -4,6 +4,8 @@ use super::scalars;
 use crate::error::Result;
 use crate::io::files::sequence::Pattern;
 use crate::io::mesh::{EXTENSIONS, extension};
+use crate::scene::Frames;
+use crate::scene::schema::key::OBJECT;
 use crate::scene::schema::{Table, Value, Values};
 use crate::scene::shallow::{Form, Obstacle, Shallow};
 
@@ -14,7 +16,7 @@ impl Shallow {
     /// Keys that exclude each other, or one that others need.
     pub(in crate::scene) fn check(table: &Table, values: &Values) -> Result<()> {
         let Some(shallow) = Self::of(values) else { return Ok(()) };
-        let has = |name: &str| values.get(&format!("shallow.{name}")).is_some();
+        let has = |name: &str| values.table("shallow").value(name).is_some();
         let kind = extension(&shallow.terrain);
         let is_mesh = EXTENSIONS.contains(&&*kind);
         for name in ["terrain_size", "terrain_height"] {
@@ -76,33 +78,27 @@ impl Shallow {
         table: &Table,
         values: &Values,
     ) -> Result<()> {
+        let own = values.one(name, index);
         match name {
             "object" => check_object(index, table, values),
             "scalar" => scalars::check(index, table, values),
             "pour" => {
                 scalars::check_brought(name, index, table, values)?;
-                let frame = values.of_many(name, index, "frame").and_then(Value::whole);
-                let Some(Value::Frames(frames)) = values.get("shot.frames") else { return Ok(()) };
-                match frame.filter(|frame| *frame < i64::from(frames.first)) {
-                    Some(_) => {
-                        let what = format!("must not lie before the shot's first frame, {}", frames.first);
-                        Err(table.error("frame", what))
-                    }
-                    None => Ok(()),
+                let first = values.table("shot").get::<Frames>("frames").first;
+                if own.find::<i32>("frame").is_some_and(|frame| frame < first) {
+                    let what = format!("must not lie before the shot's first frame, {first}");
+                    return Err(table.error("frame", what));
                 }
+                Ok(())
             }
             _ => {
                 scalars::check_brought(name, index, table, values)?;
-                let value = |key: &str| values.of_many(name, index, key);
                 let terrain = values.get("shallow.terrain").and_then(Value::path);
-                if value("follows").and_then(Value::flag) == Some(true)
-                    && terrain.and_then(Pattern::parse).is_none()
-                {
+                if own.get("follows") && terrain.and_then(Pattern::parse).is_none() {
                     let what = "must be false where the terrain does not move: it needs a sequence of meshes, as \"organ.%04d.ply\"";
                     return Err(table.error("follows", what));
                 }
-                let frame = |key: &str| value(key).and_then(Value::whole);
-                match (frame("from"), frame("until")) {
+                match (own.find::<i32>("from"), own.find::<i32>("until")) {
                     (Some(from), Some(until)) if from > until => {
                         Err(table.error("until", format!("must not lie before `from`, {from}")))
                     }
@@ -114,9 +110,9 @@ impl Shallow {
 }
 
 fn check_object(index: usize, table: &Table, values: &Values) -> Result<()> {
-    let value = |name: &str| values.of_object(index, name);
-    let shape = value("shape").and_then(Value::text);
-    match (shape, value("file")) {
+    let own = values.one(OBJECT, index);
+    let shape = own.text("shape");
+    match (shape, own.value("file")) {
         (None, None) => return Err(table.error("shape", "is missing (or `file`, a mesh)")),
         (Some(_), Some(_)) => return Err(table.error("file", "excludes `shape`: give one of them")),
         _ => {}
@@ -128,7 +124,7 @@ fn check_object(index: usize, table: &Table, values: &Values) -> Result<()> {
         None => &[],
     };
     for name in ["radius", "length", "size"] {
-        match (needed.contains(&name), value(name)) {
+        match (needed.contains(&name), own.value(name)) {
             (true, None) => {
                 return Err(table.error(name, format!("is missing: a {} has one", shape.unwrap_or(""))));
             }

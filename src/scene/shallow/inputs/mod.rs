@@ -11,7 +11,7 @@ pub(in crate::scene::shallow) mod terrain;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::estimate::memory;
+use super::estimate;
 use super::{Point, Shallow};
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -93,7 +93,7 @@ impl Inputs {
             warnings.extend(too_far(&path, mesh, grid.cell));
         }
         // A terrain in millimetres by mistake has too many cells.
-        memory::allow_cells(ctx, &grid)
+        estimate::allow_cells(ctx, &grid)
             .inspect_err(|_| warnings.iter().for_each(|warning| log::warn!("{warning}")))?;
         let orientation = terrain.turn_outward();
         warnings.extend(orientation.warning().map(|what| format!("{}: {what}", path.display())));

@@ -27,39 +27,34 @@ impl Carried {
     }
 
     fn of(values: &Values, index: usize) -> Self {
-        let value = |name: &str| values.of_many("scalar", index, name);
-        let number = |name: &str| value(name).and_then(Value::number);
-        let text = |name: &str| value(name).and_then(Value::text);
-        let law = match (text("law"), number("half_life")) {
+        let own = values.one("scalar", index);
+        let law = match (own.text("law"), own.find("half_life")) {
             (Some("decays"), Some(half_life)) => Law::Decays(half_life),
             (Some("ages"), _) => Law::Ages,
             _ => Law::Dye,
         };
-        let name = text("name").unwrap_or_default().into();
-        let scalar = Scalar { name, law, range: values.settled("scalar", Some(index), "range") };
-        Self { scalar, start: values.settled("scalar", Some(index), "start") }
+        let scalar = Scalar { name: own.get("name"), law, range: own.get("range") };
+        Self { scalar, start: own.get("start") }
     }
 }
 
 /// How a scalar thickens the liquid: the first that does.
 pub(in crate::scene::shallow) fn thickening(values: &Values) -> Option<Thickening> {
     (0..values.count("scalar")).find_map(|scalar| {
-        let number = |name: &str| values.of_many("scalar", scalar, name).and_then(Value::number);
-        let (times, to) = (number("thickens_times")?, number("thickens_to")?);
-        let from = values.settled("scalar", Some(scalar), "thickens_from");
-        Some(Thickening { scalar, from, to, times })
+        let own = values.one("scalar", scalar);
+        let (times, to) = (own.find("thickens_times")?, own.find("thickens_to")?);
+        Some(Thickening { scalar, from: own.get("thickens_from"), to, times })
     })
 }
 
 /// The scalar that stains: the first that does.
 pub(in crate::scene::shallow) fn staining(values: &Values) -> Option<usize> {
-    (0..values.count("scalar"))
-        .find(|index| values.of_many("scalar", *index, "stains").and_then(Value::flag) == Some(true))
+    (0..values.count("scalar")).find(|index| values.one("scalar", *index).get("stains"))
 }
 
 /// Concentrations of the scalars in the liquid of a pour or a source: those that its `carries` names, and the defaults of the others.
 pub(in crate::scene::shallow) fn brought(values: &Values, table: &str, index: usize) -> Vec<f64> {
-    let named = values.of_many(table, index, "carries").and_then(Value::named);
+    let named = values.one(table, index).value("carries").and_then(Value::named);
     let own = |carried: Carried| {
         named.and_then(|named| named.get(&carried.scalar.name)).copied().unwrap_or(carried.start)
     };
@@ -93,8 +88,8 @@ pub(in crate::scene::shallow) fn check(index: usize, table: &Table, values: &Val
     if all[..index].iter().any(|other| other.scalar.name == scalar.name) {
         return Err(table.error("name", format!("must not be \"{name}\": another scalar has that name")));
     }
-    let law = values.of_many("scalar", index, "law").and_then(Value::text);
-    match (law, table.has("half_life")) {
+    let own = values.one("scalar", index);
+    match (own.text("law"), table.has("half_life")) {
         (Some("decays"), false) => {
             return Err(table.error("half_life", "is missing: a scalar that decays has one"));
         }
@@ -106,8 +101,8 @@ pub(in crate::scene::shallow) fn check(index: usize, table: &Table, values: &Val
     if start.abs() > scalar.range {
         return Err(table.error("start", format!("must lie within -{0} to {0}, its range", scalar.range)));
     }
-    if values.of_many("scalar", index, "stains").and_then(Value::flag) == Some(true) {
-        if values.get("shallow.stains").and_then(Value::flag) != Some(true) {
+    if own.get("stains") {
+        if !values.table("shallow").get::<bool>("stains") {
             return Err(table.error("stains", "must be false where shallow.stains is"));
         }
         if staining(values).is_some_and(|first| first < index) {
@@ -122,17 +117,17 @@ pub(in crate::scene::shallow) fn check(index: usize, table: &Table, values: &Val
 /// # Errors
 /// A key without the others; a concentration out of range; a second scalar that thickens, or a liquid that cannot be thickened.
 fn check_thickening(index: usize, table: &Table, values: &Values, range: f64) -> Result<()> {
-    let number = |name: &str| values.of_many("scalar", index, name).and_then(Value::number);
-    if number("thickens_times").is_none() {
+    let own = values.one("scalar", index);
+    if own.value("thickens_times").is_none() {
         return match table.has("thickens_to") {
             true => Err(table.error("thickens_to", "is of a scalar that has `thickens_times`: leave it out")),
             false => Ok(()),
         };
     }
-    let Some(to) = number("thickens_to") else {
+    let Some(to) = own.find("thickens_to") else {
         return Err(table.error("thickens_to", "is missing: a scalar with `thickens_times` has one"));
     };
-    let from: f64 = values.settled("scalar", Some(index), "thickens_from");
+    let from: f64 = own.get("thickens_from");
     for (name, concentration) in [("thickens_from", from), ("thickens_to", to)] {
         if concentration.abs() > range {
             return Err(table.error(name, format!("must lie within -{range} to {range}, its range")));
@@ -160,7 +155,7 @@ pub(in crate::scene::shallow) fn check_brought(
     table: &Table,
     values: &Values,
 ) -> Result<()> {
-    let Some(named) = values.of_many(name, index, "carries").and_then(Value::named) else { return Ok(()) };
+    let Some(named) = values.one(name, index).value("carries").and_then(Value::named) else { return Ok(()) };
     let all = Carried::all_of(values);
     for (name, concentration) in named {
         let Some(Carried { scalar, .. }) = all.iter().find(|carried| carried.scalar.name == *name) else {

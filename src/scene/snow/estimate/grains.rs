@@ -6,6 +6,7 @@ use super::{disk, memory};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::scene::run::Stored;
+use crate::scene::schema::key::OBJECT;
 use crate::scene::snow::Inputs;
 use crate::scene::snow::grain_params::params;
 use crate::snow::grains::PACKING;
@@ -54,7 +55,7 @@ impl Forecast {
         }
         let params = params(scene, inputs.snow.cell);
         let takers = scene.objects.iter().enumerate().filter(|(_, object)| object.role.removes());
-        let own = |index| scene.values.of_object(index, "compression").and_then(|value| value.number());
+        let own = |index| scene.values.one(OBJECT, index).find("compression");
         let all: Vec<f64> = takers.map(|(index, _)| own(index).unwrap_or(params.compression)).collect();
         let compression = all.iter().copied().reduce(f64::min).unwrap_or(params.compression);
         let grain = std::f64::consts::PI / 6.0 * (2.0 * params.radius).powi(3);
@@ -83,11 +84,8 @@ impl Forecast {
         if self.grains as f64 > (1.0 + OFF) * most(scene) as f64 {
             return Err(Error::argument(self.too_many(scene)));
         }
-        if self.memory_bytes > limit {
-            let what = format!("{}: stage grains with {}", scene.path.display(), self.count());
-            return Err(Error::Memory { what, needed: self.memory_bytes, limit });
-        }
-        Ok(())
+        let what = || format!("{}: stage grains with {}", scene.path.display(), self.count());
+        Error::check_memory(self.memory_bytes, limit, what)
     }
 
     /// The warning for an estimate over `grains.max` by no more than its error.
@@ -116,8 +114,7 @@ impl Forecast {
 
 /// The maximum number of grains of a scene.
 fn most(scene: &Scene) -> u64 {
-    let most = scene.values.get("grains.max").and_then(|value| value.whole());
-    most.map_or(u64::MAX, |most| most as u64)
+    scene.values.table("grains").get("max")
 }
 
 /// Count of grains after each frame, given those born in each and their lifetime in frames.

@@ -48,19 +48,13 @@ pub(in crate::scene::snow) fn of_volumes(scene: &Scene, inputs: &Inputs, grains:
     let layer = layer(inputs)?;
     let columns = layer / BYTES_PER_COLUMN;
     let fine = if needs.grains { division(scene, inputs) as f64 } else { 1.0 };
-    let parts = [
-        (needs.base, layer),
-        (asked.fog_base, layer),
-        (asked.snow, layer * fine * fine),
-        (asked.mesh(), columns * BYTES_OF_MESH),
-    ];
-    let base: f64 = parts.into_iter().filter(|(is_there, _)| *is_there).map(|(_, bytes)| bytes).sum();
-    let each = [
-        (needs.grains, BYTES_OF_POINT),
-        (asked.fog_grains, BYTES_OF_FOG),
-        (needs.grains && asked.snow, BYTES_OF_UNITED),
-    ];
-    let each: u64 = each.into_iter().filter(|(is_there, _)| *is_there).map(|(_, bytes)| bytes).sum();
+    let base = f64::from(needs.base) * layer
+        + f64::from(asked.fog_base) * layer
+        + f64::from(asked.snow) * layer * fine * fine
+        + f64::from(asked.mesh()) * columns * BYTES_OF_MESH;
+    let each = u64::from(needs.grains) * BYTES_OF_POINT
+        + u64::from(asked.fog_grains) * BYTES_OF_FOG
+        + u64::from(needs.grains && asked.snow) * BYTES_OF_UNITED;
     let there = needs.base || needs.grains;
     Ok(if there { (base + FIXED) as u64 + grains * each } else { 0 })
 }
@@ -107,9 +101,5 @@ fn layer(inputs: &Inputs) -> Result<f64> {
 /// # Errors
 /// [`Error::Memory`] names the cell size; or as [`estimate`].
 pub fn check(scene: &Scene, inputs: &Inputs, limit: u64) -> Result<()> {
-    let needed = estimate(scene, inputs)?;
-    if needed > limit {
-        return Err(Error::Memory { what: format!("cell = {} m", inputs.snow.cell), needed, limit });
-    }
-    Ok(())
+    Error::check_memory(estimate(scene, inputs)?, limit, || format!("cell = {} m", inputs.snow.cell))
 }

@@ -102,15 +102,13 @@ impl MistForecast {
     /// # Errors
     /// [`Error::Memory`] names the count of cells and its origin.
     pub fn check(&self, limit: u64) -> Result<()> {
-        if self.memory_bytes <= limit {
-            return Ok(());
-        }
         let from = match self.made_to_frame {
             Some(frame) => format!("as many as it had up to frame {frame}"),
             None => "as many as fill the boxes that objects pass".to_string(),
         };
-        let what = format!("mist of {} cells of {} m, {from},", self.cells, rounded(self.cell_m));
-        Err(Error::Memory { what, needed: self.memory_bytes, limit })
+        Error::check_memory(self.memory_bytes, limit, || {
+            format!("mist of {} cells of {} m, {from},", self.cells, rounded(self.cell_m))
+        })
     }
 
     /// The maximum cells of a step under a memory limit (bytes).

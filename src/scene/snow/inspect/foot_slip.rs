@@ -47,9 +47,9 @@ pub(in crate::scene::snow) fn walk(
     let round = own.duration();
     let own = Placed::new(Box::new(own), object.space, Keys::default());
     let Some(own) = gait(&own, 0.0, round)?.filter(|gait| gait.is_steady()) else { return Ok(None) };
-    let (frames, fps) = (scene.shot.frames, scene.shot.fps);
-    let start = f64::from(frames.first) / fps;
-    let end = (start + round).min(f64::from(frames.last) / fps);
+    let frames = scene.shot.frames;
+    let start = scene.shot.time(frames.first);
+    let end = (start + round).min(scene.shot.time(frames.last));
     let Some(carried) = gait(moved, start, end)? else { return Ok(None) };
     let (speed, slips) = (own.velocity.norm(), carried.velocity.norm());
     Ok(Some(Walk {

@@ -143,7 +143,7 @@ impl<'a> ObjectPath<'a> {
     fn holes(&self) -> Result<usize> {
         let mut pose = Vec::new();
         let shot = self.scene.shot;
-        self.body.motion().pose(f64::from(shot.frames.first) / shot.fps, &mut pose)?;
+        self.body.motion().pose(shot.time(shot.frames.first), &mut pose)?;
         Ok(faults::holes(&pose, self.body.motion().triangles(), self.body.corners()))
     }
 
@@ -169,7 +169,7 @@ impl<'a> ObjectPath<'a> {
             far + extent.moved > near
         };
         let reach = Reach::of_snow(cell, low, high)?;
-        let time = |frame: i32| f64::from(frame) / scene.shot.fps;
+        let time = |frame: i32| scene.shot.time(frame);
         for frame in extents.iter().filter(|extent| is_far(extent)).map(|extent| extent.frame) {
             let before = (frame - 1).max(scene.shot.frames.first);
             match reach.spans(ctx, body, time(before), time(frame)) {
@@ -185,10 +185,9 @@ impl<'a> ObjectPath<'a> {
 
     /// The first frame in which a body rotates too far for one step.
     fn too_fast(&self) -> Option<String> {
-        let Self { scene, body, .. } = self;
-        let time = |frame: i32| f64::from(frame) / scene.shot.fps;
-        scene.shot.frames.iter().skip(1).find_map(|frame| {
-            let error = body.turning(time(frame - 1), time(frame)).err()?;
+        let shot = self.scene.shot;
+        shot.frames.iter().skip(1).find_map(|frame| {
+            let error = self.body.turning(shot.time(frame - 1), shot.time(frame)).err()?;
             Some(format!("frame {frame} cannot be made: {error}"))
         })
     }
@@ -264,7 +263,7 @@ impl<'a> ObjectPath<'a> {
 fn extents(ctx: &Context, scene: &Scene, body: &Body) -> Result<Vec<Extent>> {
     let frames: Vec<i32> = scene.shot.frames.iter().collect();
     let of_run = |run: &[i32]| -> Result<Vec<Extent>> {
-        let at = |frame: i32| f64::from(frame) / scene.shot.fps;
+        let at = |frame: i32| scene.shot.time(frame);
         // The first frame of a run is compared with the frame before it, if the shot has one.
         let mut time = at((run[0] - 1).max(scene.shot.frames.first));
         let mut poses = Poses::start(body.motion(), time)?;

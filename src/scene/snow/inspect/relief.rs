@@ -6,46 +6,44 @@ use crate::scene::snow::Inputs;
 use crate::snow::base_layer::initial::{Cover, Ground};
 
 /// The ground and the snow on it, as far as heights are known before the layer is made.
-pub(in crate::scene::snow) struct Relief<'a> {
-    ground: Surface<'a>,
+pub(in crate::scene::snow) struct Relief {
+    ground: Surface,
     /// Depth of the snow above the ground (m), or its top.
-    snow: Snow<'a>,
+    snow: Snow,
 }
 
-enum Surface<'a> {
+enum Surface {
     Plane { height: f64, area: [f64; 4] },
-    Mesh(Heights<'a>),
+    Mesh(Heights),
 }
 
-enum Snow<'a> {
+enum Snow {
     Depth(f64),
-    Top(Heights<'a>),
+    Top(Heights),
 }
 
 /// Heights of a mesh seen from above.
-struct Heights<'a> {
-    mesh: &'a TriMesh,
+struct Heights {
     tree: Bvh,
     above: f64,
 }
 
-impl<'a> Heights<'a> {
-    fn new(mesh: &'a TriMesh) -> Self {
+impl Heights {
+    fn new(mesh: &TriMesh) -> Self {
         let above =
             mesh.bounds().map_or(0.0, |(low, high)| f64::from(high.y) + f64::from((high - low).norm()) + 1.0);
-        Self { mesh, tree: Bvh::new(mesh), above }
+        Self { tree: Bvh::new(mesh), above }
     }
 
     fn at(&self, x: f64, z: f64) -> Option<f64> {
         let hit = self.tree.ray(DVec3::new(x, self.above, z), -DVec3::y(), f64::INFINITY)?;
-        debug_assert!(hit.triangle < self.mesh.triangles.len());
         Some(self.above - hit.distance)
     }
 }
 
-impl<'a> Relief<'a> {
+impl Relief {
     /// The relief of a scene; none when the snow is given as a level set.
-    pub fn new(inputs: &'a Inputs) -> Option<Self> {
+    pub fn new(inputs: &Inputs) -> Option<Self> {
         let (ground, cover) = inputs.made()?;
         let ground = match ground {
             Ground::Plane { height, area } => Surface::Plane { height: *height, area: *area },

@@ -2,9 +2,7 @@
 
 use crate::error::Result;
 use crate::motion::span;
-use crate::scene::schema::key::Fallback;
-use crate::scene::schema::{Values, rounded};
-use crate::scene::snow::GRAIN_KEYS;
+use crate::scene::schema::{Value, Values, rounded};
 use crate::scene::{Object, Scene};
 use crate::sweep::Body;
 
@@ -14,23 +12,11 @@ pub(in crate::scene::snow) fn replaced(values: &Values) -> Vec<String> {
     let pairs = [("friction", "repose_angle_deg"), ("attraction", "stands")];
     let given = pairs.into_iter().filter_map(|(key, other)| Some((key, number(key)?, other, number(other)?)));
     given
-        .filter(|(_, _, other, value)| left_out(values, other) != Some(*value))
+        .filter(|(_, _, other, value)| values.declared("grains", other) != Some(Value::Number(*value)))
         .map(|(key, own, other, value)| {
             format!("grains.{key} = {own} replaces grains.{other} = {value}, which has no effect")
         })
         .collect()
-}
-
-/// The default of a number of `[grains]`, given the preset.
-fn left_out(values: &Values, name: &str) -> Option<f64> {
-    let key = GRAIN_KEYS.iter().find(|key| key.table == "grains" && key.name == name)?;
-    let chosen = values.get("grains.preset").and_then(|preset| preset.text());
-    let of_preset = key.presets.iter().find(|(preset, _)| Some(*preset) == chosen);
-    match (of_preset, key.fallback) {
-        (Some((_, value)), _) => value.parse().ok(),
-        (None, Fallback::Is(value)) => value.parse().ok(),
-        _ => None,
-    }
 }
 
 /// The warning about an object that removes snow and is smaller than a grain at a time (s).

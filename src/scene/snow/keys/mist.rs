@@ -2,44 +2,37 @@
 
 use crate::error::{Error, Result};
 use crate::scene::schema::key::Kind::{Cells, Flag, Number, NumbersOrFile, Whole};
-use crate::scene::schema::key::{Key, Kind, Scope, Unset, optional, or, or_cells};
+use crate::scene::schema::key::{Key, Scope, Scopes, key, optional, or, or_cells};
 use crate::scene::schema::{Table, Values};
 use crate::scene::snow::has_grains;
 use crate::snow::mist::{FASTEST_WIND, Params};
 
-/// A key that changes the first state.
-const fn first(table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Key {
-    Key::new(table, name, kind, unset).concerns(&[("mist", Scope::First)])
-}
-
-/// A key that changes every step.
-const fn step(table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Key {
-    Key::new(table, name, kind, unset).concerns(&[("mist", Scope::Step)])
-}
+const FIRST: Scopes = &[("mist", Scope::First)];
+const STEP: Scopes = &[("mist", Scope::Step)];
 
 /// All of them.
 pub const MIST_KEYS: &[Key] = &[
-    first("mist", "cell", Cells(0.25, 64.0), or_cells(4.0 / 3.0)).means("edge of a cell of air (m)"),
-    step("mist", "from_speed", Number(0.0, 1000.0, "m/s"), or("2.0"))
+    key(FIRST, "mist", "cell", Cells(0.25, 64.0), or_cells(4.0 / 3.0)).means("edge of a cell of air (m)"),
+    key(STEP, "mist", "from_speed", Number(0.0, 1000.0, "m/s"), or("2.0"))
         .means("grains faster than this raise mist along their path (m/s)"),
-    step("mist", "falling", Flag, or("false")).means("whether falling grains raise mist too"),
-    step("mist", "gravity", Number(-100.0, 100.0, "m/s2"), or("-2.0"))
+    key(STEP, "mist", "falling", Flag, or("false")).means("whether falling grains raise mist too"),
+    key(STEP, "mist", "gravity", Number(-100.0, 100.0, "m/s2"), or("-2.0"))
         .means("of the air where there is mist (m/s2)"),
-    step("mist", "half_life", Number(0.001, 1.0e6, "s"), or("1.0"))
+    key(STEP, "mist", "half_life", Number(0.001, 1.0e6, "s"), or("1.0"))
         .means("time in which half of the mist dissipates (s)"),
-    first("mist", "wind", NumbersOrFile(3, FASTEST_WIND, "m/s", &["vdb"]), or("[0.0, 0.0, 0.0]"))
+    key(FIRST, "mist", "wind", NumbersOrFile(3, FASTEST_WIND, "m/s", &["vdb"]), or("[0.0, 0.0, 0.0]"))
         .means("velocity (m/s), or a grid of velocities, that carries the air along where there is mist"),
-    step("mist", "turbulence", Number(0.0, 1000.0, "m/s2"), or("0.0"))
+    key(STEP, "mist", "turbulence", Number(0.0, 1000.0, "m/s2"), or("0.0"))
         .means("acceleration by eddies (m/s2, root mean square)"),
-    step("mist", "turbulence_size", Cells(2.0, 1.0e6), optional("0.4"))
+    key(STEP, "mist", "turbulence_size", Cells(2.0, 1.0e6), optional("0.4"))
         .means("size of the eddies (m), at least 8 cells of air; default: 24 cells of air"),
-    step("mist", "confinement", Number(0.0, 100.0, "1/s"), or("0.0"))
+    key(STEP, "mist", "confinement", Number(0.0, 100.0, "1/s"), or("0.0"))
         .means("strength of vorticity confinement, which keeps small eddies alive (1/s); 0 = off"),
-    step("mist", "noise", Number(0.0, 1.0, ""), or("0.3"))
+    key(STEP, "mist", "noise", Number(0.0, 1.0, ""), or("0.3"))
         .means("maximum share of the density of new mist that noise removes"),
-    step("mist", "noise_size", Cells(0.25, 1.0e6), optional("0.05"))
+    key(STEP, "mist", "noise_size", Cells(0.25, 1.0e6), optional("0.05"))
         .means("size of that noise (m), at least a cell of air; default: 4 cells of air"),
-    step("mist", "seed", Whole(0, i32::MAX as i64), or("0"))
+    key(STEP, "mist", "seed", Whole(0, i32::MAX as i64), or("0"))
         .means("another seed gives other noise and eddies"),
 ];
 
@@ -64,21 +57,20 @@ pub fn check_mist(table: &Table, values: &Values) -> Result<()> {
 
 /// The parameters of a scene's mist; `None` if it has none. A wind given as a grid is not included.
 pub fn mist_params(values: &Values) -> Option<Params> {
-    let number = |name: &str| values.number(&format!("mist.{name}"));
-    let value = |name: &str| values.get(&format!("mist.{name}"));
-    let defaults = Params::for_cell(number("cell")?);
+    let own = values.table("mist");
+    let defaults = Params::for_cell(own.find("cell")?);
     Some(Params {
-        from_speed: values.settled("mist", None, "from_speed"),
-        falling: values.settled("mist", None, "falling"),
-        gravity: values.settled("mist", None, "gravity"),
-        half_life: values.settled("mist", None, "half_life"),
-        wind: value("wind").and_then(|value| value.numbers()).unwrap_or_default(),
-        turbulence: values.settled("mist", None, "turbulence"),
-        turbulence_size: number("turbulence_size").unwrap_or(defaults.turbulence_size),
-        confinement: values.settled("mist", None, "confinement"),
-        noise: values.settled("mist", None, "noise"),
-        noise_size: number("noise_size").unwrap_or(defaults.noise_size),
-        seed: values.settled::<i64>("mist", None, "seed") as i32,
+        from_speed: own.get("from_speed"),
+        falling: own.get("falling"),
+        gravity: own.get("gravity"),
+        half_life: own.get("half_life"),
+        wind: own.find("wind").unwrap_or_default(),
+        turbulence: own.get("turbulence"),
+        turbulence_size: own.find("turbulence_size").unwrap_or(defaults.turbulence_size),
+        confinement: own.get("confinement"),
+        noise: own.get("noise"),
+        noise_size: own.find("noise_size").unwrap_or(defaults.noise_size),
+        seed: own.get("seed"),
         ..defaults
     })
 }

@@ -1,7 +1,7 @@
 //! The keys of `[output]` in scenes with snow.
 
 use crate::scene::schema::key::Kind::{Choice, Choices, Flag};
-use crate::scene::schema::key::{Key, Kind, Scope, Scopes, Unset, or};
+use crate::scene::schema::key::{Key, Scope, Scopes, key, or};
 
 const BASE: Scopes = &[("base", Scope::Output)];
 const GRAINS: Scopes = &[("grains", Scope::Output)];
@@ -9,32 +9,27 @@ const MIST: Scopes = &[("mist", Scope::Output)];
 const VOLUMES: Scopes = &[("volumes", Scope::Output)];
 const OBJECTS: Scopes = &[("objects", Scope::Output)];
 
-/// A key that changes the files of a frame.
-const fn output(scopes: Scopes, name: &'static str, kind: Kind, unset: Unset) -> Key {
-    Key::new("output", name, kind, unset).concerns(scopes)
-}
-
 /// All of them.
 pub const OUTPUT_KEYS: &[Key] = &[
-    output(BASE, "base", Choices(&["vdb"]), or("[\"vdb\"]"))
+    key(BASE, "output", "base", Choices(&["vdb"]), or("[\"vdb\"]"))
         .means("base/base.%04d.vdb: surface, compression, touched; [] = none"),
-    output(BASE, "base_mode", Choice(&["full", "delta"]), or("\"full\""))
+    key(BASE, "output", "base_mode", Choice(&["full", "delta"]), or("\"full\""))
         .means("full, or delta: first frame whole, then only changes (`frazil vdb rebuild`)"),
-    output(BASE, "half", Flag, or("false")).means("16-bit values, for rendering only"),
-    output(BASE, "removed", Choices(&["vdb"]), or("[\"vdb\"]"))
+    key(BASE, "output", "half", Flag, or("false")).means("16-bit values, for rendering only"),
+    key(BASE, "output", "removed", Choices(&["vdb"]), or("[\"vdb\"]"))
         .means("removed/removed.%04d.vdb: the snow that each frame removed"),
-    output(GRAINS, "grains", Choices(&["vdb", "ply", "usd"]), or("[\"vdb\"]"))
+    key(GRAINS, "output", "grains", Choices(&["vdb", "ply", "usd"]), or("[\"vdb\"]"))
         .means("grains/grains.%04d.vdb: points with v, id, active, trapped, pscale, source_frame, rest; also \"ply\", \"usd\" (large)"),
-    output(GRAINS, "grains_mode", Choice(&["full", "delta"]), or("\"full\""))
+    key(GRAINS, "output", "grains_mode", Choice(&["full", "delta"]), or("\"full\""))
         .means("full, or delta: .vdb files of the first and every 24th frame whole, then only changes (`frazil vdb rebuild`)"),
-    output(MIST, "mist", Choices(&["vdb"]), or("[\"vdb\"]"))
+    key(MIST, "output", "mist", Choices(&["vdb"]), or("[\"vdb\"]"))
         .means("mist/mist.%04d.vdb: density, and vel (m/s) at the cells' centres; [] = none"),
-    output(VOLUMES, "fog", Choices(&["base", "grains", "mist"]), or("[]"))
+    key(VOLUMES, "output", "fog", Choices(&["base", "grains", "mist"]), or("[]"))
         .means("fog/fog.%04d.vdb: densities for rendering, a grid for each of these (see docs/snow.md)"),
-    output(VOLUMES, "snow", Flag, or("false"))
+    key(VOLUMES, "output", "snow", Flag, or("false"))
         .means("snow/snow.%04d.vdb: one level set of the base and the resting grains, on voxels fine enough for the grains (large)"),
-    output(VOLUMES, "mesh", Choices(&["ply", "usd"]), or("[]"))
+    key(VOLUMES, "output", "mesh", Choices(&["ply", "usd"]), or("[]"))
         .means("\"ply\", \"usd\": mesh/, the triangulated surface of the base (large)"),
-    output(OBJECTS, "objects", Choices(&["usd", "ply"]), or("[]"))
+    key(OBJECTS, "output", "objects", Choices(&["usd", "ply"]), or("[]"))
         .means("\"usd\", \"ply\": objects/, the moving objects, with velocities"),
 ];

@@ -4,10 +4,11 @@ use super::mist::mist_params;
 use crate::error::Result;
 use crate::io::mesh::{EXTENSIONS, extension};
 use crate::scene::schema::key::Kind::{Cells, File, Flag, HeightOrFile, Number, Numbers, Whole};
-use crate::scene::schema::key::{Key, Kind, OBJECT, Scope, Scopes, Unset, optional, or, or_cells, required};
+use crate::scene::schema::key::{Key, OBJECT, Scope, Scopes, key, optional, or, or_cells, required};
 use crate::scene::schema::{FAR, NO_ORIGIN, ORIGIN, Table, Value, Values};
 use crate::scene::{Ground, Layer, Snow};
 use crate::snow::NoiseParams;
+use std::path::PathBuf;
 
 /// Grains fall on the ground too, and mist flows along it.
 const GROUND: Scopes = &[("base", Scope::First), ("grains", Scope::First), ("mist", Scope::First)];
@@ -17,60 +18,50 @@ const CELLS: (f64, f64) = (1.0e-5, 10.0);
 /// A mesh of the top, or a level set of the whole layer.
 const TOPS: &[&str] = &["vdb", EXTENSIONS[0], EXTENSIONS[1], EXTENSIONS[2]];
 
-/// A key that changes the first state.
-const fn first(table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Key {
-    Key::new(table, name, kind, unset).concerns(&[("base", Scope::First)])
-}
-
-/// A key that changes every step.
-const fn step(table: &'static str, name: &'static str, kind: Kind, unset: Unset) -> Key {
-    Key::new(table, name, kind, unset).concerns(&[("base", Scope::Step)])
-}
+const FIRST: Scopes = &[("base", Scope::First)];
+const STEP: Scopes = &[("base", Scope::Step)];
 
 /// All of them.
 pub const KEYS: &[Key] = &[
-    Key::new("snow", "ground", HeightOrFile(FAR, &EXTENSIONS), optional("0.0").shown())
-        .means("height of a level plane (m), or a mesh (then no area); beside a .vdb layer only grains lie on it")
-        .concerns(GROUND),
-    Key::new("snow", "area", Numbers(4, FAR, "m"), optional("[-3.0, -3.0, 3.0, 3.0]").shown())
-        .means("extent of the plane: x0, z0, x1, z1 (m)")
-        .concerns(GROUND),
-    first("snow", "depth", Number(1.0e-4, 1000.0, "m"), optional("0.3").shown())
+    key(GROUND, "snow", "ground", HeightOrFile(FAR, &EXTENSIONS), optional("0.0").shown()).means(
+        "height of a level plane (m), or a mesh (then no area); beside a .vdb layer only grains lie on it",
+    ),
+    key(GROUND, "snow", "area", Numbers(4, FAR, "m"), optional("[-3.0, -3.0, 3.0, 3.0]").shown())
+        .means("extent of the plane: x0, z0, x1, z1 (m)"),
+    key(FIRST, "snow", "depth", Number(1.0e-4, 1000.0, "m"), optional("0.3").shown())
         .means("depth above ground and static objects (m)"),
-    first("snow", "top", File(TOPS), optional("\"snow_top.ply\""))
+    key(FIRST, "snow", "top", File(TOPS), optional("\"snow_top.ply\""))
         .means("instead of depth: mesh of the top surface, or the layer as a level set"),
-    Key::new("snow", "origin", ORIGIN, or(NO_ORIGIN))
-        .means("position that becomes the origin of the meshes of ground and top (m), subtracted in 64 bits")
-        .concerns(GROUND),
-    first("snow", "cell", Number(CELLS.0, CELLS.1, "m"), required("0.0075").shown())
+    key(GROUND, "snow", "origin", ORIGIN, or(NO_ORIGIN))
+        .means("position that becomes the origin of the meshes of ground and top (m), subtracted in 64 bits"),
+    key(FIRST, "snow", "cell", Number(CELLS.0, CELLS.1, "m"), required("0.0075").shown())
         .means("edge of a voxel (m)"),
-    step("snow", "min_crumb", Whole(0, 10_000), or("0"))
+    key(STEP, "snow", "min_crumb", Whole(0, 10_000), or("0"))
         .means("islands of fewer voxels are removed; 0 = off"),
-    step("snow.noise", "amplitude", Cells(0.0, 32.0), or_cells(2.0))
+    key(STEP, "snow.noise", "amplitude", Cells(0.0, 32.0), or_cells(2.0))
         .means("maximum displacement, outward only (m); 0 = off"),
-    step("snow.noise", "size", Cells(2.0, 10_000.0), or_cells(8.0)).means("size of the largest features (m)"),
-    step("snow.noise", "octaves", Whole(1, 8), or("3"))
+    key(STEP, "snow.noise", "size", Cells(2.0, 10_000.0), or_cells(8.0))
+        .means("size of the largest features (m)"),
+    key(STEP, "snow.noise", "octaves", Whole(1, 8), or("3"))
         .means("octaves, each half the size of the one before"),
-    step("snow.noise", "seed", Whole(0, i32::MAX as i64), or("0"))
+    key(STEP, "snow.noise", "seed", Whole(0, i32::MAX as i64), or("0"))
         .means("another seed gives another pattern"),
-    step(OBJECT, "noise", Flag, or("true")).means("whether its prints have ragged edges"),
+    key(STEP, OBJECT, "noise", Flag, or("true")).means("whether its prints have ragged edges"),
 ];
 
 impl Snow {
     /// The layer that a scene's values describe; `None` if it has no snow.
     pub(in crate::scene) fn of(values: &Values) -> Option<Self> {
-        let cell = values.number("snow.cell")?;
-        let path = |key: &str| values.get(key).and_then(Value::path).map(|path| path.to_path_buf());
-        let layer = match (values.number("snow.depth"), path("snow.top")) {
+        let own = values.table("snow");
+        let cell = own.find("cell")?;
+        let layer = match (own.find("depth"), own.find::<PathBuf>("top")) {
             (Some(depth), _) => Layer::Depth(depth),
             (None, Some(top)) if extension(&top) == "vdb" => Layer::Grid(top),
             (None, top) => Layer::Top(top?),
         };
-        let area = values.get("snow.area").and_then(Value::numbers);
-        let plane = values.number("snow.ground").map(|height| Ground::Plane { height, area });
-        let ground = plane.or(path("snow.ground").map(Ground::Mesh));
-        let min_crumb = values.get("snow.min_crumb")?.whole()? as usize;
-        let origin = values.get("snow.origin").and_then(Value::numbers::<3>).unwrap_or_default().into();
+        let plane = own.find("ground").map(|height| Ground::Plane { height, area: own.find("area") });
+        let ground = plane.or_else(|| own.find("ground").map(Ground::Mesh));
+        let (origin, min_crumb) = (own.get("origin"), own.get("min_crumb"));
         Some(Self { ground, layer, origin, cell, noise: noise(values)?, min_crumb })
     }
 
@@ -79,20 +70,19 @@ impl Snow {
     /// # Errors
     /// Keys that exclude each other, or a key without one that it needs; noise that would leave islands.
     pub(in crate::scene) fn check(snow: &Table, values: &Values) -> Result<()> {
-        let value = |name: &str| values.get(&format!("snow.{name}"));
-        match (value("depth"), value("top")) {
+        let own = values.table("snow");
+        let (ground, top) = (own.value("ground"), own.value("top"));
+        match (own.value("depth"), top) {
             (Some(_), Some(_)) => return Err(snow.error("top", "excludes `depth`: give one of them")),
             (None, None) => return Err(snow.error("depth", "is missing (or `top`, a mesh or .vdb file)")),
             _ => {}
         }
-        let is_grid = value("top").and_then(Value::path).is_some_and(|path| extension(path) == "vdb");
-        let is_mesh = value("ground").and_then(Value::path).is_some() || !is_grid && value("top").is_some();
-        let has_origin =
-            value("origin").and_then(Value::numbers::<3>).is_some_and(|origin| origin != [0.0; 3]);
-        if has_origin && !is_mesh {
+        let is_grid = top.and_then(Value::path).is_some_and(|path| extension(path) == "vdb");
+        let is_mesh = ground.and_then(Value::path).is_some() || !is_grid && top.is_some();
+        if own.get::<[f64; 3]>("origin") != [0.0; 3] && !is_mesh {
             return Err(snow.error("origin", "is for meshes of ground and top: leave it out"));
         }
-        match (value("ground"), value("area")) {
+        match (ground, own.value("area")) {
             (_, Some(_)) if is_grid => {
                 return Err(snow.error("area", "is of no use beside a .vdb layer in `top`: leave it out"));
             }
@@ -103,15 +93,15 @@ impl Snow {
             (Some(Value::Number(_)), None) if !is_grid => {
                 return Err(snow.error("area", "is missing: a plane needs [x0, z0, x1, z1] (m)"));
             }
-            (Some(_), Some(area)) => {
-                let [x0, z0, x1, z1] = area.numbers().unwrap_or_default();
+            (Some(_), Some(_)) => {
+                let [x0, z0, x1, z1] = own.find::<[f64; 4]>("area").unwrap_or_default();
                 if x1 <= x0 || z1 <= z0 {
                     return Err(snow.error("area", "must be [x0, z0, x1, z1] with x0 < x1 and z0 < z1"));
                 }
             }
             _ => {}
         }
-        if !is_grid && value("ground").is_none() {
+        if !is_grid && ground.is_none() {
             return Err(snow.error("ground", "is missing"));
         }
         Ok(())
@@ -170,11 +160,11 @@ impl Snow {
 }
 
 fn noise(values: &Values) -> Option<NoiseParams> {
-    let whole = |key: &str| values.get(key).and_then(Value::whole);
+    let own = values.table("snow.noise");
     Some(NoiseParams {
-        amplitude: values.number("snow.noise.amplitude")?,
-        size: values.number("snow.noise.size")?,
-        octaves: whole("snow.noise.octaves")? as u32,
-        seed: whole("snow.noise.seed")? as i32,
+        amplitude: own.find("amplitude")?,
+        size: own.find("size")?,
+        octaves: own.get("octaves"),
+        seed: own.get("seed"),
     })
 }

@@ -45,8 +45,9 @@ pub fn check_volumes(table: &Table, values: &Values, output: &Output) -> Result<
         (false, true) => "snow",
         (false, false) => "mesh",
     };
-    if needs.base && (output.half || !output.base) {
-        let key = if output.half { "half" } else { "base" };
+    if needs.base
+        && let Some(key) = output.inexact_base()
+    {
         let what = format!("leaves out what `{reader}` reads of every frame: exact values of the base");
         return Err(table.error(key, what));
     }

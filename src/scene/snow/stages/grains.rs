@@ -77,12 +77,12 @@ impl<'a> Grains<'a> {
     pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
         let moving = scene.objects.iter().enumerate().filter(|(_, object)| object.role.moves());
         let object = |((index, object), body): ((usize, &scene::Object), &'a Body)| {
-            let number = |name: &str| scene.values.of_object(index, name).and_then(|value| value.number());
+            let own = scene.values.one(OBJECT, index);
             Object {
                 body,
-                friction: scene.values.settled(OBJECT, Some(index), "friction"),
-                stick: scene.values.settled(OBJECT, Some(index), "stick"),
-                compression: number("compression"),
+                friction: own.get("friction"),
+                stick: own.get("stick"),
+                compression: own.find("compression"),
                 removes: object.role.removes(),
                 pushes: object.role.pushes(),
             }

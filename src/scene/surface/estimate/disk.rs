@@ -38,13 +38,13 @@ impl FrameSize {
         let obj = TEXT * (3 * vertices + 2 * positions) + index * named;
         // Positions, velocities and arrays; each face also has its count of corners.
         let own: usize = detail.arrays.iter().map(|array| array.values.len()).sum();
-        let delta = if output.delta { vertices } else { 0 };
-        let flagged = if output.flagged { vertices } else { 0 };
-        let rebuilt = if output.rebuilt { triangles } else { 0 };
+        let if_asked = |is_asked: bool, bytes: u64| if is_asked { bytes } else { 0 };
+        let delta = if_asked(output.delta, vertices);
+        let flagged = if_asked(output.flagged, vertices);
+        let rebuilt = if_asked(output.rebuilt, triangles);
         let usd = TEXT * (6 * vertices + 2 * positions + own as u64 + delta)
             + index * (3 * triangles + corners)
             + (1 + AROUND_INDEX) * (triangles + flagged + rebuilt);
-        let if_asked = |is_asked: bool, bytes: u64| if is_asked { bytes } else { 0 };
         Self {
             ply: if_asked(output.ply, ply(output, detail)),
             obj: if_asked(output.obj, obj),

@@ -1,8 +1,6 @@
 //! Everything that a scene with `[surface]` reads before its first frame.
 
-#[cfg(feature = "vdb")]
 pub(in crate::scene::surface) mod particle_times;
-#[cfg(feature = "vdb")]
 pub(in crate::scene::surface) mod sculpts;
 
 use std::path::{Path, PathBuf};
@@ -118,7 +116,7 @@ impl Inputs {
             }
             None => {
                 let mesh = reconstructed(ctx, &particles, spacing, surface.cell)
-                    .map_err(|error| with_path(&first, error))?;
+                    .map_err(|error| error.in_file(&first))?;
                 DetailedMesh { mesh, ..DetailedMesh::default() }
             }
         };
@@ -165,8 +163,7 @@ pub(super) fn read_mesh(
         let warning = faults(path, &mesh.mesh).or_else(doubts);
         return Ok((mesh, warning));
     }
-    let (mesh, warning) =
-        closed(ctx, mesh, spacing * surface.cell).map_err(|error| with_path(path, error))?;
+    let (mesh, warning) = closed(ctx, mesh, spacing * surface.cell).map_err(|error| error.in_file(path))?;
     Ok((mesh, warning.map(|warning| format!("{}: {warning}", path.display())).or_else(doubts)))
 }
 
@@ -246,13 +243,6 @@ fn reconstructed(ctx: &Context, particles: &Particles, spacing: f64, cell: f64) 
     Ok(Isosurface::new(&phi).mesh(&phi))
 }
 
-fn with_path(path: &Path, error: Error) -> Error {
-    match error {
-        Error::Argument(what) => Error::file(path, what),
-        other => other,
-    }
-}
-
 /// The mesh made ready for rebuilding: a closed 2-manifold by index without self-intersections, repaired in cells of an edge (m) if
 /// necessary; and a sentence about the repair.
 fn closed(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(DetailedMesh, Option<String>)> {
@@ -264,33 +254,30 @@ fn closed(ctx: &Context, mesh: DetailedMesh, cell: f64) -> Result<(DetailedMesh,
         return Ok((mesh, None));
     }
     let repaired = repair(ctx, &mesh.mesh, cell)?;
-    let kept = repaired.report.kept_triangles;
-    if is_only_joined(&mesh.mesh, &repaired) {
-        let joined = repaired.report.prepared.joined_vertices;
+    let report = &repaired.report;
+    let warning = if is_only_joined(&mesh.mesh, &repaired) {
+        let joined = report.prepared.joined_vertices;
         log::info!("{joined} vertices are joined with others that are the same corners");
-        let detail = carry_attributes(&mesh, repaired.mesh, &repaired.vertices, &repaired.sources, None);
-        return Ok((detail, None));
-    }
-    let lost = repaired.report.losses.warning(repaired.report.cell);
-    let mut what = Vec::new();
-    if !is_closed {
-        what.push("is not closed as its indices have it");
-    } else if !is_outward {
-        what.push("is inside out in parts");
-    }
-    if crossings > 0 {
-        what.push("crosses itself");
-    }
-    let warning = format!(
-        "it {}: it was repaired, as `frazil mesh repair --cell {:.6}` does; {kept} of {} triangles are as they were \
-         (surface.rebuild = false follows it as it is){}",
-        what.join(" and "),
-        repaired.report.cell,
-        mesh.mesh.triangles.len(),
-        lost.map_or(String::new(), |lost| format!("; {lost}")),
-    );
+        None
+    } else {
+        let fault = match (is_closed, is_outward) {
+            (false, _) => Some("is not closed as its indices have it"),
+            (true, false) => Some("is inside out in parts"),
+            (true, true) => None,
+        };
+        let what: Vec<&str> = fault.into_iter().chain((crossings > 0).then_some("crosses itself")).collect();
+        let lost = report.losses.warning(report.cell).map_or(String::new(), |lost| format!("; {lost}"));
+        Some(format!(
+            "it {}: it was repaired, as `frazil mesh repair --cell {:.6}` does; {} of {} triangles are as they were \
+             (surface.rebuild = false follows it as it is){lost}",
+            what.join(" and "),
+            report.cell,
+            report.kept_triangles,
+            mesh.mesh.triangles.len(),
+        ))
+    };
     let detail = carry_attributes(&mesh, repaired.mesh, &repaired.vertices, &repaired.sources, None);
-    Ok((detail, Some(warning)))
+    Ok((detail, warning))
 }
 
 /// Whether a repair only joined vertices that are one corner: the mesh was triangle soup, and closed.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::geometry::points::Values;
-use crate::io::files::{hash, source};
+use crate::io::files::source;
 use crate::io::mesh::extension;
 use crate::io::particles::{self, ParticleData};
 use crate::io::records::input_hashes::InputHashes;
@@ -28,14 +28,10 @@ pub fn read_cloud(path: &Path, seen: &InputHashes) -> Result<ParticleData> {
         return particles::parse(path, &seen.read(path)?);
     }
     source::open(path)?;
-    // OpenVDB reads the file itself: its content must be the same before and after.
-    seen.hash(path)?;
-    if let Some(since) = changes_since(path)? {
-        return Err(Error::file(path, partial(since)));
-    }
-    let cloud = points::read(path, None)?.into();
-    seen.note(path, hash::of_file(path)?)?;
-    Ok(cloud)
+    seen.around(path, || match changes_since(path)? {
+        Some(since) => Err(Error::file(path, partial(since))),
+        None => Ok(points::read(path, None)?.into()),
+    })
 }
 
 /// The particles of a file (m, m/s).
@@ -123,10 +119,7 @@ impl<'a> Liquid<'a> {
 
     /// An error about missing data of the particles at a time, with their file.
     pub fn with_path(&self, time: f64, error: Error) -> Error {
-        match error {
-            Error::Argument(what) => Error::file(self.path(time.floor() as i32), what),
-            other => other,
-        }
+        error.in_file(self.path(time.floor() as i32))
     }
 
     fn path(&self, file: i32) -> PathBuf {

@@ -22,6 +22,8 @@ pub struct Sculpt {
     pub mesh: DetailedMesh,
     /// Detail retention of each vertex: the share that never fades; empty: none.
     pub detail_retention: Vec<f32>,
+    /// Sentences about what it lacks, or has to no effect.
+    warnings: Vec<String>,
 }
 
 /// The frames of a shot after its first that have an edited mesh, ascending.
@@ -66,9 +68,7 @@ pub fn check(ctx: &Context, surface: &Surface, inputs: &Inputs) -> Result<Vec<St
     let mut out = Vec::new();
     for frame in &inputs.sculpts {
         ctx.check()?;
-        if let Some((_, warnings)) = read(ctx, surface, inputs, *frame)? {
-            out.extend(warnings);
-        }
+        out.extend(read_sculpt(ctx, surface, inputs, *frame)?.into_iter().flat_map(|sculpt| sculpt.warnings));
     }
     Ok(out)
 }
@@ -79,16 +79,6 @@ pub fn check(ctx: &Context, surface: &Surface, inputs: &Inputs) -> Result<Vec<St
 /// A file that cannot be read, or that has changed since it was checked; a mesh to be rebuilt that encloses nothing; shares of detail out
 /// of range, if any fades; cancel.
 pub fn read_sculpt(ctx: &Context, surface: &Surface, inputs: &Inputs, frame: i32) -> Result<Option<Sculpt>> {
-    Ok(read(ctx, surface, inputs, frame)?.map(|(sculpt, _)| sculpt))
-}
-
-/// As [`read_sculpt`], with warnings.
-fn read(
-    ctx: &Context,
-    surface: &Surface,
-    inputs: &Inputs,
-    frame: i32,
-) -> Result<Option<(Sculpt, Vec<String>)>> {
     let Some(path) = path_at(surface, &inputs.sculpts, frame) else { return Ok(None) };
     let (mesh, warning) = read_mesh(ctx, surface, &path, &inputs.seen, inputs.spacing)?;
     let mut warnings: Vec<String> = warning.into_iter().collect();
@@ -100,7 +90,7 @@ fn read(
     };
     let (mesh, faults) = conformed(mesh, &inputs.mesh);
     warnings.extend(faults.iter().map(|fault| format!("{}: {fault}", path.display())));
-    Ok(Some((Sculpt { path, mesh, detail_retention }, warnings)))
+    Ok(Some(Sculpt { path, mesh, detail_retention, warnings }))
 }
 
 /// A mesh with the same data as that of the first frame, so that all frames have the same; and the differences, a sentence each.

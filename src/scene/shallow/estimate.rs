@@ -1,25 +1,71 @@
-//! Maximum size of the files of a liquid on a terrain: when all of it is wet.
+//! Memory and disk space of a liquid on a terrain, estimated before any is used. Disk space is the maximum: when all of it is wet.
 
+use crate::context::Context;
+use crate::error::Result;
 use crate::scene::shallow::Shallow;
+use crate::shallow::columns::grid::Grid;
 use crate::shallow::free_fall::mesh::bound;
+use crate::shallow::params::Friction;
+
+/// Bytes that every run takes.
+const FIXED: u64 = 32_000_000;
+/// Bytes of a cell during conversion of the terrain to columns: its crossings and solids, in two copies.
+const CELL: u64 = 64;
+/// Bytes of a column: liquid, pipes and data of steps 100; its vertex and triangles while they are made 150; up to three steps that wait
+/// for the writer, 120 each; files and states 100; minimum heights 20.
+const COLUMN: u64 = 730;
+/// Bytes of a scalar in a column: its amount 8, its concentration 4, and 50 in those steps, files and states.
+const SCALAR: u64 = 62;
+/// Additional bytes of a column for friction at walls, and for viscosity that depends on a scalar.
+const WALLS: u64 = 108;
+const THICK: u64 = 12;
+/// Bytes of a drop: its own data 500; its ball and strand while they are made, and in up to three steps that wait for the writer, 5,600
+/// each.
+const DROP: u64 = 22_900;
+/// Bytes of a triangle of the terrain: corners and a position, twice while it is read or while minimum heights are found, and the data that
+/// these need.
+const TRIANGLE: u64 = 110;
+
+/// Additional bytes of a triangle that the liquid stains: stains, and the mesh in up to three steps that wait for the writer.
+const STAINED: u64 = 110;
+
+/// Refuses more cells than the context's memory limit allows, before they are made.
+///
+/// # Errors
+/// [`crate::Error::Memory`], naming the cells.
+pub(in crate::scene::shallow) fn allow_cells(ctx: &Context, grid: &Grid) -> Result<()> {
+    let [across, along] = grid.size;
+    let what = format!("shallow.cell = {} m, {across} x {along} cells,", grid.cell);
+    ctx.allow(&what, FIXED + (CELL + COLUMN) * grid.cells() as u64)
+}
+
+/// Estimated bytes of a run.
+pub(in crate::scene::shallow) fn memory(of: &Shallow, grid: &Grid, columns: u64, triangles: u64) -> u64 {
+    let walls = if of.params.friction == Friction::Walls { WALLS } else { 0 };
+    let thick = if of.params.thickening.is_some() { THICK } else { 0 };
+    let triangle = TRIANGLE + if of.staining.is_some() { STAINED } else { 0 };
+    let column = COLUMN + SCALAR * of.scalars.len() as u64 + walls + thick;
+    let drops = DROP * of.params.falls.map_or(0, |falls| falls.most as u64);
+    FIXED + CELL * grid.cells() as u64 + column * columns + triangle * triangles + drops
+}
 
 /// Bytes of a 32-bit float in text with its separators, and of an index.
 const TEXT: u64 = 12;
 const INDEX: u64 = 8;
 /// Bytes of a column in the exact state, unpacked; of a scalar in a column; and of a drop, with the volume waiting at a link.
 const STATE: u64 = 20;
-const SCALAR: u64 = 8;
-const DROP: u64 = 220;
+const STATE_OF_SCALAR: u64 = 8;
+const STATE_OF_DROP: u64 = 220;
 /// Bytes of a voxel of a leaf; there are about two for each column.
 const VOXEL: u64 = 2 * 4;
 /// Bytes of a triangle of a stained terrain: its corners, and for half a vertex the position, the stain, and the stain in the exact state.
-const STAINED: u64 = 13 + (12 + 4 + 12) / 2;
+const FILE_OF_STAINED: u64 = 13 + (12 + 4 + 12) / 2;
 /// Bytes of a frame's report and record.
 const RECORDS: u64 = 3000;
 
 /// Maximum bytes of a frame's files with these counts of columns and triangles of the terrain: if all columns are wet, and the air holds
 /// the maximum number of drops.
-pub(in crate::scene::shallow) fn frame(of: &Shallow, columns: u64, triangles: u64) -> u64 {
+pub(in crate::scene::shallow) fn frame_bytes(of: &Shallow, columns: u64, triangles: u64) -> u64 {
     let output = of.output;
     let scalars = of.scalars.len() as u64;
     let (carried, falling) =
@@ -36,13 +82,13 @@ pub(in crate::scene::shallow) fn frame(of: &Shallow, columns: u64, triangles: u6
     let numbers = 6 + u64::from(output.depth) + u64::from(output.alpha) + u64::from(output.layer);
     let numbers = numbers + carried + falling;
     let usd = TEXT * numbers + 2 * 3 * INDEX + 2 * 3;
-    let state = STATE + SCALAR * scalars;
+    let state = STATE + STATE_OF_SCALAR * scalars;
     let each = if_asked(output.ply, ply) + if_asked(output.usd, usd) + if_asked(output.vdb, VOXEL) + state;
     let drops = of.params.falls.map_or(0, |falls| falls.most);
     // For each vertex of its mesh two triangles.
     let in_air = bound(drops).vertices as u64 * (if_asked(output.ply, ply) + if_asked(output.usd, usd));
-    let stained = if_asked(of.staining.is_some(), STAINED * triangles);
-    columns * each + in_air + stained + drops as u64 * DROP + RECORDS
+    let stained = if_asked(of.staining.is_some(), FILE_OF_STAINED * triangles);
+    columns * each + in_air + stained + drops as u64 * STATE_OF_DROP + RECORDS
 }
 
 #[cfg(test)]
@@ -74,10 +120,10 @@ mod tests {
         let carried =
             Carried { velocities: &drawn.velocities, uvs: None, arrays: &arrays.iter().collect::<Vec<_>>() };
         let bytes = ply_bytes(&drawn.mesh, &carried).len() as u64;
-        let more = (STATE + SCALAR) * count as u64;
-        let said = (frame(of, count as u64, 9) - frame(of, 0, 0)) - more;
+        let more = (STATE + STATE_OF_SCALAR) * count as u64;
+        let said = (frame_bytes(of, count as u64, 9) - frame_bytes(of, 0, 0)) - more;
         assert!(bytes > said && bytes < said + 500, "{bytes} bytes, {said} said");
         // A drop has a ball.
-        assert!(frame(of, 0, 0) > RECORDS + DROP + 42 * 12, "{}", frame(of, 0, 0));
+        assert!(frame_bytes(of, 0, 0) > RECORDS + STATE_OF_DROP + 42 * 12, "{}", frame_bytes(of, 0, 0));
     }
 }
