@@ -17,8 +17,7 @@ use serde_json::{Value, json};
 
 use super::options::{MeshSpace, warn_if_far};
 use super::output;
-use super::session::Session;
-use super::session::exit::{Failure, Phase};
+use super::session::{Failure, Phase, Session};
 
 /// Check, compare and repair meshes.
 #[derive(clap::Args)]
@@ -195,7 +194,7 @@ fn bodies(mesh: &TriMesh) -> Vec<TriMesh> {
 }
 
 /// A key of the report, and the noun for its count, singular and plural.
-pub type Counted = (&'static str, &'static str, &'static str);
+type Counted = (&'static str, &'static str, &'static str);
 
 const PARTS: [Counted; 2] = [
     ("holes", "hole: closed by a cone to its centre", "holes: closed by cones to their centres"),
@@ -274,8 +273,9 @@ const TRIANGLES: [Counted; 11] = [
 
 /// A mesh as text: what it is, then only the faults that it has.
 fn in_words(mesh: &Value) -> String {
-    let count = |key: &str| mesh[key].as_u64().unwrap_or(0);
-    let as_it_is = |key: &str| mesh["by_index"][key].as_u64().unwrap_or(0);
+    let number = |number: &Value| number.as_u64().unwrap_or(0) as usize;
+    let count = |key: &str| number(&mesh[key]);
+    let as_it_is = |key: &str| number(&mesh["by_index"][key]);
     let what = match (mesh["solid"] == json!(true), as_it_is("open_edges")) {
         (false, _) => "not a solid as it is",
         (true, 0) => "a solid",
@@ -336,7 +336,7 @@ fn bodies_in_words(bodies: &[Value]) -> String {
     let area = |body: &Value| body["area_m2"].as_f64().unwrap_or(0.0);
     order.sort_by(|&a, &b| area(b).total_cmp(&area(a)));
     let line = |&body: &&Value| {
-        let count = body["triangles"].as_u64().unwrap_or(0);
+        let count = body["triangles"].as_u64().unwrap_or(0) as usize;
         let genus = body["genus"].as_i64().map_or("open".to_string(), |genus| format!("genus {genus}"));
         let (area, volume) = (area(body), body["volume_m3"].as_f64().unwrap_or(0.0));
         let triangles = form(count, ["triangle", "triangles"]);
@@ -344,17 +344,17 @@ fn bodies_in_words(bodies: &[Value]) -> String {
     };
     let mut out: String = order.iter().take(TOLD).map(line).collect();
     if let Some(others) = bodies.len().checked_sub(TOLD).filter(|others| *others > 0) {
-        out += &format!("  and {others} more {}\n", form(others as u64, ["body", "bodies"]));
+        out += &format!("  and {others} more {}\n", form(others, ["body", "bodies"]));
     }
     out
 }
 
 /// A line with a count and its noun.
-pub fn line(count: u64, forms: [&'static str; 2]) -> String {
+pub fn line(count: usize, forms: [&'static str; 2]) -> String {
     format!("  {count:>8} {}\n", form(count, forms))
 }
 
 /// The noun for a count, singular or plural.
-pub fn form(count: u64, [one, several]: [&'static str; 2]) -> &'static str {
+pub fn form(count: usize, [one, several]: [&'static str; 2]) -> &'static str {
     if count == 1 { one } else { several }
 }

@@ -7,8 +7,7 @@ use frazil::scene::{Scene, shallow};
 use serde_json::{Map, Value, json};
 
 use super::ShotArgs;
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 
 /// Let a little liquid flow over a terrain: blood, water, paint, honey.
 ///

@@ -109,7 +109,7 @@ impl<'a> Run<'a> {
         }
         let mut cache = Cache::open(stage, self.plan.seen, folder, asked)?;
         let upstream = self.upstream(stage, folder)?;
-        cache.check_inputs(stage, asked.frames, &upstream.iter().collect::<Vec<_>>())?;
+        cache.check_inputs(stage, asked.frames, &upstream)?;
         let (there, todo): (Vec<i32>, Vec<i32>) =
             asked.frames.iter().partition(|frame| cache.stored.is_done(*frame));
         self.refuse_missing(stage, &cache.stored, &todo, &upstream)?;
@@ -169,7 +169,7 @@ impl<'a> Run<'a> {
             if let ([frame, ..], Some(cache), false) = (&run.todo[..], &run.cache, waits) {
                 let upstream = self.upstream(run.stage, self.own.folder())?;
                 let last = run.todo.last().copied().unwrap_or(*frame);
-                run.stage.looks_ahead(ctx, &upstream.iter().collect::<Vec<_>>(), last)?;
+                run.stage.looks_ahead(ctx, &upstream, last)?;
                 self.stages[position].start = Some(run.stage.before(ctx, *frame, cache.kept(first))?);
             }
         }
@@ -306,18 +306,17 @@ impl Drop for StopOthers<'_> {
 impl StageRun<'_> {
     fn make(&mut self, shared: &Shared<'_>, upstream: &[Stored], every_state: bool) -> Result<()> {
         let todo = std::mem::take(&mut self.todo);
-        let upstream: Vec<&Stored> = upstream.iter().collect();
         let Some(cache) = &mut self.cache else { return Ok(()) };
         let start = match self.start.take() {
             Some(start) => start,
             None => {
                 // The upstream frames were made only in this run.
-                cache.check_inputs(self.stage, &FrameChoice::none(), &upstream)?;
-                self.stage.looks_ahead(shared.ctx, &upstream, todo[todo.len() - 1])?;
+                cache.check_inputs(self.stage, &FrameChoice::none(), upstream)?;
+                self.stage.looks_ahead(shared.ctx, upstream, todo[todo.len() - 1])?;
                 self.stage.before(shared.ctx, todo[0], cache.kept(shared.first))?
             }
         };
-        start.make(Work { shared, cache, upstream: &upstream, todo: &todo, every_state })
+        start.make(Work { shared, cache, upstream, todo: &todo, every_state })
     }
 }
 

@@ -135,7 +135,7 @@ pub trait Stepping: Stage {
     ///
     /// # Errors
     /// Why the frames cannot be made.
-    fn foresee(&self, _ctx: &Context, _upstream: &[&Stored], _last: i32) -> Result<()> {
+    fn foresee(&self, _ctx: &Context, _upstream: &[Stored], _last: i32) -> Result<()> {
         Ok(())
     }
 
@@ -182,7 +182,7 @@ pub struct To<'a> {
     /// Hash of everything that the frame depends on, if its files are wanted.
     pub made_from: Option<&'a str>,
     /// The frames of the stages upstream, in the order of [`Stage::upstream`].
-    pub upstream: &'a [&'a Stored],
+    pub upstream: &'a [Stored],
 }
 
 /// The result of a step.

@@ -16,8 +16,7 @@ use crate::scene::{BaseMode, Scene, moving};
 use crate::snow::base_layer::{BaseLayer, Changes, Grids, Params, StepReport};
 use crate::sweep::{Body, TOLERANCE};
 use crate::vdb::FloatGrid;
-use crate::vdb::file::to_bytes;
-use crate::vdb::write_options::WriteOptions;
+use crate::vdb::file::{WriteOptions, to_bytes};
 
 /// The layer of a scene, pressed by its objects.
 pub struct Base<'a> {

@@ -228,7 +228,7 @@ impl Stepping for Grains<'_> {
     type Step = Option<grains::Grains>;
     type Writer = Writer;
 
-    fn foresee(&self, ctx: &Context, upstream: &[&Stored], last: i32) -> Result<()> {
+    fn foresee(&self, ctx: &Context, upstream: &[Stored], last: i32) -> Result<()> {
         let [base] = upstream else { return Err(Error::Internal("grains read one stage".into())) };
         let Some(forecast) = Forecast::of(self.scene, self.inputs, base, last)? else { return Ok(()) };
         log::info!(

@@ -23,9 +23,8 @@ use crate::scene::vdb_metadata::metadata;
 use crate::scene::{Scene, moving};
 use crate::snow::mist::{self, Around, Grids, Params, Source, Start, StepReport, Surroundings, Wind};
 use crate::sweep::Body;
-use crate::vdb::file::any_to_bytes;
-use crate::vdb::write_options::WriteOptions;
-use crate::vdb::{FloatGrid, GridRef, file};
+use crate::vdb::file::{self, WriteOptions, any_to_bytes};
+use crate::vdb::{FloatGrid, GridRef};
 
 /// Name of the stage, and of the kind of its files.
 const NAME: &str = "mist";
