@@ -108,8 +108,9 @@ impl Own {
             return Err(Error::file(&scene.path, what));
         }
         if scene.output.usd {
-            let of_stages = plan.stages().flat_map(|stage| stage.loose_files().iter().copied());
-            std::iter::once(SHOT).chain(of_stages).try_for_each(|name| self.refuse_changed(name, None))?;
+            self.refuse_changed(SHOT, None)?;
+            let kinds = plan.stages().filter_map(|stage| stage.usd_kind());
+            kinds.map(manifest_of).try_for_each(|name| self.refuse_changed(&name, None))?;
         }
         self.refuse_changed(SCENE, Some(&new))?;
         let asked = frames.first()..=frames.last();
@@ -318,6 +319,11 @@ pub(super) struct OfFrame {
 fn is_same(a: &Path, b: &Path) -> bool {
     let there = |path| std::fs::canonicalize(path).ok();
     there(a).is_some_and(|a| there(b) == Some(a))
+}
+
+/// The manifest that the .usda files of a kind share.
+pub(in crate::scene::run) fn manifest_of(kind: &str) -> String {
+    format!("{kind}/{kind}.manifest.usda")
 }
 
 /// The shot for programs that read USD.

@@ -60,9 +60,9 @@ pub trait Stage: Sync {
         "vdb"
     }
 
-    /// Its files that belong to no frame, by path relative to the folder.
-    fn loose_files(&self) -> &'static [&'static str] {
-        &[]
+    /// The kind of its .usda files, if this scene has them: they share a manifest, which belongs to no frame.
+    fn usd_kind(&self) -> Option<&'static str> {
+        None
     }
 
     /// The settings that its frames depend on.

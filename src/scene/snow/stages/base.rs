@@ -20,8 +20,8 @@ use crate::vdb::file::{WriteOptions, to_bytes};
 
 /// The layer of a scene, pressed by its objects.
 pub struct Base<'a> {
-    scene: &'a Scene,
-    inputs: &'a Inputs,
+    pub scene: &'a Scene,
+    pub inputs: &'a Inputs,
 }
 
 /// Input of the writer.
@@ -41,12 +41,7 @@ pub struct Writer {
     copy: Option<Grids>,
 }
 
-impl<'a> Base<'a> {
-    /// The stage for a scene.
-    pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
-        Self { scene, inputs }
-    }
-
+impl Base<'_> {
     /// Whether writing needs a copy of the layer.
     fn copies(&self) -> bool {
         !self.scene.output.base_restarts() || self.scene.output.base_mode == BaseMode::Full

@@ -33,8 +33,8 @@ const DENSITY: &str = "density";
 
 /// The stage for a scene.
 pub struct Mist<'a> {
-    scene: &'a Scene,
-    inputs: &'a Inputs,
+    pub scene: &'a Scene,
+    pub inputs: &'a Inputs,
 }
 
 /// State carried from frame to frame.
@@ -58,12 +58,7 @@ pub(in crate::scene::snow) fn density(stored: &Stored, frame: i32) -> Result<Flo
     file::read_own_named(&stored.file(frame, NAME)?, DENSITY)
 }
 
-impl<'a> Mist<'a> {
-    /// The stage for a scene.
-    pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
-        Self { scene, inputs }
-    }
-
+impl Mist<'_> {
     fn params(&self) -> Result<Params> {
         mist_params(&self.scene.values).ok_or_else(|| Error::Internal("the scene has no mist".into()))
     }

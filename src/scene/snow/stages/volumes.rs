@@ -52,8 +52,6 @@ struct Source<'s> {
 /// too much memory.
 type Files = Vec<(&'static str, &'static str, Vec<u8>)>;
 
-/// Manifest shared by the clips in `mesh/`.
-const MANIFEST: &str = "mesh/mesh.manifest.usda";
 /// Name of the mesh's prim.
 const MESH: &str = "base";
 
@@ -236,8 +234,8 @@ impl Stage for Volumes<'_> {
         Keeps::Whole
     }
 
-    fn loose_files(&self) -> &'static [&'static str] {
-        if self.asked.mesh_usd { &[MANIFEST] } else { &[] }
+    fn usd_kind(&self) -> Option<&'static str> {
+        self.asked.mesh_usd.then_some("mesh")
     }
 
     fn volumes(&self) -> Vec<Volume> {
