@@ -161,12 +161,9 @@ impl<'a> Run<'a> {
     /// Loads the state before the first frame to be made, for stages whose upstream frames all exist.
     fn load(&mut self, ctx: &Context) -> Result<()> {
         let first = self.plan.scene.shot.frames.first;
-        let busy: Vec<&str> =
-            self.stages.iter().filter(|run| !run.todo.is_empty()).map(|run| run.stage.name()).collect();
         for position in 0..self.stages.len() {
             let run = &self.stages[position];
-            let waits = run.stage.upstream().iter().any(|name| busy.contains(name));
-            if let ([frame, ..], Some(cache), false) = (&run.todo[..], &run.cache, waits) {
+            if let ([frame, ..], Some(cache), false) = (&run.todo[..], &run.cache, self.waits(run)) {
                 let upstream = self.upstream(run.stage, self.own.folder())?;
                 let last = run.todo.last().copied().unwrap_or(*frame);
                 run.stage.looks_ahead(ctx, &upstream, last)?;
@@ -190,6 +187,12 @@ impl<'a> Run<'a> {
             }
         }
         self.own.write(own_files::SCENE, self.plan.scene.to_toml_in(self.own.folder()).as_bytes())
+    }
+
+    /// Whether a stage upstream of this one still has frames to make.
+    fn waits(&self, run: &StageRun<'_>) -> bool {
+        let mut busy = self.stages.iter().filter(|other| !other.todo.is_empty());
+        busy.any(|other| run.stage.upstream().contains(&other.stage.name()))
     }
 
     /// Number of frames to be made, over all stages.
@@ -236,10 +239,7 @@ impl<'a> Run<'a> {
 
     /// The stages, by index, that have frames to make and wait for no other; `None` if all is done.
     fn ready(&self) -> Option<Vec<usize>> {
-        let busy: Vec<&str> =
-            self.stages.iter().filter(|run| !run.todo.is_empty()).map(|run| run.stage.name()).collect();
-        let waits = |run: &StageRun<'_>| run.stage.upstream().iter().any(|name| busy.contains(name));
-        let is_ready = |run: &StageRun<'_>| !run.todo.is_empty() && !waits(run);
+        let is_ready = |run: &StageRun<'_>| !run.todo.is_empty() && !self.waits(run);
         let ready: Vec<usize> = (0..self.stages.len()).filter(|at| is_ready(&self.stages[*at])).collect();
         (!ready.is_empty()).then_some(ready)
     }
