@@ -9,8 +9,7 @@ use super::each::Each;
 use super::options::{
     Axis, MeshSpace, needs_frames, of_frame, one_frame, positive, refuse_one_file, warn_if_far,
 };
-use super::session::Session;
-use super::session::exit::{Failure, Phase};
+use super::session::{Failure, Phase, Session};
 use super::{output, points};
 use frazil::geometry::mesh::attributes::On;
 use frazil::geometry::{MeshArray, TriMesh, Uvs, Vec3};
@@ -82,16 +81,9 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let path = of_frame(&args.output, frame);
         output::refuse_input(&path, inputs.iter().map(PathBuf::as_path)).before()?;
     }
-    let (mut each, mut made, mut triangles, mut has_warned) = (Each::default(), 0, 0, false);
-    for frame in frames.iter() {
-        session.ctx.check().during()?;
-        let path = of_frame(&args.output, frame);
-        let done = source.write(args, &path, frame, &mut has_warned);
-        if let Some(count) = each.take(frame, done)? {
-            (made, triangles) = (made + 1, count);
-        }
-    }
-    session.record("frames", json!(made));
+    let (mut triangles, mut has_warned) = (0, false);
+    let write = |frame| source.write(args, &of_frame(&args.output, frame), frame, &mut has_warned);
+    let each = Each::run(session, &frames, write, |count| triangles = count)?;
     session.record("triangles", json!(triangles));
     each.finish()
 }

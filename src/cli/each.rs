@@ -1,8 +1,9 @@
 //! Frames that are made one by one: a frame that cannot be made does not cost the others.
 
+use frazil::scene::FrameChoice;
 use frazil::{Error, Result};
 
-use super::session::exit::Failure;
+use super::session::{Failure, Phase, Session};
 
 /// Number of failed frames that are named one by one, and of those listed at the end.
 const MAX_NAMED: usize = 20;
@@ -17,6 +18,25 @@ pub struct Each {
 }
 
 impl Each {
+    /// Makes frames one by one; `add` gets what was made of each. The report of the session gets their number.
+    ///
+    /// # Errors
+    /// As [`Each::take`].
+    pub fn run<T>(
+        session: &Session,
+        frames: &FrameChoice,
+        mut make: impl FnMut(i32) -> Result<T>,
+        mut add: impl FnMut(T),
+    ) -> std::result::Result<Self, Failure> {
+        let mut each = Self::default();
+        for frame in frames.iter() {
+            session.ctx.check().during()?;
+            each.take(frame, make(frame))?.into_iter().for_each(&mut add);
+        }
+        session.record("frames", each.made.into());
+        Ok(each)
+    }
+
     /// Counts a frame; returns its result, none if it failed.
     ///
     /// # Errors

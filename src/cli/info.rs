@@ -8,8 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::options::{Origin, warn_if_far};
 use super::output;
-use super::session::Session;
-use super::session::exit::{Failure, Phase};
+use super::session::{Failure, Phase, Session};
 
 /// Report what .vdb, mesh (.obj, .ply, .stl), character (.glb, .gltf) and particle files (.bgeo, .vtk, .vtu, .xyz, .ply) hold.
 #[derive(clap::Args)]

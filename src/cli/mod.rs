@@ -16,8 +16,7 @@ mod shot;
 mod vdb;
 
 use clap::{Parser, Subcommand};
-use session::exit::Failure;
-use session::{Globals, Session};
+use session::{Failure, Globals, Session};
 use std::process::ExitCode;
 
 /// Volumetric effects on OpenVDB: deep snow with prints, detailed meshes that follow liquids, little liquids on terrain, swept volumes,

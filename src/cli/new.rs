@@ -3,7 +3,7 @@
 use frazil::scene::{self, reference, template};
 
 use super::output;
-use super::session::exit::{Failure, Phase};
+use super::session::{Failure, Phase};
 
 /// Print a commented scene to start from.
 #[derive(clap::Args)]

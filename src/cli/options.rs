@@ -10,7 +10,7 @@ use frazil::render::Size;
 use frazil::scene::{FrameChoice, Frames};
 use std::path::{Path, PathBuf};
 
-use super::session::exit::Failure;
+use super::session::Failure;
 
 /// Conversion of a file's space to metres with Y up.
 #[derive(clap::Args)]

@@ -18,8 +18,7 @@ use serde_json::{Map, Value, json};
 use super::each::Each;
 use super::options::{needs_frames, of_frame, one_frame, refuse_one_file};
 use super::output;
-use super::session::Session;
-use super::session::exit::{Failure, Phase};
+use super::session::{Failure, Phase, Session};
 
 /// The description of points in `frazil info`, without the name of their grid.
 pub fn described(points: &Points) -> Map<String, Value> {
@@ -133,19 +132,13 @@ impl Conversion<'_> {
             let from = of_frame(self.input, frame);
             output::refuse_input(&of_frame(self.output, frame), [from.as_path()]).before()?;
         }
-        let (mut each, mut made, mut count) = (Each::default(), 0, 0);
-        for frame in frames.iter() {
-            session.ctx.check().during()?;
-            let one = || {
-                let read = self.read(&of_frame(self.input, frame))?;
-                self.write(&of_frame(self.output, frame), frame, &read, session)?;
-                Ok(read.points.count())
-            };
-            if let Some(points) = each.take(frame, one())? {
-                (made, count) = (made + 1, count + points);
-            }
-        }
-        session.record("frames", json!(made));
+        let mut count = 0;
+        let convert = |frame| {
+            let read = self.read(&of_frame(self.input, frame))?;
+            self.write(&of_frame(self.output, frame), frame, &read, session)?;
+            Ok(read.points.count())
+        };
+        let each = Each::run(session, &frames, convert, |points| count += points)?;
         session.record("points", json!(count));
         each.finish()
     }

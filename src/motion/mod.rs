@@ -21,7 +21,7 @@ pub use space::{Space, Up};
 use std::path::Path;
 
 use crate::error::Result;
-use crate::geometry::DVec3;
+use crate::geometry::{DVec3, TriMesh};
 use crate::io::mesh::extension;
 
 /// Whether a file is a glTF character, by its extension.
@@ -64,6 +64,17 @@ pub trait Motion: Send + Sync {
     /// As [`Motion::pose`].
     fn drawn_pose(&self, time: f64, out: &mut Vec<DVec3>) -> Result<()> {
         self.pose(time, out)
+    }
+
+    /// The mesh of [`Motion::triangles`] at `time` (s), with positions as in [`Motion::pose`].
+    ///
+    /// # Errors
+    /// As [`Motion::pose`].
+    fn mesh_at(&self, time: f64) -> Result<TriMesh> {
+        let mut pose = Vec::new();
+        self.pose(time, &mut pose)?;
+        let positions = pose.iter().map(|position| position.cast()).collect();
+        Ok(TriMesh { positions, triangles: self.triangles().to_vec() })
     }
 
     /// Writes the mean velocities (m/s) of the drawn vertices from `time` to `time + step` (s) into `out` (cleared first).

@@ -74,8 +74,8 @@ impl Stage for Objects<'_> {
         &[Kind { name: "objects", extensions: &["usda", "ply"] }]
     }
 
-    fn loose_files(&self) -> &'static [&'static str] {
-        if self.scene.output.objects_usd { &[MANIFEST] } else { &[] }
+    fn usd_kind(&self) -> Option<&'static str> {
+        self.scene.output.objects_usd.then_some("objects")
     }
 
     fn settings(&self) -> Result<Settings> {
@@ -102,9 +102,6 @@ impl Stage for Objects<'_> {
         Some(Clips::new("objects", ClipPrims::Meshes(named.map(mesh).collect())))
     }
 }
-
-/// Manifest shared by the clips in `objects/`.
-const MANIFEST: &str = "objects/objects.manifest.usda";
 
 impl Stepping for Objects<'_> {
     type State = ();

@@ -14,8 +14,7 @@ use frazil::scene::{Override, Scene, System};
 use serde::Serialize;
 
 use super::output;
-use super::session::Session;
-use super::session::exit::{Failure, Phase};
+use super::session::{Failure, Phase, Session};
 
 /// Read every input of every frame of a scene, and print its sizes, memory and disk; nothing is computed.
 ///

@@ -7,8 +7,7 @@ use frazil::scene::snow::check::{ObjectReport, Report, check};
 use frazil::scene::{Inputs, Scene, System, check_memory};
 
 use super::{Args, frames_in_words, free_in_words, print, size, surface, warn_of_space, warnings_in_words};
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 
 /// Checks the scene.
 pub fn run(args: &Args, session: &Session, mut scene: Scene) -> Result<(), Failure> {

@@ -8,8 +8,7 @@ use frazil::scene::surface::{Inputs, Report, check};
 use super::{
     Args, frames_in_words, free_in_words, print, refuse_preview, size, warn_of_space, warnings_in_words,
 };
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 
 /// Checks the scene.
 pub fn run(args: &Args, session: &Session, scene: &Scene) -> Result<(), Failure> {

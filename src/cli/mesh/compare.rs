@@ -14,8 +14,7 @@ use serde_json::{Map, Value, json};
 use super::compared::Model;
 use crate::cli::options::{Origin, of_frame};
 use crate::cli::output;
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 
 /// Report how far two meshes lie apart, or two sequences of them frame by frame, and how much a sequence flickers.
 ///

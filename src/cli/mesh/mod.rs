@@ -17,8 +17,7 @@ use serde_json::{Value, json};
 
 use super::options::{MeshSpace, warn_if_far};
 use super::output;
-use super::session::Session;
-use super::session::exit::{Failure, Phase};
+use super::session::{Failure, Phase, Session};
 
 /// Check, compare and repair meshes.
 #[derive(clap::Args)]
@@ -69,11 +68,10 @@ fn check(args: &CheckArgs, session: &Session) -> Result<(), Failure> {
         warn_if_far(path, &mesh);
         let faults = session.ctx.phase("faults", || Ok(Faults::of(&mesh))).during()?;
         let bodies = session.ctx.phase("bodies", || Ok(Body::all(&mesh, &faults))).during()?;
-        let report = report(path, &mesh, &faults, &bodies);
         if args.json {
-            all.push(report);
+            all.push(report(path, &mesh, &faults, &bodies));
         } else {
-            output::print(&in_words(&report)).during()?;
+            output::print(&in_words(path, &mesh, &faults, &bodies)).during()?;
         }
     }
     if args.json { output::print(&format!("{:#}\n", json!(all))).during() } else { Ok(()) }
@@ -194,129 +192,120 @@ fn bodies(mesh: &TriMesh) -> Vec<TriMesh> {
     topology::bodies(&triangles).into_iter().map(alone).collect()
 }
 
-/// A key of the report, and the noun for its count, singular and plural.
-pub type Counted = (&'static str, &'static str, &'static str);
+/// The nouns of faults, singular and plural.
+type Nouns<const N: usize> = [[&'static str; 2]; N];
 
-const PARTS: [Counted; 2] = [
-    ("holes", "hole: closed by a cone to its centre", "holes: closed by cones to their centres"),
-    (
-        "inverted_parts",
+const PARTS: Nouns<2> = [
+    ["hole: closed by a cone to its centre", "holes: closed by cones to their centres"],
+    [
         "part is inside out: it is turned outward where the mesh is used",
         "parts are inside out: they are turned outward where the mesh is used",
-    ),
+    ],
 ];
 
 /// Faulty edges and vertices, joined by position or by index.
-const JOINTS: [Counted; 4] = [
-    ("open_edges", "edge with one triangle", "edges with one triangle"),
-    (
-        "crowded_edges",
+const JOINTS: Nouns<4> = [
+    ["edge with one triangle", "edges with one triangle"],
+    [
         "non-manifold edge: it has more than two triangles",
         "non-manifold edges: they have more than two triangles",
-    ),
-    (
-        "turned_edges",
+    ],
+    [
         "inconsistently oriented edge: its triangles disagree about which side is out",
         "inconsistently oriented edges: their triangles disagree about which side is out",
-    ),
-    (
-        "non_manifold_vertices",
+    ],
+    [
         "non-manifold vertex: its triangles form no single fan",
         "non-manifold vertices: their triangles form no single fan",
-    ),
+    ],
 ];
 
-const TRIANGLES: [Counted; 11] = [
-    (
-        "crossings",
+const TRIANGLES: Nouns<11> = [
+    [
         "pair of triangles cuts each other: harmless only where both are right side out",
         "pairs of triangles cut each other: harmless only where both are right side out",
-    ),
-    (
-        "corner_crossings",
+    ],
+    [
         "pair of triangles with a common corner cuts each other: harmless only where both are right side out",
         "pairs of triangles with a common corner cut each other: harmless only where both are right side out",
-    ),
-    (
-        "folds",
+    ],
+    [
         "pair of triangles is folded onto each other along its common edge",
         "pairs of triangles are folded onto each other along their common edges",
-    ),
-    (
-        "overlaps",
+    ],
+    [
         "pair of triangles lies on each other in one plane",
         "pairs of triangles lie on each other in one plane",
-    ),
-    (
-        "touches",
-        "pair of triangles touches beyond common corners",
-        "pairs of triangles touch beyond common corners",
-    ),
-    ("degenerate_triangles", "triangle without area: ignored", "triangles without area: ignored"),
-    ("doubled_triangles", "triangle with the corners of another", "triangles with the corners of another"),
-    (
-        "doubled_vertices",
-        "vertex at the position of another: joined",
-        "vertices at the position of another: joined",
-    ),
-    (
-        "near_vertices",
+    ],
+    ["pair of triangles touches beyond common corners", "pairs of triangles touch beyond common corners"],
+    ["triangle without area: ignored", "triangles without area: ignored"],
+    ["triangle with the corners of another", "triangles with the corners of another"],
+    ["vertex at the position of another: joined", "vertices at the position of another: joined"],
+    [
         "vertex on an open edge within rounding of another: joined",
         "vertices on open edges within rounding of others: joined",
-    ),
-    (
-        "ambiguous_vertices",
+    ],
+    [
         "vertex on an open edge within rounding of others: which of them it is is not clear",
         "vertices on open edges within rounding of others: which of them are one is not clear",
-    ),
-    ("unused_vertices", "vertex that no triangle names: ignored", "vertices that no triangle names: ignored"),
+    ],
+    ["vertex that no triangle names: ignored", "vertices that no triangle names: ignored"],
 ];
 
 /// A mesh as text: what it is, then only the faults that it has.
-fn in_words(mesh: &Value) -> String {
-    let count = |key: &str| mesh[key].as_u64().unwrap_or(0);
-    let as_it_is = |key: &str| mesh["by_index"][key].as_u64().unwrap_or(0);
-    let what = match (mesh["solid"] == json!(true), as_it_is("open_edges")) {
+fn in_words(path: &Path, mesh: &TriMesh, faults: &Faults, bodies: &[Body]) -> String {
+    let by_index = &faults.by_index;
+    let what = match (faults.is_solid(), by_index.open_edges) {
         (false, _) => "not a solid as it is",
         (true, 0) => "a solid",
-        (true, _) if count("near_vertices") > 0 => {
+        (true, _) if faults.near_vertices > 0 => {
             "a solid, once vertices within rounding of one position are joined"
         }
         (true, _) => "a solid, once vertices at one position are joined",
     };
     let [vertices, triangles, parts] = [
-        ("vertices", ["vertex", "vertices"]),
-        ("triangles", ["triangle", "triangles"]),
-        ("parts", ["part", "parts"]),
+        (mesh.positions.len(), ["vertex", "vertices"]),
+        (mesh.triangles.len(), ["triangle", "triangles"]),
+        (faults.parts, ["part", "parts"]),
     ]
-    .map(|(key, forms)| format!("{} {}", count(key), form(count(key), forms)));
-    let file = mesh["file"].as_str().unwrap_or_default();
-    let mut out = format!("{file}: {what}\n  {vertices}, {triangles}, {parts}");
-    if let Some(genus) = mesh["genus"].as_i64() {
+    .map(|(count, forms)| format!("{count} {}", form(count, forms)));
+    let mut out = format!("{}: {what}\n  {vertices}, {triangles}, {parts}", path.display());
+    if let Some(genus) = faults.genus {
         out += &format!(", genus {genus}");
     }
-    if let Some(size) = mesh["size_m"].as_array() {
-        let size: Vec<String> = size.iter().map(|v| format!("{:.4}", v.as_f64().unwrap_or(0.0))).collect();
-        out += &format!("\n  {} m, ", size.join(" x "));
+    if let Some((low, high)) = mesh.bounds() {
+        let [x, y, z] = (high - low).into();
+        out += &format!("\n  {x:.4} x {y:.4} x {z:.4} m, ");
     }
-    let number = |key: &str| mesh[key].as_f64().unwrap_or(0.0);
-    let (area, volume) = (number("area_m2"), number("volume_m3"));
     // If the parts' volumes cancel, the rest is rounding.
-    let is_rounding = volume.abs() < 1e-9 * area * area.sqrt();
-    let volume = if is_rounding { 0.0 } else { volume };
+    let is_rounding = faults.volume.abs() < 1e-9 * faults.area * faults.area.sqrt();
+    let (area, volume) = (faults.area, if is_rounding { 0.0 } else { faults.volume });
     out += &format!("area {area:.6} m2, volume {volume:.6} m3\n");
-    out += &bodies_in_words(mesh["bodies"].as_array().map_or(&[][..], Vec::as_slice));
-    for (key, one, several) in [&PARTS[..], &JOINTS, &TRIANGLES].concat() {
-        if count(key) > 0 {
-            out += &line(count(key), [one, several]);
-        }
-    }
+    out += &bodies_in_words(bodies);
+    let joints = [faults.open_edges, faults.crowded_edges, faults.turned_edges, faults.non_manifold_vertices];
+    let triangles = [
+        faults.crossings,
+        faults.corner_crossings,
+        faults.folds,
+        faults.overlaps,
+        faults.touches,
+        faults.degenerate,
+        faults.doubled_triangles,
+        faults.doubled_vertices,
+        faults.near_vertices,
+        faults.ambiguous_vertices,
+        faults.unused_vertices,
+    ];
+    let parts = [faults.holes, faults.inverted_parts].into_iter().zip(PARTS);
+    let all = parts.chain(joints.into_iter().zip(JOINTS)).chain(triangles.into_iter().zip(TRIANGLES));
+    out.extend(all.filter(|(count, _)| *count > 0).map(|(count, forms)| line(count, forms)));
     // Faults hidden by joining vertices by position.
-    for (key, one, several) in
-        JOINTS.into_iter().filter(|(key, ..)| ![0, count(key)].contains(&as_it_is(key)))
-    {
-        let (count, noun) = (as_it_is(key), form(as_it_is(key), [one, several]));
-        out += &format!("  {count:>8} {noun}, by the vertices' indices\n");
+    let as_it_is =
+        [by_index.open_edges, by_index.crowded_edges, by_index.turned_edges, by_index.non_manifold_vertices];
+    for ((count, joined), forms) in as_it_is.into_iter().zip(joints).zip(JOINTS) {
+        if count > 0 && count != joined {
+            out += &format!("  {count:>8} {}, by the vertices' indices\n", form(count, forms));
+        }
     }
     if volume < 0.0 {
         out += "           inside out: turned outward where it is used\n";
@@ -328,33 +317,32 @@ fn in_words(mesh: &Value) -> String {
 const TOLD: usize = 8;
 
 /// Several bodies, the largest first; the rest only as a count.
-fn bodies_in_words(bodies: &[Value]) -> String {
+fn bodies_in_words(bodies: &[Body]) -> String {
     if bodies.len() < 2 {
         return String::new();
     }
-    let mut order: Vec<&Value> = bodies.iter().collect();
-    let area = |body: &Value| body["area_m2"].as_f64().unwrap_or(0.0);
-    order.sort_by(|&a, &b| area(b).total_cmp(&area(a)));
-    let line = |&body: &&Value| {
-        let count = body["triangles"].as_u64().unwrap_or(0);
-        let genus = body["genus"].as_i64().map_or("open".to_string(), |genus| format!("genus {genus}"));
-        let (area, volume) = (area(body), body["volume_m3"].as_f64().unwrap_or(0.0));
+    let mut order: Vec<&Body> = bodies.iter().collect();
+    order.sort_by(|a, b| b.faults.area.total_cmp(&a.faults.area));
+    let line = |Body { mesh, faults }: &&Body| {
+        let count = mesh.triangles.len();
+        let genus = faults.genus.map_or("open".to_string(), |genus| format!("genus {genus}"));
+        let (area, volume) = (faults.area, faults.volume);
         let triangles = form(count, ["triangle", "triangles"]);
         format!("  body: {count} {triangles}, {genus}, area {area:.6} m2, volume {volume:.6} m3\n")
     };
     let mut out: String = order.iter().take(TOLD).map(line).collect();
     if let Some(others) = bodies.len().checked_sub(TOLD).filter(|others| *others > 0) {
-        out += &format!("  and {others} more {}\n", form(others as u64, ["body", "bodies"]));
+        out += &format!("  and {others} more {}\n", form(others, ["body", "bodies"]));
     }
     out
 }
 
 /// A line with a count and its noun.
-pub fn line(count: u64, forms: [&'static str; 2]) -> String {
+pub fn line(count: usize, forms: [&'static str; 2]) -> String {
     format!("  {count:>8} {}\n", form(count, forms))
 }
 
 /// The noun for a count, singular or plural.
-pub fn form(count: u64, [one, several]: [&'static str; 2]) -> &'static str {
+pub fn form(count: usize, [one, several]: [&'static str; 2]) -> &'static str {
     if count == 1 { one } else { several }
 }

@@ -12,14 +12,13 @@ use frazil::scene::FrameChoice;
 use frazil::{Error, Result};
 use serde_json::{Value, json};
 
-use super::{Counted, form, line};
+use super::{form, line};
 use crate::cli::convert::{Losses, MeshFile, VELOCITY, check_output, prim_name};
 use crate::cli::options::{
     MeshSpace, needs_frames, of_frame, one_frame, positive, refuse_one_file, warn_if_far,
 };
 use crate::cli::output;
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 
 /// Make solids of meshes that are open, intersect themselves, or are inside out in parts.
 ///
@@ -84,6 +83,7 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
         if let Some(what) = warning(&repaired) {
             log::warn!("{}: {what}", from.display());
         }
+        let words = in_words(&from, &to, &detail.mesh, &repaired, cell);
         let mut report = report(&detail.mesh, &repaired, cell);
         report["file"] = json!(from.display().to_string());
         report["output"] = json!(to.display().to_string());
@@ -99,7 +99,7 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
         };
         args.write(&to, frame, &detail).during()?;
         if !args.json {
-            output::print(&in_words(&report, cell)).during()?;
+            output::print(&words).during()?;
         }
         reports.push(report);
     }
@@ -270,25 +270,19 @@ fn report(mesh: &TriMesh, repaired: &Repaired, cell: Cell) -> Value {
     })
 }
 
-/// Preparation before anything is rebuilt.
-const DONE: [Counted; 5] = [
-    (
-        "joined_vertices",
+/// What was done before anything is rebuilt: nouns for the counts of `in_words`.
+const DONE: [[&str; 2]; 5] = [
+    [
         "vertex joined with another that is the same corner",
         "vertices joined with others that are the same corners",
-    ),
-    (
-        "dropped_triangles",
+    ],
+    [
         "triangle left out: without area, doubled, or alone",
         "triangles left out: without area, doubled, or alone",
-    ),
-    (
-        "turned_triangles",
-        "triangle turned round as its neighbours are",
-        "triangles turned round as their neighbours are",
-    ),
-    ("turned_parts", "part turned outward", "parts turned outward"),
-    ("closed_holes", "hole closed", "holes closed"),
+    ],
+    ["triangle turned round as its neighbours are", "triangles turned round as their neighbours are"],
+    ["part turned outward", "parts turned outward"],
+    ["hole closed", "holes closed"],
 ];
 
 /// How far rebuilding extended beyond the faulty cells and those that they require.
@@ -300,32 +294,35 @@ const RUNGS: [&str; 4] = [
 ];
 
 /// A repair as text: only what was done.
-fn in_words(report: &Value, cell: Cell) -> String {
-    let count = |key: &str| report[key].as_u64().unwrap_or(0);
-    let number = |key: &str| report[key].as_f64().unwrap_or(0.0);
-    let [file, output] = ["file", "output"].map(|key| report[key].as_str().unwrap_or_default());
-    if report["solid_already"] == json!(true) {
+fn in_words(from: &Path, to: &Path, before: &TriMesh, repaired: &Repaired, cell: Cell) -> String {
+    let Repaired { mesh: after, report, .. } = repaired;
+    let (file, output) = (from.display(), to.display());
+    if is_as_it_was(before, repaired) {
         return format!("{file} is a solid already: written as it is\n");
     }
-    let what = if report["lost"] == json!(true) { "a solid now, but not all of it" } else { "a solid now" };
+    let is_lost = report.losses.warning(report.cell).is_some();
+    let what = if is_lost { "a solid now, but not all of it" } else { "a solid now" };
     let mut out = format!("{file}: {what}, in {output}\n");
-    for (key, one, several) in DONE.into_iter().filter(|(key, ..)| count(key) > 0) {
-        out += &line(count(key), [one, several]);
+    let done = &report.prepared;
+    let counts =
+        [done.joined_vertices, done.dropped_triangles, done.turned_triangles, done.turned_parts, done.holes];
+    for (count, forms) in counts.into_iter().zip(DONE).filter(|(count, _)| *count > 0) {
+        out += &line(count, forms);
     }
-    let (used, Cell { edge, why }) = (number("cell_m"), cell);
+    let (used, Cell { edge, why }) = (report.cell, cell);
     let why = if used < edge { format!(": {edge} m would have left nothing") } else { why.to_string() };
-    let rung = RUNGS.get(report["rung"].as_u64().unwrap_or(0) as usize).copied().unwrap_or_default();
+    let rung = RUNGS.get(report.rung).copied().unwrap_or_default();
     out += &format!(
         "  cells of {used} m{why}\n  {:>8} {} flagged, {} rebuilt{rung}\n",
-        count("flagged_cells"),
-        form(count("flagged_cells"), ["cell", "cells"]),
-        count("rebuilt_cells")
+        report.flagged_cells,
+        form(report.flagged_cells, ["cell", "cells"]),
+        report.rebuilt_cells
     );
-    let (kept, before, made) = (count("kept_triangles"), count("triangles_before"), count("made_triangles"));
-    out += &format!("  {kept:>8} of {before} triangles kept, {made} made\n");
-    if count("slivers") > 0 {
-        out += &line(count("slivers"), ["of these is a sliver", "of these are slivers"]);
+    let (kept, made) = (report.kept_triangles, after.triangles.len() - report.kept_triangles);
+    out += &format!("  {kept:>8} of {} triangles kept, {made} made\n", before.triangles.len());
+    if report.slivers > 0 {
+        out += &line(report.slivers, ["of these is a sliver", "of these are slivers"]);
     }
-    let (volume, after) = (number("volume_before_m3"), number("volume_m3"));
+    let (volume, after) = (before.volume(), after.volume());
     out + &format!("  volume {volume:.6} m3 before, {after:.6} m3 now\n")
 }

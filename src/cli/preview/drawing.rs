@@ -12,7 +12,7 @@ use frazil::{Context, Error, Result};
 
 use super::tint::{Tint, Tinted};
 use crate::cli::preview::parts::Part;
-use crate::cli::session::exit::Failure;
+use crate::cli::session::Failure;
 
 /// The colour of meshes (linear red, green, blue): leather, to contrast with snow.
 const BROWN: [f32; 3] = [0.35, 0.16, 0.08];

@@ -7,8 +7,7 @@ use super::in_order::in_order;
 use super::sources::Sources;
 use crate::cli::each::Each;
 use crate::cli::preview::parts::Part;
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 use crate::cli::shot::progress::FrameProgress;
 use frazil::io::files::atomic;
 use frazil::io::files::sequence::Pattern;
@@ -164,22 +163,12 @@ impl<'a> Flipbook<'a> {
         };
         let mut progress = FrameProgress::new(ctx, frames.len(), 0, session.is_quiet());
         let at_once = ctx.pool().threads().min(MOST_AT_ONCE);
-        let mut ended = None;
-        let done = in_order(frames.len(), at_once, read, make, |position, made| match take(position, made) {
-            Ok(Some(())) => {
+        in_order(frames.len(), at_once, read, make, |position, made| {
+            if take(position, made)?.is_some() {
                 progress.finished("picture", frames[position]);
-                Ok(())
             }
-            Ok(None) => Ok(()),
-            Err(failure) => {
-                ended = Some(failure);
-                Err(Error::Cancelled)
-            }
-        });
-        match ended {
-            Some(failure) => Err(failure),
-            None => done.during(),
-        }
+            Ok(())
+        })
     }
 
     /// Colours for all frames, from small pictures of some.

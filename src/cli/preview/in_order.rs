@@ -16,13 +16,13 @@ type Job<T> = (usize, Sender<Result<T>>);
 ///
 /// # Errors
 /// The first error, in order of frames; no later frame is read any more.
-pub fn in_order<R, T: Send>(
+pub fn in_order<R, T: Send, E: From<Error>>(
     count: usize,
     threads: usize,
     read: impl FnMut(usize) -> Result<R> + Send,
     make: impl Fn(usize, R) -> Result<T> + Sync,
-    mut take: impl FnMut(usize, T) -> Result<()>,
-) -> Result<()> {
+    mut take: impl FnMut(usize, T) -> std::result::Result<(), E>,
+) -> std::result::Result<(), E> {
     let (ask, jobs) = channel::<Job<T>>();
     let (waiting, failed) = (Mutex::new((jobs, read)), AtomicBool::new(false));
     std::thread::scope(|scope| {
@@ -99,13 +99,13 @@ mod tests {
             let take = |frame: usize, made: usize| {
                 under_way.fetch_sub(1, Ordering::SeqCst);
                 taken.push((frame, made));
-                Ok(())
+                Ok::<(), Error>(())
             };
             in_order(20, threads, begin, make, take).unwrap();
             assert_eq!(read, (0..20).collect::<Vec<_>>());
             assert_eq!(taken, (0..20).map(|frame| (frame, 10 * frame)).collect::<Vec<_>>());
         }
-        in_order(0, 2, |_| Ok(()), |_, ()| Ok(()), |_, ()| Ok(())).unwrap();
+        in_order(0, 2, |_| Ok(()), |_, ()| Ok(()), |_, ()| Ok::<(), Error>(())).unwrap();
     }
 
     #[test]
@@ -117,7 +117,7 @@ mod tests {
             };
             let take = |_, ()| {
                 taken += 1;
-                Ok(())
+                Ok::<(), Error>(())
             };
             let error = in_order(20, 3, |_| Ok(()), make, take).unwrap_err();
             assert_eq!((error.to_string(), taken), (faulty.to_string(), faulty));

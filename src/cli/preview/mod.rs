@@ -12,8 +12,7 @@ mod tint;
 
 use std::path::{Path, PathBuf};
 
-use super::session::Session;
-use super::session::exit::{Failure, Phase};
+use super::session::{Failure, Phase, Session};
 use super::{options, output};
 use drawing::Look;
 use flipbook::Flipbook;

@@ -111,13 +111,13 @@ impl Folder for Shot {
         if mist.is_some() {
             parts.extend(of_vdb(&self.mist.file(frame, STAGES[2].0)?)?);
         }
-        if objects.is_some() {
-            let path = self.objects.file_with(frame, STAGES[3].0, "ply")?;
-            parts.push(Part::Mesh(mesh::read_detailed(&path)?.without_unused()));
-        }
-        if surface.is_some() {
-            let path = self.surface.file_with(frame, STAGES[4].0, "ply")?;
-            parts.push(Part::Mesh(mesh::read_detailed(&path)?.without_unused()));
+        for (stored, (stage, _), file) in
+            [(&self.objects, STAGES[3], objects), (&self.surface, STAGES[4], surface)]
+        {
+            if file.is_some() {
+                let path = stored.file_with(frame, stage, "ply")?;
+                parts.push(Part::Mesh(mesh::read_detailed(&path)?.without_unused()));
+            }
         }
         Ok(parts)
     }

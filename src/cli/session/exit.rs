@@ -62,10 +62,17 @@ impl<T> Phase<T> for frazil::Result<T> {
     }
 
     fn during(self) -> Result<T, Failure> {
-        self.map_err(|error| match error {
-            Error::Argument(_) | Error::Memory { .. } => Failure::refused(error),
-            _ => Failure::failed(error),
-        })
+        self.map_err(Failure::from)
+    }
+}
+
+/// As [`Phase::during`].
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Argument(_) | Error::Memory { .. } => Self::refused(error),
+            _ => Self::failed(error),
+        }
     }
 }
 

@@ -7,7 +7,7 @@ mod signals;
 pub(in crate::cli) mod usage;
 
 use super::output;
-use exit::{Failure, Phase};
+pub use exit::{Failure, Phase};
 use frazil::context::{PhaseTime, Phases, peak_memory};
 #[cfg(feature = "vdb")]
 use frazil::vdb::reading::guard::{self, Guard};

@@ -14,8 +14,7 @@ use frazil::scene::run::{Plan, Report, Run};
 use frazil::scene::{FrameChoice, Override, Scene};
 
 use super::output;
-use super::session::Session;
-use super::session::exit::{Failure, Phase};
+use super::session::{Failure, Phase, Session};
 use progress::FrameProgress;
 
 /// The output of a shot, and the part of it to make.

@@ -7,8 +7,7 @@ use frazil::scene::{Scene, shallow};
 use serde_json::{Map, Value, json};
 
 use super::ShotArgs;
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 
 /// Let a little liquid flow over a terrain: blood, water, paint, honey.
 ///
@@ -44,31 +43,20 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     for (name, value) in last.unwrap_or_default().into_iter().filter(|(name, _)| name.ends_with("_ml")) {
         session.record(&name, value);
     }
-    times.0.iter().for_each(|phase| {
-        log::info!("{}: {:.3} ms a frame, at most {:.3} ms", phase.name, phase.mean(), phase.worst);
-    });
-    session.record("ms", times.into_json());
+    let mut ms = Map::new();
+    for (name, all) in times.0 {
+        let mean = all.iter().sum::<f64>() / all.len() as f64;
+        let worst = all.into_iter().fold(0.0, f64::max);
+        log::info!("{name}: {mean:.3} ms a frame, at most {worst:.3} ms");
+        ms.insert(name.into(), json!({ "mean": mean, "worst": worst }));
+    }
+    session.record("ms", ms.into());
     Ok(())
 }
 
-/// Times of the phases of frames.
+/// The time of each phase in each frame (ms).
 #[derive(Default)]
-struct Times(Vec<Phases>);
-
-/// A phase, over all frames.
-struct Phases {
-    name: &'static str,
-    /// Milliseconds: total over all frames, and maximum.
-    sum: f64,
-    worst: f64,
-    count: usize,
-}
-
-impl Phases {
-    fn mean(&self) -> f64 {
-        self.sum / self.count as f64
-    }
-}
+struct Times(Vec<(&'static str, Vec<f64>)>);
 
 impl Times {
     /// Adds a frame; the first one takes no step, and does not count.
@@ -78,21 +66,10 @@ impl Times {
         }
         for phase in &report.phases {
             let ms = 1e3 * phase.time.as_secs_f64();
-            match self.0.iter_mut().find(|known| known.name == phase.name) {
-                Some(known) => {
-                    known.sum += ms;
-                    known.worst = known.worst.max(ms);
-                    known.count += 1;
-                }
-                None => self.0.push(Phases { name: phase.name, sum: ms, worst: ms, count: 1 }),
+            match self.0.iter_mut().find(|(name, _)| *name == phase.name) {
+                Some((_, all)) => all.push(ms),
+                None => self.0.push((phase.name, vec![ms])),
             }
         }
-    }
-
-    /// Mean and maximum of each phase.
-    fn into_json(self) -> Value {
-        let of =
-            |phase: Phases| (phase.name.to_string(), json!({ "mean": phase.mean(), "worst": phase.worst }));
-        Value::Object(self.0.into_iter().map(of).collect::<Map<String, Value>>())
     }
 }

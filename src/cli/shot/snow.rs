@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use frazil::scene::{Inputs, Scene, check_memory, snow};
 
 use super::ShotArgs;
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 
 /// Press moving objects into a layer of snow.
 ///

@@ -7,8 +7,7 @@ use frazil::scene::{Frames, Scene, surface};
 
 use super::ShotArgs;
 use crate::cli::options::positive;
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 
 /// Carry a detailed mesh along with the particles of a liquid, frame by frame, keeping its detail.
 ///

@@ -1,8 +1,7 @@
 //! `frazil vdb union`, `difference`, `intersection`.
 
 use super::VdbOutput;
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 use frazil::vdb::{FloatGrid, file};
 use frazil::{Context, Result};
 use std::path::PathBuf;

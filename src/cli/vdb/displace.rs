@@ -1,8 +1,7 @@
 //! `frazil vdb displace`.
 
 use super::VdbOutput;
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 use frazil::snow::NoiseParams;
 use frazil::snow::base_layer::displace;
 use frazil::vdb::file;

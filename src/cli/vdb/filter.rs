@@ -2,8 +2,7 @@
 
 use super::VdbOutput;
 use crate::cli::options::finite;
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 use clap::ValueEnum;
 use frazil::vdb::file;
 use frazil::vdb::level_set::{self, Scheme};

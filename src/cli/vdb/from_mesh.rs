@@ -2,8 +2,7 @@
 
 use super::VdbOutput;
 use crate::cli::options::{MeshSpace, positive, warn_of_corners};
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 use frazil::motion::{Keys, Rigid};
 use frazil::sweep::{self, Body, Settings};
 use std::path::PathBuf;

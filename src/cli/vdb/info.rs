@@ -36,7 +36,6 @@ pub fn grids(path: &Path, measure: bool, ctx: &Context) -> frazil::Result<Vec<Va
             if let Some(what) = what {
                 log::warn!("{}: grid \"{}\" {what}", path.display(), grid.name);
             }
-            let mut set = |key: &str, value: Value| entry.insert(key.into(), value);
             set("area_m2", json!(size.area));
             set("volume_m3", json!(size.volume));
         }
@@ -47,10 +46,8 @@ pub fn grids(path: &Path, measure: bool, ctx: &Context) -> frazil::Result<Vec<Va
                 entry.insert("partial".into(), json!(partial(since)));
             }
         }
-        let mut set = |key: &str, value: Value| entry.insert(key.into(), value);
-        for (key, value) in grid.metadata.iter().filter(|(key, _)| !key.starts_with("file_")) {
-            set(key, meta(value));
-        }
+        let metadata = grid.metadata.iter().filter(|(key, _)| !key.starts_with("file_"));
+        entry.extend(metadata.map(|(key, value)| (key.clone(), meta(value))));
         out.push(Value::Object(entry));
     }
     Ok(out)

@@ -12,8 +12,7 @@ mod sweep;
 mod to_mesh;
 
 use super::output;
-use super::session::Session;
-use super::session::exit::{Failure, Phase};
+use super::session::{Failure, Phase, Session};
 use clap::{Subcommand, ValueEnum};
 use frazil::geometry::TriMesh;
 use frazil::geometry::mesh::{BY_OPTION, too_far};

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use super::{Packing, check_name};
 use crate::cli::options::{of_frame, refuse_one_file};
 use crate::cli::output;
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 use frazil::io::files::atomic;
+use frazil::scene::run::Stored;
 use frazil::scene::{FrameChoice, Rebuild, RebuildGrains};
 use frazil::vdb::MetaValue;
 use frazil::vdb::file::{self, WriteOptions};
@@ -45,12 +45,6 @@ enum Of {
     Grains,
 }
 
-/// A cache, read frame by frame.
-enum Cache {
-    Base(Rebuild),
-    Grains(RebuildGrains),
-}
-
 /// Runs the command.
 pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     check_name(&args.output, &["vdb"])?;
@@ -59,42 +53,52 @@ pub fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.stage == Of::Grains && args.packing.half {
         return Err(Failure::refused("--half is of no use with --stage grains: points keep 32 bits"));
     }
-    let mut cache = match args.stage {
-        Of::Base => Cache::Base(Rebuild::open(&args.folder).before()?),
-        Of::Grains => Cache::Grains(RebuildGrains::open(&args.folder).before()?),
-    };
-    let stored = match &cache {
-        Cache::Base(cache) => cache.stored(),
-        Cache::Grains(cache) => cache.stored(),
-    };
-    if let Some(missing) = args.frame.iter().find(|frame| !stored.is_done(*frame)) {
-        return Err(Failure::of_file(&args.folder, format!("frame {missing} is not there")));
-    }
-    let folders = ["base", "removed", "grains", "state"].map(|name| args.folder.join(name));
-    let own: Vec<PathBuf> = folders.iter().filter_map(|folder| std::fs::canonicalize(folder).ok()).collect();
-    let there = match args.output.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => std::fs::canonicalize(folder).ok(),
-        _ => std::env::current_dir().ok(),
-    };
-    if there.is_some_and(|there| own.contains(&there)) {
-        return Err(Failure::of_file(&args.output, "would be written among the cache's own files"));
-    }
-    for frame in args.frame.iter() {
-        let path = of_frame(&args.output, frame);
-        match &mut cache {
-            Cache::Base(cache) => {
-                let grids = cache.layer(&session.ctx, frame).during()?;
-                session.ctx.check().during()?;
+    match args.stage {
+        Of::Base => {
+            let mut cache = Rebuild::open(&args.folder).before()?;
+            args.check(cache.stored())?;
+            args.write(|frame| {
+                let layer = cache.layer(&session.ctx, frame)?;
+                session.ctx.check()?;
                 let metadata = vec![("frazil:frame".to_string(), MetaValue::Int(frame.into()))];
-                let options = WriteOptions { metadata, ..args.packing.options() };
-                file::write(&path, &grids.list(), &options).during()?;
-            }
-            Cache::Grains(cache) => {
-                let bytes = cache.bytes(&session.ctx, frame, &args.packing.options()).during()?;
-                atomic::write_bytes(&path, &bytes).during()?;
-            }
+                file::to_bytes(&layer.list(), &WriteOptions { metadata, ..args.packing.options() })
+            })?;
+        }
+        Of::Grains => {
+            let mut cache = RebuildGrains::open(&args.folder).before()?;
+            args.check(cache.stored())?;
+            args.write(|frame| cache.bytes(&session.ctx, frame, &args.packing.options()))?;
         }
     }
     session.record("frames", json!(args.frame.count()));
     Ok(())
+}
+
+impl Args {
+    /// Refuses frames that a cache lacks, and an output among its own files.
+    fn check(&self, stored: &Stored) -> Result<(), Failure> {
+        if let Some(missing) = self.frame.iter().find(|frame| !stored.is_done(*frame)) {
+            return Err(Failure::of_file(&self.folder, format!("frame {missing} is not there")));
+        }
+        let folders = ["base", "removed", "grains", "state"].map(|name| self.folder.join(name));
+        let own: Vec<PathBuf> =
+            folders.iter().filter_map(|folder| std::fs::canonicalize(folder).ok()).collect();
+        let there = match self.output.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => std::fs::canonicalize(folder).ok(),
+            _ => std::env::current_dir().ok(),
+        };
+        if there.is_some_and(|there| own.contains(&there)) {
+            return Err(Failure::of_file(&self.output, "would be written among the cache's own files"));
+        }
+        Ok(())
+    }
+
+    /// Writes the file of each frame.
+    fn write(&self, mut bytes: impl FnMut(i32) -> frazil::Result<Vec<u8>>) -> Result<(), Failure> {
+        self.frame.iter().try_for_each(|frame| {
+            let written =
+                bytes(frame).and_then(|bytes| atomic::write_bytes(&of_frame(&self.output, frame), &bytes));
+            written.during()
+        })
+    }
 }

@@ -2,8 +2,7 @@
 
 use super::VdbOutput;
 use crate::cli::options::{MeshSpace, Origin, needs_frames, positive, triple};
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 use frazil::geometry::{DVec3, TriMesh};
 use frazil::io::files::sequence::Pattern;
 use frazil::motion::{Key, Keys, MeshSequence, Morph, Motion, Placed, Rigid};
@@ -93,13 +92,7 @@ impl Args {
 
     fn sweep(&self, session: &Session, settings: &Settings) -> Result<FloatGrid, Failure> {
         let (motion, from, to) = self.motion()?;
-        let posed = |time: f64| -> frazil::Result<TriMesh> {
-            let mut pose = Vec::new();
-            motion.pose(time, &mut pose)?;
-            let positions = pose.iter().map(|at| at.cast()).collect();
-            Ok(TriMesh { positions, triangles: motion.triangles().to_vec() })
-        };
-        let ends = [posed(from).before()?, posed(to).before()?];
+        let ends = [motion.mesh_at(from).before()?, motion.mesh_at(to).before()?];
         if let Some(what) = super::far_mesh(&self.mesh[0], &ends[0], self.cell) {
             log::warn!("{what}");
         }

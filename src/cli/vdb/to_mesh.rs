@@ -3,8 +3,7 @@
 use super::check_name;
 use crate::cli::options::finite;
 use crate::cli::output;
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 use frazil::vdb::{file, level_set};
 use serde_json::json;
 use std::path::PathBuf;

@@ -146,11 +146,7 @@ impl Character {
     /// # Errors
     /// As [`Character::open`].
     pub fn posed(path: &Path, play: Play, time: f64) -> Result<TriMesh> {
-        let character = Self::open(path, play)?;
-        let mut pose = Vec::new();
-        character.pose(time, &mut pose)?;
-        let positions = pose.iter().map(|position| position.cast()).collect();
-        Ok(TriMesh { positions, triangles: character.triangles().to_vec() })
+        Self::open(path, play)?.mesh_at(time)
     }
 
     /// Names of a file's contents besides positions, triangles and motion, in the plural: "UVs", "materials" ...

@@ -125,12 +125,6 @@ enum Filled {
     Dense(Box<Samples>),
 }
 
-impl Filled {
-    fn is_dense(&self) -> bool {
-        matches!(self, Self::Dense(_))
-    }
-}
-
 impl Fog {
     /// A fog of densities by block position (a multiple of 8 on each axis), each at most once. Density 1 removes the share `extinction`
     /// of the light per metre, over short paths (1/m, above 0; density times extinction counts as a million at most).
@@ -173,9 +167,7 @@ impl Fog {
             nodes: Vec::new(),
             blocks: Vec::new(),
             // Most fogs have at most one value that whole blocks share.
-            samples: Vec::with_capacity(
-                filled.iter().flatten().filter(|filled| filled.is_dense()).count() + 1,
-            ),
+            samples: Vec::with_capacity(dense + 1),
             bounds: None,
         };
         let mut even: HashMap<u32, u32> = HashMap::new();

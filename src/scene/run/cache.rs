@@ -145,7 +145,7 @@ impl Cache {
         seen: &Arc<InputHashes>,
         folder: &Path,
         reader: &str,
-        upstream: &[&Stored],
+        upstream: &[Stored],
     ) -> Result<()> {
         let stored = Stored::read(folder, stage.name())?;
         let record: Record = checksummed::read(&record_path(folder, stage))?.unwrap_or_default();
@@ -202,7 +202,7 @@ impl Cache {
         &mut self,
         stage: &dyn Stage,
         asked: &FrameChoice,
-        upstream: &[&Stored],
+        upstream: &[Stored],
     ) -> Result<()> {
         let Some(frame) = self.first_changed(stage, asked, upstream)? else { return Ok(()) };
         let what = format!(
@@ -218,7 +218,7 @@ impl Cache {
         &mut self,
         stage: &dyn Stage,
         asked: &FrameChoice,
-        upstream: &[&Stored],
+        upstream: &[Stored],
     ) -> Result<Option<i32>> {
         let own = self.own_from();
         // An upstream frame that is not done may still be made in this run, and is checked then; or it is gone, and there is nothing to
@@ -242,7 +242,7 @@ impl Cache {
     ///
     /// # Errors
     /// A file that cannot be read.
-    pub fn inputs(&mut self, stage: &dyn Stage, frame: i32, upstream: &[&Stored]) -> Result<Made> {
+    pub fn inputs(&mut self, stage: &dyn Stage, frame: i32, upstream: &[Stored]) -> Result<Made> {
         self.chain.at(stage, frame, &self.stored, upstream)
     }
 }

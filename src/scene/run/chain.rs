@@ -41,7 +41,7 @@ impl Chain {
     ///
     /// # Errors
     /// A file that cannot be read; a frame that is neither done nor has all its inputs.
-    pub fn at(&mut self, stage: &dyn Stage, frame: i32, own: &Stored, upstream: &[&Stored]) -> Result<Made> {
+    pub fn at(&mut self, stage: &dyn Stage, frame: i32, own: &Stored, upstream: &[Stored]) -> Result<Made> {
         let from = if stage.remembers() {
             let wanted = (i64::from(frame) - i64::from(self.first)).max(-1) + 1;
             while (self.links.len() as i64) <= wanted {
@@ -62,7 +62,7 @@ impl Chain {
         stage: &dyn Stage,
         frame: i32,
         own: &Stored,
-        upstream: &[&Stored],
+        upstream: &[Stored],
     ) -> Result<String> {
         let mut link = Hasher::default();
         link.add_text(before);

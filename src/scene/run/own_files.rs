@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::plan::Plan;
 use super::stage::Stage;
-use super::stored::record_of;
+use super::stored::{names_in, record_of};
 use crate::error::{Error, Result};
 use crate::io::files::{atomic, hash};
 use crate::io::records::checksummed;
@@ -89,11 +89,6 @@ impl Own {
         self.known.files.keys().map(String::as_str)
     }
 
-    /// The stages that runs have started.
-    fn stages(&self) -> impl Iterator<Item = &str> {
-        self.known.stages.keys().map(String::as_str)
-    }
-
     /// Refuses to start frames, or to write files that belong to no frame, over files that are not the folder's own; inputs of the scene
     /// never are.
     ///
@@ -113,8 +108,9 @@ impl Own {
             return Err(Error::file(&scene.path, what));
         }
         if scene.output.usd {
-            let of_stages = plan.stages().flat_map(|stage| stage.loose_files().iter().copied());
-            std::iter::once(SHOT).chain(of_stages).try_for_each(|name| self.refuse_changed(name, None))?;
+            self.refuse_changed(SHOT, None)?;
+            let kinds = plan.stages().filter_map(|stage| stage.usd_kind());
+            kinds.map(manifest_of).try_for_each(|name| self.refuse_changed(&name, None))?;
         }
         self.refuse_changed(SCENE, Some(&new))?;
         let asked = frames.first()..=frames.last();
@@ -260,7 +256,7 @@ impl Own {
     pub fn names(&self) -> Result<BTreeMap<String, Option<OfFrame>>> {
         let mut out = BTreeMap::new();
         for kind in self.folders() {
-            for name in self.entries(&kind)? {
+            for name in names_in(&self.folder.join(&kind))? {
                 if self.is_own(&kind, &name) {
                     let path = if kind.is_empty() { name.clone() } else { format!("{kind}/{name}") };
                     out.insert(path, self.frame_of(&kind, &name));
@@ -278,24 +274,8 @@ impl Own {
         let is_of = |name: &String| {
             record_of(name).is_some_and(|(stage, _)| stages.iter().any(|known| known == stage))
         };
-        let records = self.entries("state")?.into_iter().filter(is_of);
+        let records = names_in(&self.folder.join("state"))?.into_iter().filter(is_of);
         Ok(self.names()?.into_keys().chain(records.map(|name| format!("state/{name}"))).collect())
-    }
-
-    /// Names of the files in a folder.
-    fn entries(&self, kind: &str) -> Result<Vec<String>> {
-        let path = self.folder.join(kind);
-        let entries = match std::fs::read_dir(&path) {
-            // Folders of kinds that are not written need not exist.
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-            other => other.map_err(|error| Error::io(&path, "read", error))?,
-        };
-        let mut out = Vec::new();
-        for entry in entries {
-            let name = entry.map_err(|error| Error::io(&path, "read", error))?.file_name();
-            out.extend(name.to_str().map(String::from));
-        }
-        Ok(out)
     }
 
     /// Removes files that a killed run left unfinished: no other run is writing now.
@@ -304,7 +284,7 @@ impl Own {
     /// What the operating system reports.
     pub fn remove_unfinished(&self) -> Result<()> {
         for kind in self.folders() {
-            for part in self.entries(&kind)? {
+            for part in names_in(&self.folder.join(&kind))? {
                 if atomic::finished_name(&part).is_some_and(|finished| self.is_own(&kind, finished)) {
                     let path = self.folder.join(&kind).join(&part);
                     std::fs::remove_file(&path).map_err(|error| Error::io(path, "remove", error))?;
@@ -319,12 +299,10 @@ impl Own {
     /// # Errors
     /// A folder that cannot be read.
     pub fn stages_there(&self) -> Result<Vec<String>> {
-        let of_records = self.entries("state")?;
-        let of_records = of_records.iter().filter_map(|name| record_of(name)).map(|(stage, _)| stage);
-        let mut out: Vec<String> = self.stages().chain(of_records).map(String::from).collect();
-        out.sort();
-        out.dedup();
-        Ok(out)
+        let names = names_in(&self.folder.join("state"))?;
+        let of_records = names.iter().filter_map(|name| Some(record_of(name)?.0.to_string()));
+        let all: BTreeSet<String> = self.known.stages.keys().cloned().chain(of_records).collect();
+        Ok(all.into_iter().collect())
     }
 }
 
@@ -341,6 +319,11 @@ pub(super) struct OfFrame {
 fn is_same(a: &Path, b: &Path) -> bool {
     let there = |path| std::fs::canonicalize(path).ok();
     there(a).is_some_and(|a| there(b) == Some(a))
+}
+
+/// The manifest that the .usda files of a kind share.
+pub(in crate::scene::run) fn manifest_of(kind: &str) -> String {
+    format!("{kind}/{kind}.manifest.usda")
 }
 
 /// The shot for programs that read USD.

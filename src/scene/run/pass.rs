@@ -44,7 +44,7 @@ pub struct Shared<'a> {
 pub trait AnyStage: Stage {
     /// See [`Stepping::foresee`].
     #[doc(hidden)]
-    fn looks_ahead(&self, ctx: &Context, upstream: &[&Stored], last: i32) -> Result<()>;
+    fn looks_ahead(&self, ctx: &Context, upstream: &[Stored], last: i32) -> Result<()>;
 
     /// The state from which a frame is reached in the fewest steps.
     #[doc(hidden)]
@@ -52,7 +52,7 @@ pub trait AnyStage: Stage {
 }
 
 impl<S: Stepping> AnyStage for S {
-    fn looks_ahead(&self, ctx: &Context, upstream: &[&Stored], last: i32) -> Result<()> {
+    fn looks_ahead(&self, ctx: &Context, upstream: &[Stored], last: i32) -> Result<()> {
         self.foresee(ctx, upstream, last)
     }
 
@@ -75,7 +75,7 @@ pub struct Work<'a> {
     /// Gets the records of the frames that were written, even if the pass fails.
     pub cache: &'a mut Cache,
     /// The frames of the stages upstream.
-    pub upstream: &'a [&'a Stored],
+    pub upstream: &'a [Stored],
     /// The frames to make, ascending.
     pub todo: &'a [i32],
     /// Whether the exact states of all frames are kept, as another stage reads them.

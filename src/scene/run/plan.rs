@@ -63,7 +63,6 @@ impl Plan<'_> {
             for (_, stage) in others.filter(|(_, stage)| reader.upstream().contains(&stage.name())) {
                 let upstream = stage.upstream().iter().map(|name| Stored::read(folder, name));
                 let upstream: Vec<Stored> = upstream.collect::<Result<_>>()?;
-                let upstream: Vec<&Stored> = upstream.iter().collect();
                 Cache::refuse_stale(stage, self.seen, folder, reader.name(), &upstream)?;
             }
         }

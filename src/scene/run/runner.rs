@@ -109,7 +109,7 @@ impl<'a> Run<'a> {
         }
         let mut cache = Cache::open(stage, self.plan.seen, folder, asked)?;
         let upstream = self.upstream(stage, folder)?;
-        cache.check_inputs(stage, asked.frames, &upstream.iter().collect::<Vec<_>>())?;
+        cache.check_inputs(stage, asked.frames, &upstream)?;
         let (there, todo): (Vec<i32>, Vec<i32>) =
             asked.frames.iter().partition(|frame| cache.stored.is_done(*frame));
         self.refuse_missing(stage, &cache.stored, &todo, &upstream)?;
@@ -161,15 +161,12 @@ impl<'a> Run<'a> {
     /// Loads the state before the first frame to be made, for stages whose upstream frames all exist.
     fn load(&mut self, ctx: &Context) -> Result<()> {
         let first = self.plan.scene.shot.frames.first;
-        let busy: Vec<&str> =
-            self.stages.iter().filter(|run| !run.todo.is_empty()).map(|run| run.stage.name()).collect();
         for position in 0..self.stages.len() {
             let run = &self.stages[position];
-            let waits = run.stage.upstream().iter().any(|name| busy.contains(name));
-            if let ([frame, ..], Some(cache), false) = (&run.todo[..], &run.cache, waits) {
+            if let ([frame, ..], Some(cache), false) = (&run.todo[..], &run.cache, self.waits(run)) {
                 let upstream = self.upstream(run.stage, self.own.folder())?;
                 let last = run.todo.last().copied().unwrap_or(*frame);
-                run.stage.looks_ahead(ctx, &upstream.iter().collect::<Vec<_>>(), last)?;
+                run.stage.looks_ahead(ctx, &upstream, last)?;
                 self.stages[position].start = Some(run.stage.before(ctx, *frame, cache.kept(first))?);
             }
         }
@@ -190,6 +187,12 @@ impl<'a> Run<'a> {
             }
         }
         self.own.write(own_files::SCENE, self.plan.scene.to_toml_in(self.own.folder()).as_bytes())
+    }
+
+    /// Whether a stage upstream of this one still has frames to make.
+    fn waits(&self, run: &StageRun<'_>) -> bool {
+        let mut busy = self.stages.iter().filter(|other| !other.todo.is_empty());
+        busy.any(|other| run.stage.upstream().contains(&other.stage.name()))
     }
 
     /// Number of frames to be made, over all stages.
@@ -236,10 +239,7 @@ impl<'a> Run<'a> {
 
     /// The stages, by index, that have frames to make and wait for no other; `None` if all is done.
     fn ready(&self) -> Option<Vec<usize>> {
-        let busy: Vec<&str> =
-            self.stages.iter().filter(|run| !run.todo.is_empty()).map(|run| run.stage.name()).collect();
-        let waits = |run: &StageRun<'_>| run.stage.upstream().iter().any(|name| busy.contains(name));
-        let is_ready = |run: &StageRun<'_>| !run.todo.is_empty() && !waits(run);
+        let is_ready = |run: &StageRun<'_>| !run.todo.is_empty() && !self.waits(run);
         let ready: Vec<usize> = (0..self.stages.len()).filter(|at| is_ready(&self.stages[*at])).collect();
         (!ready.is_empty()).then_some(ready)
     }
@@ -306,18 +306,17 @@ impl Drop for StopOthers<'_> {
 impl StageRun<'_> {
     fn make(&mut self, shared: &Shared<'_>, upstream: &[Stored], every_state: bool) -> Result<()> {
         let todo = std::mem::take(&mut self.todo);
-        let upstream: Vec<&Stored> = upstream.iter().collect();
         let Some(cache) = &mut self.cache else { return Ok(()) };
         let start = match self.start.take() {
             Some(start) => start,
             None => {
                 // The upstream frames were made only in this run.
-                cache.check_inputs(self.stage, &FrameChoice::none(), &upstream)?;
-                self.stage.looks_ahead(shared.ctx, &upstream, todo[todo.len() - 1])?;
+                cache.check_inputs(self.stage, &FrameChoice::none(), upstream)?;
+                self.stage.looks_ahead(shared.ctx, upstream, todo[todo.len() - 1])?;
                 self.stage.before(shared.ctx, todo[0], cache.kept(shared.first))?
             }
         };
-        start.make(Work { shared, cache, upstream: &upstream, todo: &todo, every_state })
+        start.make(Work { shared, cache, upstream, todo: &todo, every_state })
     }
 }
 

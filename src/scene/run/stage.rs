@@ -60,9 +60,9 @@ pub trait Stage: Sync {
         "vdb"
     }
 
-    /// Its files that belong to no frame, by path relative to the folder.
-    fn loose_files(&self) -> &'static [&'static str] {
-        &[]
+    /// The kind of its .usda files, if this scene has them: they share a manifest, which belongs to no frame.
+    fn usd_kind(&self) -> Option<&'static str> {
+        None
     }
 
     /// The settings that its frames depend on.
@@ -135,7 +135,7 @@ pub trait Stepping: Stage {
     ///
     /// # Errors
     /// Why the frames cannot be made.
-    fn foresee(&self, _ctx: &Context, _upstream: &[&Stored], _last: i32) -> Result<()> {
+    fn foresee(&self, _ctx: &Context, _upstream: &[Stored], _last: i32) -> Result<()> {
         Ok(())
     }
 
@@ -182,7 +182,7 @@ pub struct To<'a> {
     /// Hash of everything that the frame depends on, if its files are wanted.
     pub made_from: Option<&'a str>,
     /// The frames of the stages upstream, in the order of [`Stage::upstream`].
-    pub upstream: &'a [&'a Stored],
+    pub upstream: &'a [Stored],
 }
 
 /// The result of a step.

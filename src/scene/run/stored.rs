@@ -24,27 +24,13 @@ impl Stored {
     /// # Errors
     /// A folder that cannot be read; a record that is damaged or of a newer version.
     pub fn read(folder: &Path, stage: &str) -> Result<Self> {
-        let state = folder.join("state");
         let mut done = BTreeMap::new();
-        let stored = |done| Self { folder: folder.to_path_buf(), stage: stage.to_string(), done };
-        let entries = match std::fs::read_dir(&state) {
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                return Ok(stored(done));
-            }
-            other => other.map_err(|error| Error::io(&state, "read", error))?,
-        };
-        for entry in entries {
-            let name = entry.map_err(|error| Error::io(&state, "read", error))?.file_name();
-            let Some((of, frame)) = name.to_str().and_then(record_of) else { continue };
-            let Some(manifest) = (if of == stage { Manifest::read(folder, stage, frame)? } else { None })
-            else {
-                continue;
-            };
-            if manifest.files_are_there(folder) {
-                done.insert(frame, manifest);
-            }
+        for name in names_in(&folder.join("state"))? {
+            let Some((_, frame)) = record_of(&name).filter(|(of, _)| *of == stage) else { continue };
+            let manifest = Manifest::read(folder, stage, frame)?;
+            done.extend(manifest.filter(|own| own.files_are_there(folder)).map(|own| (frame, own)));
         }
-        Ok(stored(done))
+        Ok(Self { folder: folder.to_path_buf(), stage: stage.to_string(), done })
     }
 
     /// Their folder.
@@ -216,6 +202,23 @@ impl Stored {
             None => Ok(path),
         }
     }
+}
+
+/// Names of the files in a folder; none if it does not exist.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub(super) fn names_in(folder: &Path) -> Result<Vec<String>> {
+    let refused = |error| Error::io(folder, "read", error);
+    let entries = match std::fs::read_dir(folder) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        other => other.map_err(refused)?,
+    };
+    let mut out = Vec::new();
+    for entry in entries {
+        out.extend(entry.map_err(refused)?.file_name().into_string().ok());
+    }
+    Ok(out)
 }
 
 /// The stage and frame of a record, by its name in `state/`: `base.0012.json`.

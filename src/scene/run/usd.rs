@@ -1,6 +1,6 @@
 //! `shot.usda`: the whole shot for programs that read USD.
 
-use super::own_files::{Own, SHOT};
+use super::own_files::{Own, SHOT, manifest_of};
 use super::plan::Plan;
 use super::stage::{Stage, Volume};
 use super::stored::Stored;
@@ -33,7 +33,7 @@ pub(super) fn write<'s>(
     }
     for Clips { kind, prims, .. } in &clips {
         let manifest = usd::clip_manifest(kind, prims);
-        files.write(&format!("{kind}/{kind}.manifest.usda"), manifest.as_bytes())?;
+        files.write(&manifest_of(kind), manifest.as_bytes())?;
     }
     let time = usd::StageTime { first: frames.first, last: frames.last, fps };
     let comment = format!("made by frazil {}", env!("CARGO_PKG_VERSION"));

@@ -14,6 +14,6 @@ use crate::scene::run::Plan;
 /// A scene without one; a source inside solid, before anything is written; cancel.
 pub fn plan<'a>(ctx: &Context, scene: &'a Scene, inputs: &'a Inputs) -> Result<Plan<'a>> {
     LiquidState::begin(ctx, (scene, scene.shallow()?, inputs))?;
-    let stage = Liquid::new(scene, scene.shallow()?, inputs);
+    let stage = Liquid { scene, of: scene.shallow()?, inputs };
     Ok(Plan { scene, seen: &inputs.seen, stages: vec![Box::new(stage)] })
 }

@@ -12,12 +12,12 @@ use crate::scene::run::{AnyStage, Plan};
 
 /// The stages of a scene with snow.
 pub fn plan<'a>(scene: &'a Scene, inputs: &'a Inputs) -> Plan<'a> {
-    let mut stages: Vec<Box<dyn AnyStage + 'a>> = vec![Box::new(Base::new(scene, inputs))];
+    let mut stages: Vec<Box<dyn AnyStage + 'a>> = vec![Box::new(Base { scene, inputs })];
     if has_grains(&scene.values) {
         stages.push(Box::new(Grains::new(scene, inputs)));
     }
     if has_mist(&scene.values) {
-        stages.push(Box::new(Mist::new(scene, inputs)));
+        stages.push(Box::new(Mist { scene, inputs }));
     }
     let volumes = scene.output.volumes;
     if volumes.fog() || volumes.snow || volumes.mesh() {

@@ -11,6 +11,6 @@ use crate::scene::run::Plan;
 /// # Errors
 /// A scene without one.
 pub fn plan<'a>(scene: &'a Scene, inputs: &'a Inputs) -> Result<Plan<'a>> {
-    let stage = Track::new(scene, scene.surface()?, inputs);
+    let stage = Track { scene, surface: scene.surface()?, inputs };
     Ok(Plan { scene, seen: &inputs.seen, stages: vec![Box::new(stage)] })
 }

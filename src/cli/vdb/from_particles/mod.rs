@@ -12,8 +12,7 @@ use crate::cli::each::Each;
 use crate::cli::options::{MeshSpace, needs_frames, of_frame, one_frame, positive, refuse_one_file, triple};
 use crate::cli::output;
 use crate::cli::points::points_of_vdb;
-use crate::cli::session::Session;
-use crate::cli::session::exit::{Failure, Phase};
+use crate::cli::session::{Failure, Phase, Session};
 use colliders::Colliders;
 use frazil::geometry::mesh::attributes::{Number, On};
 use frazil::geometry::points::{Attribute, Values};
@@ -119,18 +118,13 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
         Some(spacing) => spacing,
         None => args.estimated(session, &frames)?,
     };
-    let (mut each, mut total, mut is_compared) = (Each::default(), Made::default(), args.spacing.is_none());
-    for frame in frames.iter() {
-        session.ctx.check().during()?;
-        let made = args.frame(session, frame, spacing, &mut colliders, &mut is_compared);
-        if let Some(made) = each.take(frame, made)? {
-            total.frames += 1;
-            total.particles += made.particles;
-            total.specks += made.specks;
-            total.triangles += made.triangles;
-        }
-    }
-    session.record("frames", json!(total.frames));
+    let (mut total, mut is_compared) = (Made::default(), args.spacing.is_none());
+    let make = |frame| args.frame(session, frame, spacing, &mut colliders, &mut is_compared);
+    let each = Each::run(session, &frames, make, |made| {
+        total.particles += made.particles;
+        total.specks += made.specks;
+        total.triangles += made.triangles;
+    })?;
     session.record("particles", json!(total.particles));
     session.record("specks_left_out", json!(total.specks));
     session.record("spacing_m", json!(spacing));
@@ -141,7 +135,6 @@ pub fn run(args: &Args, session: &Session) -> std::result::Result<(), Failure> {
 /// Report of what was made.
 #[derive(Default)]
 struct Made {
-    frames: usize,
     particles: usize,
     specks: usize,
     triangles: usize,
@@ -227,7 +220,7 @@ impl Args {
             Error::Argument(what) if what.starts_with(TOO_FAR) => Error::file(&path, what),
             other => other,
         })?;
-        Ok(Made { frames: 1, particles: cloud.positions.len(), specks, triangles: mesh.triangles.len() })
+        Ok(Made { particles: cloud.positions.len(), specks, triangles: mesh.triangles.len() })
     }
 
     /// Handles options that leave nothing: an error for a single file, a warning for a frame of a sequence, which may well have no liquid there.

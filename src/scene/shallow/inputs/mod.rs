@@ -86,8 +86,8 @@ impl Inputs {
         let path = shallow.terrain_at(frames.first);
         let mut terrain = Terrain::read(shallow, frames.first, &seen)?;
         let bounds = terrain.bounds();
-        let grid = grid(shallow, &bounds).map_err(|error| with_path(&scene.path, error))?;
-        let heights = heights(shallow, &bounds).map_err(|error| with_path(&scene.path, error))?;
+        let grid = grid(shallow, &bounds).map_err(|error| error.in_file(&scene.path))?;
+        let heights = heights(shallow, &bounds).map_err(|error| error.in_file(&scene.path))?;
         let mut warnings: Vec<String> = wide(shallow, &path, &bounds).into_iter().collect();
         if let Terrain::Mesh(mesh) = &terrain {
             warnings.extend(too_far(&path, mesh, grid.cell));
@@ -97,41 +97,11 @@ impl Inputs {
             .inspect_err(|_| warnings.iter().for_each(|warning| log::warn!("{warning}")))?;
         let orientation = terrain.turn_outward();
         warnings.extend(orientation.warning().map(|what| format!("{}: {what}", path.display())));
-        let mut solids = terrain.solids(ctx, grid, heights).map_err(|error| with_path(&path, error))?;
-        let mut is_turned = false;
-        if solids.layers() == 0
-            && let Terrain::Mesh(mesh) = terrain
-        {
-            let mesh = mesh.reversed();
-            solids = triangles::solids(&mesh.positions, &mesh.triangles, grid, heights)?;
-            is_turned = solids.layers() > 0;
-            if is_turned {
-                warnings.push(format!("{}: its triangles face down: they are turned round", path.display()));
-            }
-            terrain = Terrain::Mesh(mesh);
+        let (mut solids, is_turned) = solids(ctx, &mut terrain, &path, grid, heights)?;
+        if is_turned {
+            warnings.push(format!("{}: its triangles face down: they are turned round", path.display()));
         }
-        if solids.layers() == 0 {
-            let [x0, z0, x1, z1] = area(&grid);
-            let what = format!(
-                "has no surface that faces up within x {x0:.6} to {x1:.6} m and z {z0:.6} to {z1:.6} m (shallow.area, cells of {} m)",
-                grid.cell
-            );
-            return Err(Error::file(path, what));
-        }
-        let mut meshes = obstacles::meshes(shallow, frames.first, &seen)?;
-        for (mesh, own) in meshes.iter_mut().zip(shallow.obstacles.iter().filter_map(|own| own.file())) {
-            let orientation = facing(mesh);
-            *mesh = orientation.applied_to(std::mem::take(mesh));
-            warnings.extend(orientation.warning().map(|what| format!("{}: {what}", own.display())));
-            let on_it = triangles::solids(&mesh.positions, &mesh.triangles, grid, heights);
-            let on_it = on_it.map_err(|error| with_path(own, error))?;
-            warnings.extend(too_far(own, mesh, grid.cell));
-            if orientation.has_open() && orientation.warning().is_none() {
-                let what = "is not closed: below a surface of it that faces up all is solid";
-                warnings.push(format!("{}: {what}", own.display()));
-            }
-            solids = united(&solids, &on_it);
-        }
+        let meshes = add_meshes(shallow, frames.first, &seen, &mut solids, &mut warnings)?;
         let mesh = match terrain {
             Terrain::Mesh(mesh) => Some(mesh),
             #[cfg(any(feature = "cli", feature = "vdb"))]
@@ -208,6 +178,64 @@ impl Inputs {
         }
         Ok(Some(mesh))
     }
+}
+
+/// The solids of a terrain, and whether that is a mesh of triangles that face down, which is then reversed.
+///
+/// # Errors
+/// A terrain without a surface that faces up; cancel.
+fn solids(
+    ctx: &Context,
+    terrain: &mut Terrain,
+    path: &Path,
+    grid: Grid,
+    heights: Heights,
+) -> Result<(Solids, bool)> {
+    let found = terrain.solids(ctx, grid, heights).map_err(|error| error.in_file(path))?;
+    if found.layers() > 0 {
+        return Ok((found, false));
+    }
+    if let Terrain::Mesh(mesh) = terrain {
+        *mesh = std::mem::take(mesh).reversed();
+        let found = triangles::solids(&mesh.positions, &mesh.triangles, grid, heights)?;
+        if found.layers() > 0 {
+            return Ok((found, true));
+        }
+    }
+    let [x0, z0, x1, z1] = area(&grid);
+    let what = format!(
+        "has no surface that faces up within x {x0:.6} to {x1:.6} m and z {z0:.6} to {z1:.6} m (shallow.area, cells of {} m)",
+        grid.cell
+    );
+    Err(Error::file(path, what))
+}
+
+/// Reads the meshes that stand on a terrain, and adds them to its solids.
+///
+/// # Errors
+/// A file that cannot be read, or that has too many layers.
+fn add_meshes(
+    shallow: &Shallow,
+    first: i32,
+    seen: &InputHashes,
+    solids: &mut Solids,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<TriMesh>> {
+    let mut meshes = obstacles::meshes(shallow, first, seen)?;
+    for (mesh, own) in meshes.iter_mut().zip(shallow.obstacles.iter().filter_map(|own| own.file())) {
+        let orientation = facing(mesh);
+        *mesh = orientation.applied_to(std::mem::take(mesh));
+        warnings.extend(orientation.warning().map(|what| format!("{}: {what}", own.display())));
+        let on_it = triangles::solids(&mesh.positions, &mesh.triangles, solids.grid, solids.heights);
+        let on_it = on_it.map_err(|error| error.in_file(own))?;
+        warnings.extend(too_far(own, mesh, solids.grid.cell));
+        if orientation.has_open() && orientation.warning().is_none() {
+            let what = "is not closed: below a surface of it that faces up all is solid";
+            warnings.push(format!("{}: {what}", own.display()));
+        }
+        *solids = united(solids, &on_it);
+    }
+    Ok(meshes)
 }
 
 /// The union of both.
@@ -287,11 +315,4 @@ fn wide(shallow: &Shallow, path: &Path, [low, high]: &[DVec3; 2]) -> Option<Stri
             size.z
         )
     })
-}
-
-fn with_path(path: &Path, error: Error) -> Error {
-    match error {
-        Error::Argument(what) => Error::file(path, what),
-        other => other,
-    }
 }

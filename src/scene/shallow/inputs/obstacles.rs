@@ -61,8 +61,7 @@ impl Obstacle {
 /// # Errors
 /// None for a scene that was read.
 pub(in crate::scene::shallow) fn shapes_at(shallow: &Shallow, frame: i32) -> Result<Vec<Shape>> {
-    let shapes = shallow.obstacles.iter().map(|obstacle| obstacle.shape(frame));
-    Ok(shapes.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
+    shallow.obstacles.iter().filter_map(|obstacle| obstacle.shape(frame).transpose()).collect()
 }
 
 /// The meshes that stand on the terrain, one each, in the file's order (m).
@@ -74,8 +73,7 @@ pub(in crate::scene::shallow) fn meshes(
     first: i32,
     seen: &InputHashes,
 ) -> Result<Vec<TriMesh>> {
-    let meshes = shallow.obstacles.iter().map(|obstacle| obstacle.mesh(first, seen));
-    Ok(meshes.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
+    shallow.obstacles.iter().filter_map(|obstacle| obstacle.mesh(first, seen).transpose()).collect()
 }
 
 /// Points around a drawn sphere, and rings from its bottom to its middle.

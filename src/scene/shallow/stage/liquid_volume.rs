@@ -12,8 +12,7 @@ use crate::scene::run::Volume;
 use crate::scene::shallow::Shallow;
 use crate::scene::vdb_metadata::metadata;
 use crate::shallow;
-use crate::vdb::file::to_bytes;
-use crate::vdb::write_options::WriteOptions;
+use crate::vdb::file::{WriteOptions, to_bytes};
 use crate::vdb::{DENSITY_SCALE_KEY, FloatGrid, GridClass, MetaValue};
 
 /// Name of the only grid, as shaders expect it.

@@ -33,14 +33,12 @@ const NAME: &str = "liquid";
 const VOLUME: &str = "volume";
 /// Kind of the files of a stained terrain.
 const TERRAIN: &str = "terrain";
-/// Manifest shared by the clips in `liquid/`.
-const MANIFEST: &str = "liquid/liquid.manifest.usda";
 
 /// The stage for a scene.
 pub struct Liquid<'a> {
-    scene: &'a Scene,
-    of: &'a Shallow,
-    inputs: &'a Inputs,
+    pub scene: &'a Scene,
+    pub of: &'a Shallow,
+    pub inputs: &'a Inputs,
 }
 
 /// The liquid at a frame.
@@ -60,11 +58,6 @@ pub struct Written {
 }
 
 impl<'a> Liquid<'a> {
-    /// The stage for a scene.
-    pub fn new(scene: &'a Scene, of: &'a Shallow, inputs: &'a Inputs) -> Self {
-        Self { scene, of, inputs }
-    }
-
     /// Advances the liquid to a frame, which may be the current one, and warns of points that can no longer act.
     fn go(
         &self,
@@ -154,8 +147,8 @@ impl Stage for Liquid<'_> {
         true
     }
 
-    fn loose_files(&self) -> &'static [&'static str] {
-        if self.of.output.usd { &[MANIFEST] } else { &[] }
+    fn usd_kind(&self) -> Option<&'static str> {
+        self.of.output.usd.then_some(NAME)
     }
 
     fn settings(&self) -> Result<Settings> {

@@ -16,13 +16,12 @@ use crate::scene::{BaseMode, Scene, moving};
 use crate::snow::base_layer::{BaseLayer, Changes, Grids, Params, StepReport};
 use crate::sweep::{Body, TOLERANCE};
 use crate::vdb::FloatGrid;
-use crate::vdb::file::to_bytes;
-use crate::vdb::write_options::WriteOptions;
+use crate::vdb::file::{WriteOptions, to_bytes};
 
 /// The layer of a scene, pressed by its objects.
 pub struct Base<'a> {
-    scene: &'a Scene,
-    inputs: &'a Inputs,
+    pub scene: &'a Scene,
+    pub inputs: &'a Inputs,
 }
 
 /// Input of the writer.
@@ -42,12 +41,7 @@ pub struct Writer {
     copy: Option<Grids>,
 }
 
-impl<'a> Base<'a> {
-    /// The stage for a scene.
-    pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
-        Self { scene, inputs }
-    }
-
+impl Base<'_> {
     /// Whether writing needs a copy of the layer.
     fn copies(&self) -> bool {
         !self.scene.output.base_restarts() || self.scene.output.base_mode == BaseMode::Full

@@ -15,8 +15,8 @@ use crate::io::mesh::extension;
 use crate::scene::Scene;
 use crate::scene::run::{FrameFiles, Stored};
 use crate::scene::vdb_metadata::metadata;
-use crate::vdb::write_options::WriteOptions;
-use crate::vdb::{MetaValue, file, points};
+use crate::vdb::file::{self, WriteOptions};
+use crate::vdb::{MetaValue, points};
 
 /// One frame in so many is complete.
 pub(in crate::scene::snow) const WHOLE_EVERY: i32 = 24;

@@ -67,8 +67,6 @@ pub struct Writer {
     before: Option<Points>,
 }
 
-/// Manifest shared by the clips in `grains/`.
-const MANIFEST: &str = "grains/grains.manifest.usda";
 /// Grains are dropped this far below the ground and the snow (m).
 const BELOW: f64 = 1.0;
 
@@ -208,8 +206,8 @@ impl Stage for Grains<'_> {
         Reads { files: moving::files(self.scene, frame), ahead: Vec::new() }
     }
 
-    fn loose_files(&self) -> &'static [&'static str] {
-        if self.scene.output.grains_usd { &[MANIFEST] } else { &[] }
+    fn usd_kind(&self) -> Option<&'static str> {
+        self.scene.output.grains_usd.then_some("grains")
     }
 
     fn clip(&self) -> Option<Clips<'_>> {
@@ -228,7 +226,7 @@ impl Stepping for Grains<'_> {
     type Step = Option<grains::Grains>;
     type Writer = Writer;
 
-    fn foresee(&self, ctx: &Context, upstream: &[&Stored], last: i32) -> Result<()> {
+    fn foresee(&self, ctx: &Context, upstream: &[Stored], last: i32) -> Result<()> {
         let [base] = upstream else { return Err(Error::Internal("grains read one stage".into())) };
         let Some(forecast) = Forecast::of(self.scene, self.inputs, base, last)? else { return Ok(()) };
         log::info!(

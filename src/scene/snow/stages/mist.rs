@@ -23,9 +23,8 @@ use crate::scene::vdb_metadata::metadata;
 use crate::scene::{Scene, moving};
 use crate::snow::mist::{self, Around, Grids, Params, Source, Start, StepReport, Surroundings, Wind};
 use crate::sweep::Body;
-use crate::vdb::file::any_to_bytes;
-use crate::vdb::write_options::WriteOptions;
-use crate::vdb::{FloatGrid, GridRef, file};
+use crate::vdb::file::{self, WriteOptions, any_to_bytes};
+use crate::vdb::{FloatGrid, GridRef};
 
 /// Name of the stage, and of the kind of its files.
 const NAME: &str = "mist";
@@ -34,8 +33,8 @@ const DENSITY: &str = "density";
 
 /// The stage for a scene.
 pub struct Mist<'a> {
-    scene: &'a Scene,
-    inputs: &'a Inputs,
+    pub scene: &'a Scene,
+    pub inputs: &'a Inputs,
 }
 
 /// State carried from frame to frame.
@@ -59,12 +58,7 @@ pub(in crate::scene::snow) fn density(stored: &Stored, frame: i32) -> Result<Flo
     file::read_own_named(&stored.file(frame, NAME)?, DENSITY)
 }
 
-impl<'a> Mist<'a> {
-    /// The stage for a scene.
-    pub fn new(scene: &'a Scene, inputs: &'a Inputs) -> Self {
-        Self { scene, inputs }
-    }
-
+impl Mist<'_> {
     fn params(&self) -> Result<Params> {
         mist_params(&self.scene.values).ok_or_else(|| Error::Internal("the scene has no mist".into()))
     }

@@ -22,8 +22,7 @@ use crate::scene::snow::keys::volumes::Needs;
 use crate::scene::vdb_metadata::metadata;
 use crate::scene::{Scene, VolumesOutput};
 use crate::snow::render_volumes::{fog, united};
-use crate::vdb::file::to_bytes;
-use crate::vdb::write_options::WriteOptions;
+use crate::vdb::file::{WriteOptions, to_bytes};
 use crate::vdb::{FloatGrid, level_set};
 
 /// The stage for a scene.
@@ -53,8 +52,6 @@ struct Source<'s> {
 /// too much memory.
 type Files = Vec<(&'static str, &'static str, Vec<u8>)>;
 
-/// Manifest shared by the clips in `mesh/`.
-const MANIFEST: &str = "mesh/mesh.manifest.usda";
 /// Name of the mesh's prim.
 const MESH: &str = "base";
 
@@ -66,10 +63,10 @@ impl<'a> Volumes<'a> {
     }
 
     /// The frames of an upstream stage.
-    fn stored<'s>(&self, upstream: &[&'s Stored], name: &str) -> Result<&'s Stored> {
+    fn stored<'s>(&self, upstream: &'s [Stored], name: &str) -> Result<&'s Stored> {
         let index = self.upstream().iter().position(|upstream| *upstream == name);
         let stored = index.and_then(|index| upstream.get(index));
-        stored.copied().ok_or_else(|| Error::Internal(format!("volumes do not read {name}")))
+        stored.ok_or_else(|| Error::Internal(format!("volumes do not read {name}")))
     }
 
     /// Reads the inputs of a frame.
@@ -237,8 +234,8 @@ impl Stage for Volumes<'_> {
         Keeps::Whole
     }
 
-    fn loose_files(&self) -> &'static [&'static str] {
-        if self.asked.mesh_usd { &[MANIFEST] } else { &[] }
+    fn usd_kind(&self) -> Option<&'static str> {
+        self.asked.mesh_usd.then_some("mesh")
     }
 
     fn volumes(&self) -> Vec<Volume> {
@@ -276,7 +273,7 @@ impl Stepping for Volumes<'_> {
     type Step = Files;
     type Writer = ();
 
-    fn foresee(&self, ctx: &Context, upstream: &[&Stored], last: i32) -> Result<()> {
+    fn foresee(&self, ctx: &Context, upstream: &[Stored], last: i32) -> Result<()> {
         let grains = match self.needs.grains {
             true => most_grains(self.stored(upstream, "grains")?, last)?,
             false => 0,

@@ -27,14 +27,12 @@ use tracked_shot::{At, TrackedShot, reads};
 
 /// Name of the stage, and of the kind of its files.
 const NAME: &str = "surface";
-/// Manifest shared by the clips in `surface/`.
-const MANIFEST: &str = "surface/surface.manifest.usda";
 
 /// The stage for a scene.
 pub struct Track<'a> {
-    scene: &'a Scene,
-    surface: &'a Surface,
-    inputs: &'a Inputs,
+    pub scene: &'a Scene,
+    pub surface: &'a Surface,
+    pub inputs: &'a Inputs,
 }
 
 /// The mesh at a frame whose files are written; empty for a frame without particles.
@@ -49,12 +47,7 @@ pub struct Written {
     state: Vec<u8>,
 }
 
-impl<'a> Track<'a> {
-    /// The stage for a scene.
-    pub fn new(scene: &'a Scene, surface: &'a Surface, inputs: &'a Inputs) -> Self {
-        Self { scene, surface, inputs }
-    }
-
+impl Track<'_> {
     /// The arrays that each frame writes anew. The mask of created faces is among them only for a mesh that was never changed and carries
     /// none.
     fn arrays(&self, delta: &[f32], flags: &[bool], unmade: Option<usize>) -> Vec<MeshArray> {
@@ -106,8 +99,8 @@ impl Stage for Track<'_> {
         true
     }
 
-    fn loose_files(&self) -> &'static [&'static str] {
-        if self.surface.output.usd { &[MANIFEST] } else { &[] }
+    fn usd_kind(&self) -> Option<&'static str> {
+        self.surface.output.usd.then_some(NAME)
     }
 
     fn settings(&self) -> Result<Settings> {
