@@ -4,6 +4,7 @@ use super::free_fall::Falls;
 use super::material::Liquid;
 use super::pipes::Border;
 use crate::error::{Error, Result};
+use crate::numeric::checks::check_within;
 
 /// Parameters of the flow.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,12 +102,8 @@ impl Params {
                 "gravity = ({x}, {y}, {z}) m/s2 leans by more than 45 degrees"
             )));
         }
-        if !(0.0..=1.0).contains(&self.kept) {
-            return Err(Error::argument(format!("kept = {} is not within 0 to 1", self.kept)));
-        }
-        if !(0.0..=0.01).contains(&self.rest) {
-            return Err(Error::argument(format!("rest = {} m/s is not within 0 to 0.01", self.rest)));
-        }
+        check_within("kept", self.kept, "", 0.0..=1.0)?;
+        check_within("rest", self.rest, " m/s", 0.0..=0.01)?;
         if let Some(falls) = &self.falls {
             falls.validate()?;
         }

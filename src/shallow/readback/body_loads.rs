@@ -8,7 +8,7 @@
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
-use crate::numeric::lists::check_each;
+use crate::numeric::checks::check_each;
 use crate::shallow::columns::Columns;
 use crate::shallow::columns::grid::Grid;
 use crate::shallow::pipes::side::Side;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::snapshot::Snapshot;
 use crate::error::{Error, Result};
-use crate::numeric::lists::check_room;
+use crate::numeric::checks::check_room;
 use crate::shallow::columns::grid::Grid;
 use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::scalars::check_scalar;

@@ -449,6 +449,9 @@ impl Flow {
     fn flood(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, stop: &Stop) {
         let ([east, south], [left_east, left_south]) = (&self.flux, &self.left);
         let state = State {
+            step,
+            columns,
+            pipes,
             depth: &self.depth,
             flux: [east, south],
             left: [left_east, left_south],
@@ -456,6 +459,6 @@ impl Flow {
             overflow_edges: &self.overflow_edges,
             walls: &self.walls,
         };
-        self.network.find(step, columns, pipes, self.bands.filling(), &state, stop);
+        self.network.find(self.bands.filling(), &state, stop);
     }
 }

@@ -3,6 +3,7 @@
 use super::counts::Counts;
 use super::rim::ledges::Ledges;
 use crate::error::{Error, Result};
+use crate::numeric::checks::check_not_negative;
 use crate::shallow::scalars::MOST;
 
 /// The liquid in columns.
@@ -80,12 +81,8 @@ impl Layout {
         };
         positive("scale", self.scale)?;
         positive("opaque_depth", self.opaque_depth)?;
-        for (name, value) in [("least_depth", self.least_depth), ("fade_depth", self.fade_depth)] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(Error::argument(format!("{name} = {value} is not finite and 0 or more")));
-            }
-        }
-        Ok(())
+        check_not_negative("least_depth", self.least_depth)?;
+        check_not_negative("fade_depth", self.fade_depth)
     }
 }
 

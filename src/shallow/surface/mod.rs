@@ -33,7 +33,7 @@ mod self_check;
 
 use super::columns::{Columns, NONE, STRIP};
 use crate::error::{Error, Result};
-use crate::numeric::lists::check_each;
+use crate::numeric::checks::check_each;
 pub use buffers::capacity::bound;
 use buffers::normals::Normals;
 use buffers::vertices::Vertices;

@@ -205,16 +205,8 @@ impl Detail {
     pub fn set_flows(&mut self, points: &[FlowPoint], which: impl Fn(usize) -> String) -> Result<()> {
         for (at, point) in points.iter().enumerate() {
             let owner = if self.is_near(point) { &self.fine } else { &self.coarse };
-            let mut found = Vec::new();
-            point.validate().map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
-            point.find_columns(&owner.columns, &mut found);
-            if found.is_empty() {
-                let [x, y, z] = point.at;
-                return Err(Error::argument(format!(
-                    "{}: at ({x}, {y}, {z}) there is only solid, or it lies outside of the domain",
-                    which(at)
-                )));
-            }
+            let found = point.columns(&owner.columns);
+            found.map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
         }
         self.fine.set_flows_resting(points, &which)?;
         self.coarse.set_flows_resting(points, &which)?;
