@@ -1,19 +1,25 @@
 //! Checks of what a caller gives.
 
+use std::fmt::Display;
 use std::ops::RangeInclusive;
 
 use crate::error::{Error, Result};
+
+/// Checks that something holds.
+///
+/// # Errors
+/// `Argument`: it does not; `wrong` says what is wrong then.
+pub fn ensure(holds: bool, wrong: impl Display) -> Result<()> {
+    if holds { Ok(()) } else { Err(Error::argument(wrong.to_string())) }
+}
 
 /// Checks that a number in a unit, given with a space before it, is within a range.
 ///
 /// # Errors
 /// `Argument`: it is not.
 pub fn check_within(name: &str, value: f64, unit: &str, range: RangeInclusive<f64>) -> Result<()> {
-    if range.contains(&value) {
-        return Ok(());
-    }
-    let (low, high) = range.into_inner();
-    Err(Error::argument(format!("{name} = {value}{unit} is not within {low} to {high}")))
+    let (low, high) = (range.start(), range.end());
+    ensure(range.contains(&value), format_args!("{name} = {value}{unit} is not within {low} to {high}"))
 }
 
 /// Checks that a number is finite and not negative.
@@ -21,10 +27,8 @@ pub fn check_within(name: &str, value: f64, unit: &str, range: RangeInclusive<f6
 /// # Errors
 /// `Argument`: it is not.
 pub fn check_not_negative(name: &str, value: f64) -> Result<()> {
-    if value >= 0.0 && value.is_finite() {
-        return Ok(());
-    }
-    Err(Error::argument(format!("{name} = {value} is not finite and 0 or more")))
+    let holds = value >= 0.0 && value.is_finite();
+    ensure(holds, format_args!("{name} = {value} is not finite and 0 or more"))
 }
 
 /// Checks that there is one of something for each of some others.
@@ -32,10 +36,7 @@ pub fn check_not_negative(name: &str, value: f64) -> Result<()> {
 /// # Errors
 /// `Argument`: there is another count.
 pub fn check_each(count: usize, what: &str, others: usize, of: &str) -> Result<()> {
-    if count == others {
-        return Ok(());
-    }
-    Err(Error::argument(format!("{count} {what} are not one for each of {others} {of}")))
+    ensure(count == others, format_args!("{count} {what} are not one for each of {others} {of}"))
 }
 
 /// As [`check_each`], for room that the caller gives for results.
@@ -43,8 +44,5 @@ pub fn check_each(count: usize, what: &str, others: usize, of: &str) -> Result<(
 /// # Errors
 /// `Argument`: there is another count.
 pub fn check_room(room: usize, what: &str, others: usize, of: &str) -> Result<()> {
-    if room == others {
-        return Ok(());
-    }
-    Err(Error::argument(format!("room for {room} {what} is not that of {others} {of}")))
+    ensure(room == others, format_args!("room for {room} {what} is not that of {others} {of}"))
 }

@@ -4,7 +4,7 @@ use super::free_fall::Falls;
 use super::material::Liquid;
 use super::pipes::Border;
 use crate::error::{Error, Result};
-use crate::numeric::checks::check_within;
+use crate::numeric::checks::{check_within, ensure};
 
 /// Parameters of the flow.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,9 +109,7 @@ impl Params {
         }
         if let Some(thickening) = &self.thickening {
             thickening.validate()?;
-            if self.liquid.viscosity == 0.0 {
-                return Err(Error::argument("a liquid without viscosity does not thicken"));
-            }
+            ensure(self.liquid.viscosity != 0.0, "a liquid without viscosity does not thicken")?;
         }
         match self.pace {
             TimeStepping::Realtime(longest) if !(1e-6..=1.0).contains(&longest) => {

@@ -12,7 +12,7 @@ use crate::numeric::lists::refill;
 use crate::shallow::scalars::shares::MOST;
 
 /// Capacity of the list of landings: this many columns for each packet.
-pub(in crate::shallow::free_fall) const SPLASHES: usize = 4;
+pub(super) const SPLASHES: usize = 4;
 
 /// All liquid in the air.
 #[derive(Debug, Clone, Default)]
@@ -20,10 +20,10 @@ pub(in crate::shallow) struct Falling {
     /// In the order of their creation.
     pub packets: Vec<Packet>,
     /// By link; empty without falls.
-    pub(in crate::shallow::free_fall) waiting: Vec<Waiting>,
+    pub(super) waiting: Vec<Waiting>,
     /// Landings of a step; kept to avoid repeated allocation.
     pub(super) landed: Vec<Landing>,
-    pub(in crate::shallow::free_fall) threads: Rivulets,
+    pub(super) threads: Rivulets,
     /// Seconds since packets were last created, and how many times they were.
     pub since: f64,
     pub tick: u64,

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::numeric::bytes::Reader;
 
 /// The bytes still to be written.
-pub(in crate::shallow::saved_state) struct Put<'a>(pub(super) &'a mut [u8]);
+pub(super) struct Put<'a>(pub(super) &'a mut [u8]);
 
 impl Put<'_> {
     pub fn bytes(&mut self, bytes: &[u8]) {
@@ -27,32 +27,25 @@ impl Put<'_> {
     }
 }
 
-pub(in crate::shallow::saved_state) fn get<T, const N: usize>(
-    bytes: &[u8],
-    to: &mut [T],
-    number: impl Fn([u8; N]) -> T,
-) {
+pub(super) fn get<T, const N: usize>(bytes: &[u8], to: &mut [T], number: impl Fn([u8; N]) -> T) {
     to.iter_mut().zip(bytes.as_chunks().0).for_each(|(to, bytes)| *to = number(*bytes));
 }
 
 /// The next elements of N bytes.
-pub(in crate::shallow::saved_state) fn parts<'a, const N: usize>(
-    from: &mut Reader<'a>,
-    count: usize,
-) -> Result<&'a [[u8; N]]> {
+pub(super) fn parts<'a, const N: usize>(from: &mut Reader<'a>, count: usize) -> Result<&'a [[u8; N]]> {
     Ok(from.bytes(count * N)?.as_chunks().0)
 }
 
 /// Some bytes of an element.
-pub(in crate::shallow::saved_state) fn part<const N: usize>(element: &[u8], at: usize) -> [u8; N] {
+pub(super) fn part<const N: usize>(element: &[u8], at: usize) -> [u8; N] {
     std::array::from_fn(|byte| element[at + byte])
 }
 
 /// Bytes of the hash at the end of a state.
-pub(in crate::shallow::saved_state) const SEAL: usize = 16;
+pub(super) const SEAL: usize = 16;
 
 /// How a kind of state begins.
-pub(in crate::shallow::saved_state) struct Beginning {
+pub(super) struct Beginning {
     pub magic: [u8; 8],
     pub version: u32,
     /// Where the header has the length of the state.
@@ -62,7 +55,7 @@ pub(in crate::shallow::saved_state) struct Beginning {
 }
 
 /// Checks the beginning, the length and the hash of a state; returns its header, and all of it without the hash.
-pub(in crate::shallow::saved_state) fn open<'a, const HEADER: usize>(
+pub(super) fn open<'a, const HEADER: usize>(
     bytes: &'a [u8],
     kind: &Beginning,
 ) -> Result<(&'a [u8; HEADER], &'a [u8])> {
@@ -87,14 +80,14 @@ pub(in crate::shallow::saved_state) fn open<'a, const HEADER: usize>(
 }
 
 /// Writes the hash of a state at its end.
-pub(in crate::shallow::saved_state) fn seal(state: &mut [u8]) {
+pub(super) fn seal(state: &mut [u8]) {
     let (body, seal) = state.split_at_mut(state.len() - SEAL);
     seal.copy_from_slice(&xxh3_128(body).to_le_bytes());
 }
 
-pub(in crate::shallow::saved_state) fn refused(what: &str) -> Error {
+pub(super) fn refused(what: &str) -> Error {
     Error::Bytes(format!("the saved state {what}"))
 }
 
 /// Valid sums of units, three of which fit 64 bits; and units that a flow point has pending.
-pub(in crate::shallow::saved_state) const SUMS: RangeInclusive<i64> = -(1 << 61)..=1 << 61;
+pub(super) const SUMS: RangeInclusive<i64> = -(1 << 61)..=1 << 61;

@@ -143,9 +143,7 @@ impl Header {
 }
 
 /// Active strips that have the head of a full column.
-pub(in crate::shallow::saved_state) fn heads(
-    shallow: &Shallow,
-) -> impl Iterator<Item = (usize, &[f32; STRIP])> {
+pub(super) fn heads(shallow: &Shallow) -> impl Iterator<Item = (usize, &[f32; STRIP])> {
     let all = shallow.flow.heads().as_chunks::<STRIP>().0;
     let strips = runs(shallow.flow.active()).flatten().map(move |strip| (strip, &all[strip]));
     strips.filter(|(_, heads)| heads.iter().fold(0, |any, head| any | head.to_bits()) != 0)

@@ -15,9 +15,9 @@ pub mod link_step;
 pub(super) mod overflow_edges;
 mod pressurised;
 pub mod rest;
-pub(in crate::shallow) mod rows;
+pub(super) mod rows;
 pub mod stop;
-pub(in crate::shallow) mod thickening;
+pub(super) mod thickening;
 mod transfers;
 pub mod viscous_flux;
 
@@ -91,7 +91,7 @@ pub(super) struct Stored<'a> {
 
 impl Stored<'_> {
     /// Clears the active strips of a range; inactive ones are already empty.
-    pub fn clear(&mut self, strips: std::ops::Range<usize>) {
+    pub fn clear(&mut self, strips: Range<usize>) {
         let first = strips.start;
         for run in runs(&self.active[strips]) {
             let run = (first + run.start) * STRIP..(first + run.end) * STRIP;
@@ -186,11 +186,7 @@ impl Flow {
 
     /// Makes the strips of `runs` (in ascending order) active, and besides them only strips beside liquid. Call it after changing what
     /// [`Stored`] refers to.
-    pub(super) fn wake(
-        &mut self,
-        columns: &Columns,
-        runs: impl Iterator<Item = std::ops::Range<usize>> + Clone,
-    ) {
+    pub(super) fn wake(&mut self, columns: &Columns, runs: impl Iterator<Item = Range<usize>> + Clone) {
         self.active.reset(columns, &self.depth, runs);
     }
 

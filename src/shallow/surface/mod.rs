@@ -23,11 +23,11 @@
 //! Where a group of four lacks one link, between two cells side by side, its two triangles overlap ([`Check::doubled`]): the liquid of
 //! these columns is on different layers there.
 
-pub(in crate::shallow) mod buffers;
+pub(super) mod buffers;
 pub mod counts;
 pub mod heights;
 pub mod layout;
-pub(in crate::shallow) mod quartets;
+pub(super) mod quartets;
 pub mod rim;
 mod self_check;
 

@@ -11,8 +11,7 @@ use crate::shallow::frame::{check_length, too_many_steps};
 use crate::shallow::solver::rows::bands::attended;
 use crate::shallow::solver::stop::Stop;
 use crate::shallow::system::Report;
-use crate::shallow::time_step;
-use crate::shallow::time_step::MOST_STEPS;
+use crate::shallow::time_step::{self, MOST_STEPS};
 
 impl Detail {
     /// One frame of `dt` (s).

@@ -10,6 +10,7 @@ use crate::geometry::check::orientation::{Closing, Orientation};
 use crate::geometry::mesh::coincident;
 use crate::geometry::mesh::weld::Weld;
 use crate::geometry::{DVec3, TriMesh};
+use crate::numeric::checks::ensure;
 use crate::sweep::{Face, Fixed, Lattice, Topology, Weights, Window, boundary, fill};
 use crate::vdb::FloatGrid;
 
@@ -61,9 +62,7 @@ pub fn layer(
         let mut faces = Vec::new();
         match cover {
             Cover::Depth(depth) => {
-                if !(*depth > 0.0 && depth.is_finite()) {
-                    return Err(Error::argument(format!("depth = {depth} m is not above 0")));
-                }
+                ensure(*depth > 0.0 && depth.is_finite(), format_args!("depth = {depth} m is not above 0"))?;
                 for mesh in std::iter::once(&ground).chain(&statics).map(Sheet::without_walls) {
                     let raised = |p: DVec3| p + DVec3::y() * *depth;
                     prisms(ctx, &lattice, &mesh, |p| p, raised, 1, &mut faces)?;

@@ -13,13 +13,13 @@ use super::solver::contacts::MOST as MOST_GRAINS;
 use crate::snow::grains::solver::pairs::Held;
 
 use super::solver::layout::{Layout, SUB_STEPS_AHEAD, holds, locate, order, settle, world};
-use super::solver::rest;
 use super::solver::rows::{Row, Shared, V, norm};
 use super::solver::solve::{Motion, sub_step};
-use super::solver::trapped;
+use super::solver::{rest, trapped};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
+use crate::numeric::checks::ensure;
 use crate::snow::grains::solver::blocks::{At, NONE};
 use crate::snow::grains::solver::collide::Coefficients;
 
@@ -63,9 +63,7 @@ impl Heap {
     /// A position out of range; too many grains.
     pub fn add(&mut self, id: u32, position: DVec3, velocity: V) -> Result<()> {
         let (at, position) = locate(position, self.diameter);
-        if !holds(at) {
-            return Err(Error::argument("a grain is too far from the origin"));
-        }
+        ensure(holds(at), "a grain is too far from the origin")?;
         if self.rows.len() >= MOST_GRAINS {
             return Err(Error::argument(format!("there are more than {MOST_GRAINS} grains")));
         }
@@ -329,7 +327,7 @@ pub const MOST_BEFORE: usize = 64;
 
 /// The grains at the beginning of the last step.
 #[derive(Clone, Default)]
-pub(in crate::snow::grains) struct Starts {
+pub(super) struct Starts {
     /// By identity, ascending.
     pub grains: Vec<(u32, Start)>,
     /// Identities of the grains that the step created: first and end (exclusive).

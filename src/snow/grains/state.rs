@@ -13,8 +13,7 @@ use super::solver::rows::Row;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::numeric::bytes::{Reader, Writer};
-use crate::numeric::packed;
-use crate::numeric::packed::Magic;
+use crate::numeric::packed::{self, Magic};
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzgrn06";

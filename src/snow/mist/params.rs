@@ -1,7 +1,7 @@
 //! User parameters of mist.
 
-use crate::error::{Error, Result};
-use crate::numeric::checks::check_within;
+use crate::error::Result;
+use crate::numeric::checks::{check_within, ensure};
 
 /// Maximum wind speed (m/s) along an axis.
 pub const FASTEST_WIND: f64 = 1000.0;
@@ -69,9 +69,7 @@ impl Params {
         within("cell", self.cell, 1.0e-5..=100.0)?;
         within("from_speed", self.from_speed, 0.0..=1000.0)?;
         within("gravity", self.gravity, -1000.0..=1000.0)?;
-        if self.half_life.is_nan() || self.half_life <= 0.0 {
-            return Err(Error::argument(format!("half_life = {} is not over 0", self.half_life)));
-        }
+        ensure(self.half_life > 0.0, format_args!("half_life = {} is not over 0", self.half_life))?;
         for wind in self.wind {
             within("wind", wind, -FASTEST_WIND..=FASTEST_WIND)?;
         }

@@ -3,8 +3,7 @@
 use super::Mist;
 use crate::error::{Error, Result};
 use crate::numeric::bytes::{Reader, Writer};
-use crate::numeric::packed;
-use crate::numeric::packed::Magic;
+use crate::numeric::packed::{self, Magic};
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzmst01";

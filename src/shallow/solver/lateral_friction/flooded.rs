@@ -31,13 +31,7 @@ const CEILING: f64 = 4.0;
 
 impl Walls {
     /// Lateral friction of a pipe of full columns between i and j, which may be the outside; `full` says which of them are full.
-    pub(in crate::shallow::solver) fn beside(
-        &self,
-        state: &State,
-        at: At,
-        [i, j]: [usize; 2],
-        full: [bool; 2],
-    ) -> Beside {
+    pub fn beside(&self, state: &State, at: At, [i, j]: [usize; 2], full: [bool; 2]) -> Beside {
         let State { step, columns, .. } = *state;
         if step.lateral == 0.0 {
             return Beside::NONE;

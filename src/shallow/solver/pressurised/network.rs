@@ -21,8 +21,7 @@ use crate::shallow::solver::link_flow::LinkFlow;
 use crate::shallow::solver::overflow_edges::{Fall, OverflowEdges};
 use crate::shallow::solver::rows::filling::Filling;
 use crate::shallow::solver::stop::Stop;
-use crate::shallow::solver::transfers::limiter;
-use crate::shallow::solver::transfers::limiter::Party;
+use crate::shallow::solver::transfers::limiter::{self, Party};
 use crate::shallow::solver::viscous_flux::Step;
 
 /// Columns of a network for which capacity is reserved from the beginning.

@@ -70,13 +70,7 @@ pub struct Stepped {
 }
 
 /// Calls `add` with each column of a row that gives or receives through a link, and how much.
-pub(in crate::shallow::solver) fn each_link(
-    ground: &Ground,
-    parts: &Parts,
-    row: usize,
-    gives: bool,
-    mut add: impl FnMut(u32, i64),
-) {
+pub fn each_link(ground: &Ground, parts: &Parts, row: usize, gives: bool, mut add: impl FnMut(u32, i64)) {
     if ground.pipes.links.columns_of(row).is_empty() {
         return;
     }

@@ -6,12 +6,12 @@
 //! are then final, and its depths change; no later stage reads that row again. A band starts some rows before its own rows and ends some
 //! rows after them, on copies, so that it computes the same values there as its neighbours.
 
-pub(in crate::shallow::solver) mod band_views;
+pub(super) mod band_views;
 pub(in crate::shallow) mod bands;
-pub(in crate::shallow::solver) mod buffers;
-pub(in crate::shallow::solver) mod filling;
+pub(super) mod buffers;
+pub(super) mod filling;
 mod ground;
-pub(in crate::shallow::solver) mod positions;
+pub(super) mod positions;
 
 use super::link_step::{Outside, indices_of};
 use super::pressurised::edges::At;
@@ -25,9 +25,8 @@ use crate::shallow::scalars::MOST;
 use crate::shallow::scalars::amounts::Changes;
 use band_views::Parts;
 use buffers::{Buffer, RING, Rows, SWEEPS};
-pub use ground::Ground;
-pub use ground::Stepped;
 pub(super) use ground::each_link;
+pub use ground::{Ground, Stepped};
 use positions::{PAD, Place};
 
 impl Rows {

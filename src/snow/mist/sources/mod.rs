@@ -1,6 +1,6 @@
 //! Where grains raise mist (thesis section 3.4.2): in a tube of twice the grain's radius along the path of each fast grain within the frame.
 
-pub(in crate::snow::mist) mod new_mist;
+pub(super) mod new_mist;
 
 use rayon::prelude::*;
 
