@@ -1,5 +1,6 @@
 //! The bytes of a saved state: numbers one after another, little-endian.
 
+use std::fmt::Display;
 use std::ops::RangeInclusive;
 
 use xxhash_rust::xxh3::xxh3_128;
@@ -65,17 +66,11 @@ pub(super) fn open<'a, const HEADER: usize>(
         return Err(if is_begun { refused("is cut short") } else { refused(&format!("is not of {of}")) });
     };
     let version = Reader::new(&header[8..]).u32()?;
-    if version != *wanted {
-        return Err(refused(&format!("has format {version}, and this library reads {wanted}")));
-    }
+    require(version == *wanted, format_args!("has format {version}, and this library reads {wanted}"))?;
     let length = u64::from_le_bytes(part(header, *length_at));
-    if length > bytes.len() as u64 {
-        return Err(refused("is cut short"));
-    }
+    require(length <= bytes.len() as u64, "is cut short")?;
     let (body, seal) = bytes.split_at(bytes.len() - SEAL);
-    if length < bytes.len() as u64 || xxh3_128(body).to_le_bytes() != *seal {
-        return Err(refused("is damaged"));
-    }
+    require(length >= bytes.len() as u64 && xxh3_128(body).to_le_bytes() == *seal, "is damaged")?;
     Ok((header, body))
 }
 
@@ -87,6 +82,11 @@ pub(super) fn seal(state: &mut [u8]) {
 
 pub(super) fn refused(what: &str) -> Error {
     Error::Bytes(format!("the saved state {what}"))
+}
+
+/// Checks that something holds of a state; `wrong` says what is wrong otherwise.
+pub(super) fn require(holds: bool, wrong: impl Display) -> Result<()> {
+    if holds { Ok(()) } else { Err(refused(&wrong.to_string())) }
 }
 
 /// Valid sums of units, three of which fit 64 bits; and units that a flow point has pending.
