@@ -184,7 +184,7 @@ impl Shallow {
             }
             report.seconds = if length >= left { dt } else { report.seconds + length };
         }
-        report.deepest = measures.unit * f64::from(self.flow.deepest());
+        report.deepest = measures.unit * f64::from(self.flow.bands.deepest());
         Ok(report)
     }
 }

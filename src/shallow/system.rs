@@ -274,7 +274,7 @@ impl Shallow {
         steps: u32,
         halvings: u32,
     ) -> Next<'a> {
-        let deepest = measures.unit * f64::from(self.flow.deepest());
+        let deepest = measures.unit * f64::from(self.flow.bands.deepest());
         Next { params: &self.params, measures, left, deepest, steps, last: self.flow.last, halvings }
     }
 
@@ -282,7 +282,7 @@ impl Shallow {
     fn find_fast(&mut self, dt: f64, measures: &Measures, next: impl Fn(&Next) -> Option<f64>) -> u32 {
         let Params { liquid, section, .. } = self.params;
         if liquid.viscosity == 0.0 || section == Section::Whole {
-            self.flow.calm();
+            self.flow.fast.clear();
             return 0;
         }
         let last = self.flow.last;

@@ -36,11 +36,10 @@ impl Grid {
             return Err(Error::argument(format!("a cell of {} m is not within 1e-9 to 1e9 m", self.cell)));
         }
         ensure(x.is_finite() && z.is_finite(), format_args!("the origin ({x}, {z}) is not finite"))?;
-        if !(1..=MOST_CELLS).contains(&nx) || !(1..=MOST_CELLS).contains(&nz) {
-            return Err(Error::argument(format!(
-                "{nx} x {nz} cells are not within 1 x 1 to {MOST_CELLS} x {MOST_CELLS}"
-            )));
-        }
+        ensure(
+            (1..=MOST_CELLS).contains(&nx) && (1..=MOST_CELLS).contains(&nz),
+            format_args!("{nx} x {nz} cells are not within 1 x 1 to {MOST_CELLS} x {MOST_CELLS}"),
+        )?;
         Ok(())
     }
 

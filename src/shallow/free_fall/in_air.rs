@@ -20,7 +20,7 @@ pub(in crate::shallow) struct Falling {
     /// In the order of their creation.
     pub packets: Vec<Packet>,
     /// By link; empty without falls.
-    pub(super) waiting: Vec<Waiting>,
+    pub waiting: Vec<Waiting>,
     /// Landings of a step; kept to avoid repeated allocation.
     pub(super) landed: Vec<Landing>,
     pub(super) threads: Rivulets,
@@ -49,17 +49,7 @@ impl Falling {
             + self.threads.bytes()
     }
 
-    /// All packets.
-    pub fn packets(&self) -> &[Packet] {
-        &self.packets
-    }
-
-    /// The liquid that waits at each link.
-    pub fn waiting(&self) -> &[Waiting] {
-        &self.waiting
-    }
-
-    /// Restores what [`Falling::packets`] and [`Falling::waiting`] returned; the number of links must be the same as then.
+    /// Replaces the packets, and what waits at each link.
     pub fn set(&mut self, packets: impl Iterator<Item = Packet>, waiting: impl Iterator<Item = Waiting>) {
         refill(&mut self.packets, packets);
         self.waiting.iter_mut().zip(waiting).for_each(|(to, waiting)| *to = waiting);

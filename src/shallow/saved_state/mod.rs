@@ -119,10 +119,10 @@ impl Shallow {
         for run in runs(flow.active()) {
             to.numbers(&[run.start as u32, run.len() as u32], u32::to_le_bytes);
         }
-        to.numbers(flow.bands().row_depths(), i32::to_le_bytes);
+        to.numbers(flow.bands.row_depths(), i32::to_le_bytes);
         self.remap.held.parcels().iter().for_each(|parcel| to.bytes(&parcel.to_bytes()));
-        self.falls.packets().iter().for_each(|packet| to.bytes(&packet.to_bytes()));
-        self.falls.waiting().iter().for_each(|waiting| to.bytes(&waiting.to_bytes()));
+        self.falls.packets.iter().for_each(|packet| to.bytes(&packet.to_bytes()));
+        self.falls.waiting.iter().for_each(|waiting| to.bytes(&waiting.to_bytes()));
         for (kind, waiting, moved) in self.flows.progress() {
             to.numbers(&[code_of_kind(kind), 0], u32::to_le_bytes);
             to.bytes(&waiting.to_le_bytes());
@@ -211,7 +211,7 @@ impl<'a> Saved<'a> {
         // On the same terrain, links differ only because of cliffs.
         let (links, most) =
             (shallow.flow.links.flux.len(), shallow.params.falls.map_or(0, |falls| falls.most));
-        if (counts.links, counts.lips) != (links, shallow.falls.waiting().len()) || counts.packets > most {
+        if (counts.links, counts.lips) != (links, shallow.falls.waiting.len()) || counts.packets > most {
             return Err(refused("belongs to a liquid with other falls"));
         }
         let own = shallow.flows.progress();
@@ -228,7 +228,7 @@ impl<'a> Saved<'a> {
         }
         self.scalars.check_laws(shallow)?;
         let strips = shallow.columns.strips().len();
-        let fits = counts.rows == shallow.flow.bands().row_depths().len()
+        let fits = counts.rows == shallow.flow.bands.row_depths().len()
             && is_in_order(self.runs().map(|run| run.start..run.end), strips)
             && self.runs().map(|run| run.len()).sum::<usize>() == counts.strips
             && is_in_order(self.head_strips().map(|strip| strip..strip + 1), strips);

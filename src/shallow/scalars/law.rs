@@ -66,9 +66,5 @@ pub enum Law {
 }
 
 pub(in crate::shallow) fn check_scalar(scalar: usize, count: usize) -> Result<()> {
-    if scalar < count {
-        Ok(())
-    } else {
-        Err(Error::argument(format!("there is no scalar {scalar} among {count}")))
-    }
+    ensure(scalar < count, format_args!("there is no scalar {scalar} among {count}"))
 }

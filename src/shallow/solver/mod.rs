@@ -56,11 +56,12 @@ pub struct Flow {
     pub(super) links: LinkFlow,
     pub(super) overflow_edges: OverflowEdges,
     active: Active,
-    bands: Bands,
+    /// Including upper bounds of the depths of rows.
+    pub(super) bands: Bands,
     pub(super) network: Network,
     /// The step length (s) that fluxes refer to.
     pub(super) last: f64,
-    fast: Fast,
+    pub(super) fast: Fast,
     /// Lateral friction of pipes.
     pub(super) walls: Walls,
     /// Amounts of scalars.
@@ -77,7 +78,7 @@ pub(super) struct Stored<'a> {
     pub depth: &'a mut [i32],
     /// As [`Flow::numbers`].
     pub numbers: [&'a mut [f32]; 4],
-    /// As [`Flow::heads`].
+    /// Heads above the surface (units) of full columns, by column index.
     pub heads: &'a mut [f32],
     /// The bands of rows, with an upper bound of the depth in each row.
     pub bands: &'a mut Bands,
@@ -157,16 +158,6 @@ impl Flow {
     pub(super) fn numbers(&self) -> [&[f32]; 4] {
         let ([east, south], [left_east, left_south]) = (&self.flux, &self.left);
         [east, south, left_east, left_south]
-    }
-
-    /// Heads above the surface (units) of full columns, by column index.
-    pub(super) fn heads(&self) -> &[f32] {
-        self.network.over()
-    }
-
-    /// Including upper bounds of the depths of rows.
-    pub(super) fn bands(&self) -> &Bands {
-        &self.bands
     }
 
     /// All parts that a restored state replaces; [`Flow::wake`] must follow.
@@ -309,16 +300,6 @@ impl Flow {
     pub fn lighten(&mut self, drive: f64, step: &Step) {
         let Self { fast, active, depth, flux: [east, south], .. } = self;
         fast.lighten(&Films { active, depth, flux: [east, south], drive: drive as f32 }, step);
-    }
-
-    /// Marks no film as fast.
-    pub fn calm(&mut self) {
-        self.fast.clear();
-    }
-
-    /// Upper bound of the depth (units).
-    pub fn deepest(&self) -> i32 {
-        self.bands.deepest()
     }
 
     /// Finds the overflow edges of the next step: the links that liquid falls freely from.

@@ -11,7 +11,7 @@ use super::scalars::amounts::Account;
 use super::scalars::shares::{Levels, MOST};
 use super::solver::Flow;
 use crate::error::{Error, Result};
-use crate::numeric::checks::check_within;
+use crate::numeric::checks::{check_within, ensure};
 
 /// A source, a drain or an absorber.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,11 +91,8 @@ impl FlowPoint {
             return Err(Error::argument(format!("at = ({x}, {y}, {z}) is not finite")));
         }
         let positive = |name: &str, value: f64| {
-            if value >= 0.0 && value.is_finite() {
-                Ok(())
-            } else {
-                Err(Error::argument(format!("{name} = {value} is not 0 or more")))
-            }
+            let holds = value >= 0.0 && value.is_finite();
+            ensure(holds, format_args!("{name} = {value} is not 0 or more"))
         };
         positive("radius", self.radius)?;
         positive("rate", self.rate)?;

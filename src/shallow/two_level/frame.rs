@@ -82,7 +82,8 @@ impl Detail {
             report.steps = steps + 1;
             report.seconds = if length >= left { dt } else { report.seconds + length };
         }
-        report.deepest = measures[0].unit * f64::from(fine.flow.deepest().max(coarse.flow.deepest()));
+        report.deepest =
+            measures[0].unit * f64::from(fine.flow.bands.deepest().max(coarse.flow.bands.deepest()));
         Ok(report)
     }
 }

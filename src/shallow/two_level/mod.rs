@@ -309,10 +309,7 @@ impl Detail {
 }
 
 fn check_carried(params: &Params) -> Result<()> {
-    match params.thickening {
-        Some(_) => Err(Error::argument("liquid with a level of detail has no scalar that thickens it")),
-        None => Ok(()),
-    }
+    ensure(params.thickening.is_none(), "liquid with a level of detail has no scalar that thickens it")
 }
 
 /// The smallest box of near cells with everything between two corners (m), as far as there are cells: minimum x and z, then maximum.
@@ -339,11 +336,10 @@ pub fn cells_around(grid: &Grid, bounds: [f64; 4]) -> Result<Cells> {
 
 pub(super) fn check_near(near: &Cells, [nx, nz]: [usize; 2]) -> Result<()> {
     let [x, z] = near;
-    if x.start >= x.end || z.start >= z.end || x.end > nx || z.end > nz {
-        return Err(Error::argument(format!(
-            "near cells {x:?} x {z:?} are not a box within {nx} x {nz} cells"
-        )));
-    }
+    ensure(
+        x.start < x.end && z.start < z.end && x.end <= nx && z.end <= nz,
+        format_args!("near cells {x:?} x {z:?} are not a box within {nx} x {nz} cells"),
+    )?;
     if [x.start, x.end, z.start, z.end].iter().any(|side| side % 2 > 0) {
         return Err(Error::argument(format!("near cells {x:?} x {z:?} do not begin and end at even ones")));
     }

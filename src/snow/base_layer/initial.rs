@@ -83,11 +83,10 @@ pub fn layer(
         Ok(faces)
     })?;
     let mut layer = fill(ctx, faces, lattice, half_width)?;
-    if layer.active_voxels() == 0 {
-        return Err(Error::argument(
-            "there is no snow: is the depth below a cell, or the top below the ground?",
-        ));
-    }
+    ensure(
+        layer.active_voxels() > 0,
+        "there is no snow: is the depth below a cell, or the top below the ground?",
+    )?;
     layer.prune_level_set()?;
     layer.set_name("surface")?;
     let rough = match cover {
@@ -209,11 +208,10 @@ fn sheet_of(ground: &Ground) -> Result<Sheet> {
         Ground::Mesh(mesh) => return Ok(Sheet::of(mesh)),
         Ground::Plane { height, area } => (*height, *area),
     };
-    if !(x1 > x0 && z1 > z0 && height.is_finite() && (x1 - x0).is_finite() && (z1 - z0).is_finite()) {
-        return Err(Error::argument(format!(
-            "area = [{x0}, {z0}, {x1}, {z1}] is not [x0, z0, x1, z1] with x1 > x0, z1 > z0"
-        )));
-    }
+    ensure(
+        x1 > x0 && z1 > z0 && height.is_finite() && (x1 - x0).is_finite() && (z1 - z0).is_finite(),
+        format_args!("area = [{x0}, {z0}, {x1}, {z1}] is not [x0, z0, x1, z1] with x1 > x0, z1 > z0"),
+    )?;
     let at = |x: f64, z: f64| DVec3::new(x, height, z);
     Ok(Sheet {
         positions: vec![at(x0, z0), at(x1, z0), at(x1, z1), at(x0, z1)],

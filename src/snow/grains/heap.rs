@@ -224,11 +224,10 @@ impl Heap {
             }
         });
         let is_finite = |row: &Row| row.position.iter().chain(&row.velocity).all(|x| x.is_finite());
-        if !self.rows.par_iter().all(is_finite) {
-            return Err(Error::argument(
-                "a grain would move infinitely fast: the base layer or an object is not as it should be",
-            ));
-        }
+        ensure(
+            self.rows.par_iter().all(is_finite),
+            "a grain would move infinitely fast: the base layer or an object is not as it should be",
+        )?;
         let is_there =
             |slot: &u32| layout.homes[*slot as usize].block != NONE && holds(self.at[*slot as usize]);
         let kept: Vec<u32> = (0..self.rows.len() as u32).filter(is_there).collect();
