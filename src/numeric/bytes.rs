@@ -1,5 +1,7 @@
 //! Little-endian numbers as bytes: the contents of exact states.
 
+use std::fmt::Display;
+
 use crate::error::{Error, Result};
 
 /// Writes numbers.
@@ -127,8 +129,16 @@ impl<'a> Reader<'a> {
     /// # Errors
     /// Something is left.
     pub fn end(&self) -> Result<()> {
-        if self.0.is_empty() { Ok(()) } else { Err(Error::Bytes("has bytes behind its end".into())) }
+        require(self.0.is_empty(), "has bytes behind its end")
     }
+}
+
+/// Checks that something holds of a state.
+///
+/// # Errors
+/// `Bytes`: it does not; `wrong` says what is wrong then.
+pub fn require(holds: bool, wrong: impl Display) -> Result<()> {
+    if holds { Ok(()) } else { Err(Error::Bytes(wrong.to_string())) }
 }
 
 fn cut() -> Error {

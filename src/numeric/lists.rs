@@ -1,6 +1,4 @@
-//! Lists that keep their memory while their contents are replaced, and checks of their lengths.
-
-use crate::error::{Error, Result};
+//! Lists that keep their memory while their contents are replaced.
 
 /// Makes a list of so many copies of a value.
 pub fn reset<T: Clone>(list: &mut Vec<T>, len: usize, value: T) {
@@ -24,26 +22,4 @@ pub fn split_each<T, const N: usize>(lists: [&mut [T]; N], at: usize) -> [[&mut 
         before
     });
     [before, behind]
-}
-
-/// Checks that there is one of something for each of some others.
-///
-/// # Errors
-/// `Argument`: there is another count.
-pub fn check_each(count: usize, what: &str, others: usize, of: &str) -> Result<()> {
-    if count == others {
-        return Ok(());
-    }
-    Err(Error::argument(format!("{count} {what} are not one for each of {others} {of}")))
-}
-
-/// As [`check_each`], for room that the caller gives for results.
-///
-/// # Errors
-/// `Argument`: there is another count.
-pub fn check_room(room: usize, what: &str, others: usize, of: &str) -> Result<()> {
-    if room == others {
-        return Ok(());
-    }
-    Err(Error::argument(format!("room for {room} {what} is not that of {others} {of}")))
 }

@@ -3,6 +3,8 @@
 pub mod blocks;
 pub mod bytes;
 #[doc(hidden)]
+pub mod checks;
+#[doc(hidden)]
 pub mod cpu;
 #[doc(hidden)]
 pub mod digits;

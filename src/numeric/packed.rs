@@ -2,7 +2,7 @@
 
 use xxhash_rust::xxh3::xxh3_128;
 
-use super::bytes::Reader;
+use super::bytes::{Reader, require};
 use crate::error::{Error, Result};
 
 /// Identifies the kind of a state and its version.
@@ -57,9 +57,7 @@ fn parts<'a>(packed: &'a [u8], magic: &Magic, noun: &str) -> Result<Vec<&'a [u8]
         let length = from.u32()? as usize;
         let part = from.bytes(length)?;
         let whole = part.first_chunk().map_or(0, |size| u32::from_le_bytes(*size) as usize);
-        if whole > PART {
-            return Err(wrong("has a part that is too large"));
-        }
+        require(whole <= PART, "has a part that is too large")?;
         parts.push(part);
     }
     Ok(parts)

@@ -11,10 +11,10 @@ use super::params::TimeStepping;
 use super::solver::rows::bands::attended;
 use super::solver::stop::Stop;
 use super::system::{Report, Shallow};
-use super::time_step;
-use super::time_step::{LENGTHS, MOST_STEPS, Measures, Next};
+use super::time_step::{self, LENGTHS, MOST_STEPS, Measures, Next};
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::numeric::checks::ensure;
 use crate::numeric::cpu::FlushDenormals;
 use crate::numeric::digits;
 
@@ -69,9 +69,7 @@ impl Shallow {
     /// # Errors
     /// As [`Shallow::step`]; also when the budget is not positive.
     pub fn step_within(&mut self, ctx: &Context, dt: f64, budget: f64) -> Result<Report> {
-        if budget.is_nan() || budget <= 0.0 {
-            return Err(Error::argument(format!("a budget of {budget} s is not positive")));
-        }
+        ensure(budget > 0.0, format_args!("a budget of {budget} s is not positive"))?;
         let clock = Clock::start(self.flow.divide(&self.columns, ctx.pool().threads()));
         let next = |pace: &Next| (pace.steps == 0 || clock.seconds() < budget).then(|| time_step::next(pace));
         self.frame(ctx, dt, None, next)
@@ -186,7 +184,7 @@ impl Shallow {
             }
             report.seconds = if length >= left { dt } else { report.seconds + length };
         }
-        report.deepest = measures.unit * f64::from(self.flow.deepest());
+        report.deepest = measures.unit * f64::from(self.flow.bands.deepest());
         Ok(report)
     }
 }

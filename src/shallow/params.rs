@@ -4,6 +4,7 @@ use super::free_fall::Falls;
 use super::material::Liquid;
 use super::pipes::Border;
 use crate::error::{Error, Result};
+use crate::numeric::checks::{check_within, ensure};
 
 /// Parameters of the flow.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,30 +92,22 @@ impl Params {
     pub fn validate(&self) -> Result<()> {
         self.liquid.validate()?;
         let [x, y, z] = self.gravity;
-        if !(x.is_finite() && z.is_finite() && (-1e3..=-1e-3).contains(&y)) {
-            return Err(Error::argument(format!(
-                "gravity = ({x}, {y}, {z}) m/s2 does not point down, by 0.001 to 1000"
-            )));
-        }
-        if x.abs().max(z.abs()) > -y {
-            return Err(Error::argument(format!(
-                "gravity = ({x}, {y}, {z}) m/s2 leans by more than 45 degrees"
-            )));
-        }
-        if !(0.0..=1.0).contains(&self.kept) {
-            return Err(Error::argument(format!("kept = {} is not within 0 to 1", self.kept)));
-        }
-        if !(0.0..=0.01).contains(&self.rest) {
-            return Err(Error::argument(format!("rest = {} m/s is not within 0 to 0.01", self.rest)));
-        }
+        ensure(
+            x.is_finite() && z.is_finite() && (-1e3..=-1e-3).contains(&y),
+            format_args!("gravity = ({x}, {y}, {z}) m/s2 does not point down, by 0.001 to 1000"),
+        )?;
+        ensure(
+            x.abs().max(z.abs()) <= -y,
+            format_args!("gravity = ({x}, {y}, {z}) m/s2 leans by more than 45 degrees"),
+        )?;
+        check_within("kept", self.kept, "", 0.0..=1.0)?;
+        check_within("rest", self.rest, " m/s", 0.0..=0.01)?;
         if let Some(falls) = &self.falls {
             falls.validate()?;
         }
         if let Some(thickening) = &self.thickening {
             thickening.validate()?;
-            if self.liquid.viscosity == 0.0 {
-                return Err(Error::argument("a liquid without viscosity does not thicken"));
-            }
+            ensure(self.liquid.viscosity != 0.0, "a liquid without viscosity does not thicken")?;
         }
         match self.pace {
             TimeStepping::Realtime(longest) if !(1e-6..=1.0).contains(&longest) => {
@@ -146,11 +139,10 @@ impl Thickening {
     /// `Argument`, naming the field and its range.
     pub fn validate(&self) -> Result<()> {
         let Self { from, to, times, .. } = *self;
-        if !(from.is_finite() && to.is_finite() && from != to) {
-            return Err(Error::argument(format!(
-                "thickening.from = {from} and thickening.to = {to} are not finite and apart"
-            )));
-        }
+        ensure(
+            from.is_finite() && to.is_finite() && from != to,
+            format_args!("thickening.from = {from} and thickening.to = {to} are not finite and apart"),
+        )?;
         if !(1e-6..=1e9).contains(&times) {
             return Err(Error::argument(format!("thickening.times = {times} is not within 1e-6 to 1e9")));
         }

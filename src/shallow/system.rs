@@ -19,7 +19,8 @@ use super::terrain::Solids;
 use super::terrain::identity::Identity;
 use super::time_step::{self, Measures, Next};
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::numeric::checks::ensure;
 
 /// Liquid that flows over terrain.
 pub struct Shallow {
@@ -109,9 +110,7 @@ impl Shallow {
         params.validate()?;
         solids.grid.validate()?;
         let count: usize = (0..solids.grid.cells()).map(|cell| solids.cell(cell).len()).sum();
-        if count == 0 && apart.is_none() {
-            return Err(Error::argument("the terrain has no surface that faces up within the domain"));
-        }
+        ensure(count > 0 || apart.is_some(), "the terrain has no surface that faces up within the domain")?;
         let has_walls = params.friction == Friction::Walls;
         let bytes = if has_walls { BYTES + WALLS } else { BYTES };
         ctx.allow("the columns of the liquid", count as u64 * bytes)?;
@@ -155,15 +154,9 @@ impl Shallow {
     /// `Argument`: numbers out of range; a different border, falls or friction.
     pub fn set_params(&mut self, params: Params) -> Result<()> {
         params.validate()?;
-        if params.border != self.params.border {
-            return Err(Error::argument("the border cannot change after the liquid was made"));
-        }
-        if params.falls != self.params.falls {
-            return Err(Error::argument("falls cannot change after the liquid was made"));
-        }
-        if params.friction != self.params.friction {
-            return Err(Error::argument("friction cannot change after the liquid was made"));
-        }
+        ensure(params.border == self.params.border, "the border cannot change after the liquid was made")?;
+        ensure(params.falls == self.params.falls, "falls cannot change after the liquid was made")?;
+        ensure(params.friction == self.params.friction, "friction cannot change after the liquid was made")?;
         if params != self.params {
             self.flow.rouse();
         }
@@ -281,7 +274,7 @@ impl Shallow {
         steps: u32,
         halvings: u32,
     ) -> Next<'a> {
-        let deepest = measures.unit * f64::from(self.flow.deepest());
+        let deepest = measures.unit * f64::from(self.flow.bands.deepest());
         Next { params: &self.params, measures, left, deepest, steps, last: self.flow.last, halvings }
     }
 
@@ -289,7 +282,7 @@ impl Shallow {
     fn find_fast(&mut self, dt: f64, measures: &Measures, next: impl Fn(&Next) -> Option<f64>) -> u32 {
         let Params { liquid, section, .. } = self.params;
         if liquid.viscosity == 0.0 || section == Section::Whole {
-            self.flow.calm();
+            self.flow.fast.clear();
             return 0;
         }
         let last = self.flow.last;
@@ -392,7 +385,7 @@ const WALLS: u64 = 108;
 
 /// The state at the beginning of a frame, and the steps of the frame before.
 #[derive(Debug, Default)]
-pub(in crate::shallow) struct SavedState {
+pub(super) struct SavedState {
     pub state: Vec<u8>,
     pub steps: Vec<f64>,
 }

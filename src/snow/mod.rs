@@ -2,6 +2,8 @@
 
 #[cfg(feature = "vdb")]
 pub mod base_layer;
+#[cfg(feature = "vdb")]
+mod bounds;
 pub mod grain_cohesion;
 pub mod grain_friction;
 #[cfg(feature = "vdb")]

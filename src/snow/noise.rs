@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use crate::error::{Error, Result};
+use crate::numeric::checks::ensure;
 
 /// Irregularity of an imprint's surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,11 +33,9 @@ impl NoiseParams {
     /// Names the field and its range; refuses noise so steep that it would leave islands.
     pub fn validate(&self, cell: f64) -> Result<()> {
         let within = |name: &str, value: f64, range: RangeInclusive<f64>| {
-            let (low, high) = (*range.start(), *range.end());
-            if range.contains(&value) {
-                return Ok(());
-            }
-            Err(Error::argument(format!("noise {name} = {value} m is not within {low} to {high} m")))
+            let (low, high) = (range.start(), range.end());
+            let holds = range.contains(&value);
+            ensure(holds, format_args!("noise {name} = {value} m is not within {low} to {high} m"))
         };
         within("amplitude", self.amplitude, Self::amplitudes(cell))?;
         within("size", self.size, Self::sizes(cell))?;

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::error::{Error, Result};
+use crate::numeric::checks::ensure;
 
 /// The maximum integer height; heights lie from 0 to this, so that sums of two of them fit 32 bits.
 pub const TOP: i32 = 1 << 30;
@@ -34,14 +35,11 @@ impl Grid {
         if !(1e-9..=1e9).contains(&self.cell) {
             return Err(Error::argument(format!("a cell of {} m is not within 1e-9 to 1e9 m", self.cell)));
         }
-        if !x.is_finite() || !z.is_finite() {
-            return Err(Error::argument(format!("the origin ({x}, {z}) is not finite")));
-        }
-        if !(1..=MOST_CELLS).contains(&nx) || !(1..=MOST_CELLS).contains(&nz) {
-            return Err(Error::argument(format!(
-                "{nx} x {nz} cells are not within 1 x 1 to {MOST_CELLS} x {MOST_CELLS}"
-            )));
-        }
+        ensure(x.is_finite() && z.is_finite(), format_args!("the origin ({x}, {z}) is not finite"))?;
+        ensure(
+            (1..=MOST_CELLS).contains(&nx) && (1..=MOST_CELLS).contains(&nz),
+            format_args!("{nx} x {nz} cells are not within 1 x 1 to {MOST_CELLS} x {MOST_CELLS}"),
+        )?;
         Ok(())
     }
 

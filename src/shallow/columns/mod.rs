@@ -4,9 +4,9 @@
 //! have a column, and are sorted by row, then layer, then x: a run of them is one array, and everything that a row needs is contiguous.
 
 pub mod grid;
-pub(in crate::shallow) mod per_column;
-pub(in crate::shallow) mod runs;
-pub(in crate::shallow) mod stacks;
+pub(super) mod per_column;
+pub(super) mod runs;
+pub(super) mod stacks;
 
 use std::ops::Range;
 
@@ -255,7 +255,7 @@ impl Columns {
     }
 
     /// One more than the highest layer of a strip; 0 without strips.
-    pub(in crate::shallow) fn layers(&self) -> usize {
+    pub(super) fn layers(&self) -> usize {
         self.strips.iter().map(|strip| strip.layer as usize + 1).max().unwrap_or(0)
     }
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::STRIP;
 
 /// Runs of marked strips.
-pub(in crate::shallow) fn runs(marks: &[bool]) -> impl Iterator<Item = Range<usize>> + Clone + '_ {
+pub fn runs(marks: &[bool]) -> impl Iterator<Item = Range<usize>> + Clone + '_ {
     let mut end = 0;
     std::iter::from_fn(move || {
         let first = find(marks, end, true);
@@ -15,7 +15,7 @@ pub(in crate::shallow) fn runs(marks: &[bool]) -> impl Iterator<Item = Range<usi
 }
 
 /// Replaces numbers of all columns: by those that `find` writes in each run of marked strips, by 0 elsewhere.
-pub(in crate::shallow) fn fill_runs<T: Copy + Default>(
+pub fn fill_runs<T: Copy + Default>(
     marks: &[bool],
     out: &mut [T],
     mut find: impl FnMut(Range<usize>, &mut [T]),
@@ -30,7 +30,7 @@ pub(in crate::shallow) fn fill_runs<T: Copy + Default>(
 }
 
 /// The first strip, from `from` on, whose mark equals `wanted`; otherwise the count of all.
-pub(in crate::shallow) fn find(marks: &[bool], from: usize, wanted: bool) -> usize {
+pub fn find(marks: &[bool], from: usize, wanted: bool) -> usize {
     let rest = &marks[from..];
     // Skips many at once where none matches.
     let has_none = |chunk: &&[bool]| chunk.iter().fold(true, |none, mark| none & (*mark != wanted));

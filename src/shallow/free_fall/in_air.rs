@@ -12,7 +12,7 @@ use crate::numeric::lists::refill;
 use crate::shallow::scalars::shares::MOST;
 
 /// Capacity of the list of landings: this many columns for each packet.
-pub(in crate::shallow::free_fall) const SPLASHES: usize = 4;
+pub(super) const SPLASHES: usize = 4;
 
 /// All liquid in the air.
 #[derive(Debug, Clone, Default)]
@@ -20,10 +20,10 @@ pub(in crate::shallow) struct Falling {
     /// In the order of their creation.
     pub packets: Vec<Packet>,
     /// By link; empty without falls.
-    pub(in crate::shallow::free_fall) waiting: Vec<Waiting>,
+    pub waiting: Vec<Waiting>,
     /// Landings of a step; kept to avoid repeated allocation.
     pub(super) landed: Vec<Landing>,
-    pub(in crate::shallow::free_fall) threads: Rivulets,
+    pub(super) threads: Rivulets,
     /// Seconds since packets were last created, and how many times they were.
     pub since: f64,
     pub tick: u64,
@@ -49,17 +49,7 @@ impl Falling {
             + self.threads.bytes()
     }
 
-    /// All packets.
-    pub fn packets(&self) -> &[Packet] {
-        &self.packets
-    }
-
-    /// The liquid that waits at each link.
-    pub fn waiting(&self) -> &[Waiting] {
-        &self.waiting
-    }
-
-    /// Restores what [`Falling::packets`] and [`Falling::waiting`] returned; the number of links must be the same as then.
+    /// Replaces the packets, and what waits at each link.
     pub fn set(&mut self, packets: impl Iterator<Item = Packet>, waiting: impl Iterator<Item = Waiting>) {
         refill(&mut self.packets, packets);
         self.waiting.iter_mut().zip(waiting).for_each(|(to, waiting)| *to = waiting);

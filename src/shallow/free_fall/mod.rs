@@ -72,7 +72,7 @@ impl Shallow {
         let (grid, heights) = (self.columns.grid, self.columns.heights);
         let unit = grid.cell * grid.cell * heights.unit;
         let scalars = self.scalars();
-        self.falls.packets().iter().map(move |packet| {
+        self.falls.packets.iter().map(move |packet| {
             let mut concentrations = [0.0; MOST];
             for ((out, scalar), amount) in concentrations.iter_mut().zip(scalars).zip(packet.amounts) {
                 *out = (amount as f64 / packet.units as f64 * (scalar.range / LEVELS)) as f32;

@@ -1,6 +1,7 @@
 //! Parameters of falling liquid.
 
 use crate::error::{Error, Result};
+use crate::numeric::checks::{check_not_negative, check_within};
 use crate::shallow::columns::Columns;
 use crate::shallow::pipes::cliffs::Cliffs;
 
@@ -32,15 +33,9 @@ impl Falls {
     /// # Errors
     /// `Argument`, naming the field and its range.
     pub fn validate(&self) -> Result<()> {
-        for (name, value) in [("height", self.height), ("drop", self.drop)] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(Error::argument(format!("falls.{name} = {value} is not finite and 0 or more")));
-            }
-        }
-        if !(1e-4..=1.0).contains(&self.interval) {
-            let value = self.interval;
-            return Err(Error::argument(format!("falls.interval = {value} s is not within 0.0001 to 1")));
-        }
+        check_not_negative("falls.height", self.height)?;
+        check_not_negative("falls.drop", self.drop)?;
+        check_within("falls.interval", self.interval, " s", 1e-4..=1.0)?;
         if !(1..=1 << 20).contains(&self.most) {
             return Err(Error::argument(format!("falls.most = {} is not within 1 to 1048576", self.most)));
         }

@@ -87,23 +87,23 @@ impl Waiting {
     }
 
     /// Whether liquid waits there, or arrived recently.
-    pub(in crate::shallow::free_fall) fn is_awake(&self) -> bool {
+    pub(super) fn is_awake(&self) -> bool {
         self.units > 0 || self.steady > 0
     }
 
     /// Resets it after its liquid has left.
-    pub(in crate::shallow::free_fall) fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         let Self { is_back, steady, phase, .. } = *self;
         *self = Self { is_back, steady, phase, ..Self::default() };
     }
 }
 
 /// Adds amounts to others.
-pub(in crate::shallow::free_fall) fn add(to: &mut [i64; MOST], amounts: &[i64; MOST]) {
+pub(super) fn add(to: &mut [i64; MOST], amounts: &[i64; MOST]) {
     to.iter_mut().zip(amounts).for_each(|(to, amount)| *to = to.saturating_add(*amount));
 }
 
 /// The side that liquid falls over, seen from the donor.
-pub(in crate::shallow::free_fall) fn outward(links: &Links, link: usize, is_back: bool) -> Side {
+pub(super) fn outward(links: &Links, link: usize, is_back: bool) -> Side {
     if is_back { links.sides[link].opposite() } else { links.sides[link] }
 }

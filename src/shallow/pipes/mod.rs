@@ -7,9 +7,9 @@
 mod border;
 pub(super) mod cliffs;
 pub(super) mod joints;
-pub(in crate::shallow) mod links;
-pub(in crate::shallow) mod pipe_rules;
-pub(in crate::shallow) mod side;
+pub(super) mod links;
+pub(super) mod pipe_rules;
+pub(super) mod side;
 mod slopes;
 
 pub use border::Border;

@@ -8,7 +8,7 @@
 
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
-use crate::numeric::lists::check_each;
+use crate::numeric::checks::check_each;
 use crate::shallow::columns::Columns;
 use crate::shallow::columns::grid::Grid;
 use crate::shallow::pipes::side::Side;
@@ -128,7 +128,7 @@ impl Shallow {
     fn stands(&self, column: usize) -> Option<f64> {
         let depth = self.flow.depth[column];
         let eta = f64::from(self.columns.bases()[column]) + f64::from(depth);
-        (depth > 0).then(|| eta + f64::from(self.flow.heads()[column].max(0.0)))
+        (depth > 0).then(|| eta + f64::from(self.flow.network.over()[column].max(0.0)))
     }
 
     /// Whether a column is flooded up to its ceiling, within the tolerance of the solver.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::snapshot::Snapshot;
 use crate::error::{Error, Result};
-use crate::numeric::lists::check_room;
+use crate::numeric::checks::{check_room, ensure};
 use crate::shallow::columns::grid::Grid;
 use crate::shallow::columns::{Columns, STRIP};
 use crate::shallow::scalars::check_scalar;
@@ -221,8 +221,6 @@ fn sum(depth: &[i32; STRIP]) -> i64 {
 
 fn check_box(low: [f64; 3], high: [f64; 3]) -> Result<()> {
     // Also where one is NaN.
-    if low.iter().zip(&high).all(|(low, high)| low <= high) {
-        return Ok(());
-    }
-    Err(Error::argument(format!("a box from {low:?} to {high:?} m has no inside")))
+    let has_inside = low.iter().zip(&high).all(|(low, high)| low <= high);
+    ensure(has_inside, format_args!("a box from {low:?} to {high:?} m has no inside"))
 }

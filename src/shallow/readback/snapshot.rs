@@ -3,8 +3,9 @@
 use std::ops::Range;
 
 use crate::error::Result;
+use crate::numeric::checks::check_room;
 use crate::numeric::cpu::dispatch;
-use crate::numeric::lists::{check_room, refill, reset};
+use crate::numeric::lists::{refill, reset};
 use crate::shallow::columns::runs::{fill_runs, runs};
 use crate::shallow::columns::{Columns, NONE, STRIP};
 use crate::shallow::free_fall::Droplet;

@@ -102,11 +102,6 @@ impl Held {
         });
     }
 
-    /// Whether no liquid waits.
-    pub fn is_empty(&self) -> bool {
-        self.parcels.is_empty()
-    }
-
     /// Units that wait.
     pub fn units(&self) -> i64 {
         self.parcels.iter().map(|parcel| parcel.units).sum()

@@ -1,7 +1,7 @@
 //! The new columns of rows, and the liquid that stays in them.
 
 use super::band::Band;
-use super::cells::{Cell, Old, dry};
+use super::cells::{Cell, Old, Rest, dry};
 use super::dirty::Dirty;
 use super::held::Held;
 use super::origins::Origins;
@@ -274,7 +274,7 @@ impl Block<'_> {
         liquid: &mut Liquid,
         position: usize,
         cell: &mut Cell,
-        see: impl FnOnce([usize; 2], super::cells::Rest),
+        see: impl FnOnce([usize; 2], Rest),
     ) {
         let band = self.band;
         cell.old.clear();

@@ -26,6 +26,7 @@ use super::terrain::identity::Identity;
 use super::terrain::shapes::Shape;
 use super::terrain::solids::Solid;
 use crate::error::{Error, Result};
+use crate::numeric::checks::ensure;
 pub use buffers::Remap;
 use carry::{Carry, Change};
 pub use held::{Held, Parcel};
@@ -55,9 +56,7 @@ impl Shallow {
         if (solids.grid, solids.heights) != (self.columns.grid, self.columns.heights) {
             return Err(Error::argument("the terrain's cells or heights are not those of the liquid"));
         }
-        if solids.layers() == 0 {
-            return Err(Error::argument("the terrain has no surface that faces up within the domain"));
-        }
+        ensure(solids.layers() > 0, "the terrain has no surface that faces up within the domain")?;
         let [nx, nz] = self.columns.grid.size;
         self.update_cells([0..nx, 0..nz], |cell| solids.cell(cell))
     }

@@ -275,7 +275,7 @@ fn cliffs_that_come_and_go_are_links_as_in_a_terrain_made_anew() {
         shallow.update_terrain(&solids(grid, &cells)).unwrap();
         let rules = Rules::of(&shallow.params, &shallow.columns, None);
         assert!(shallow.pipes == Pipes::with_rules(&shallow.columns, rules), "round {round}");
-        assert_eq!(shallow.falls.waiting().len(), shallow.pipes.links.len());
+        assert_eq!(shallow.falls.waiting.len(), shallow.pipes.links.len());
         assert_eq!(shallow.balance().error, 0, "round {round}");
     }
     assert!(flown > 1000, "{flown}");

@@ -9,7 +9,7 @@
 //! | states of the fine and of the coarse liquid, as in [`super`] | |
 //! | hash of everything above | [`SEAL`] |
 
-use super::encoding::{Beginning, Put, SEAL, SUMS, open, part, parts, refused, seal};
+use super::encoding::{Beginning, Put, SEAL, SUMS, open, part, parts, require, seal};
 use super::{LAST, MOST_FLUX, Saved, is_over};
 use crate::error::{Error, Result};
 use crate::numeric::bytes::Reader;
@@ -67,9 +67,7 @@ impl Detail {
     /// otherwise as [`crate::shallow::Shallow::restore`].
     pub fn restore(&mut self, bytes: &[u8]) -> Result<()> {
         let saved = Both::read(bytes)?;
-        if check_near(&saved.near, self.fine.columns.grid.size).is_err() {
-            return Err(refused("belongs to another terrain"));
-        }
+        require(check_near(&saved.near, self.fine.columns.grid.size).is_ok(), "belongs to another terrain")?;
         if saved.near == self.near {
             saved.check(self)?;
             saved.apply(self);
@@ -161,14 +159,10 @@ impl<'a> Both<'a> {
         let [pipes, rests] = [count()?, count()?];
         let sizes = [u64::from_le_bytes(from.take()?), u64::from_le_bytes(from.take()?)];
         let last = from.f64()?;
-        if scalars > MOST {
-            return Err(refused("is damaged"));
-        }
+        require(scalars <= MOST, "is damaged")?;
         let fixed = (HEADER + rest_bytes(scalars) * rests + 8 * pipes + SEAL) as u64;
         let all = sizes[0].checked_add(sizes[1]).and_then(|sum| sum.checked_add(fixed));
-        if all != Some(bytes.len() as u64) {
-            return Err(refused("is damaged"));
-        }
+        require(all == Some(bytes.len() as u64), "is damaged")?;
         let mut from = Reader::new(&body[HEADER..]);
         let rests = from.bytes(rest_bytes(scalars) * rests)?;
         let pipes = parts(&mut from, 2 * pipes)?;
@@ -197,7 +191,7 @@ impl<'a> Both<'a> {
                     && SUMS.contains(&load.units)
                     && load.amounts.iter().all(|amount| SUMS.contains(amount))
             });
-        if is_good { Ok(()) } else { Err(refused("is damaged")) }
+        require(is_good, "is damaged")
     }
 
     fn rests(&self) -> impl Iterator<Item = (usize, Load)> + Clone {

@@ -1,5 +1,6 @@
 //! The bytes of a saved state: numbers one after another, little-endian.
 
+use std::fmt::Display;
 use std::ops::RangeInclusive;
 
 use xxhash_rust::xxh3::xxh3_128;
@@ -8,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::numeric::bytes::Reader;
 
 /// The bytes still to be written.
-pub(in crate::shallow::saved_state) struct Put<'a>(pub(super) &'a mut [u8]);
+pub(super) struct Put<'a>(pub(super) &'a mut [u8]);
 
 impl Put<'_> {
     pub fn bytes(&mut self, bytes: &[u8]) {
@@ -27,32 +28,25 @@ impl Put<'_> {
     }
 }
 
-pub(in crate::shallow::saved_state) fn get<T, const N: usize>(
-    bytes: &[u8],
-    to: &mut [T],
-    number: impl Fn([u8; N]) -> T,
-) {
+pub(super) fn get<T, const N: usize>(bytes: &[u8], to: &mut [T], number: impl Fn([u8; N]) -> T) {
     to.iter_mut().zip(bytes.as_chunks().0).for_each(|(to, bytes)| *to = number(*bytes));
 }
 
 /// The next elements of N bytes.
-pub(in crate::shallow::saved_state) fn parts<'a, const N: usize>(
-    from: &mut Reader<'a>,
-    count: usize,
-) -> Result<&'a [[u8; N]]> {
+pub(super) fn parts<'a, const N: usize>(from: &mut Reader<'a>, count: usize) -> Result<&'a [[u8; N]]> {
     Ok(from.bytes(count * N)?.as_chunks().0)
 }
 
 /// Some bytes of an element.
-pub(in crate::shallow::saved_state) fn part<const N: usize>(element: &[u8], at: usize) -> [u8; N] {
+pub(super) fn part<const N: usize>(element: &[u8], at: usize) -> [u8; N] {
     std::array::from_fn(|byte| element[at + byte])
 }
 
 /// Bytes of the hash at the end of a state.
-pub(in crate::shallow::saved_state) const SEAL: usize = 16;
+pub(super) const SEAL: usize = 16;
 
 /// How a kind of state begins.
-pub(in crate::shallow::saved_state) struct Beginning {
+pub(super) struct Beginning {
     pub magic: [u8; 8],
     pub version: u32,
     /// Where the header has the length of the state.
@@ -62,7 +56,7 @@ pub(in crate::shallow::saved_state) struct Beginning {
 }
 
 /// Checks the beginning, the length and the hash of a state; returns its header, and all of it without the hash.
-pub(in crate::shallow::saved_state) fn open<'a, const HEADER: usize>(
+pub(super) fn open<'a, const HEADER: usize>(
     bytes: &'a [u8],
     kind: &Beginning,
 ) -> Result<(&'a [u8; HEADER], &'a [u8])> {
@@ -72,29 +66,28 @@ pub(in crate::shallow::saved_state) fn open<'a, const HEADER: usize>(
         return Err(if is_begun { refused("is cut short") } else { refused(&format!("is not of {of}")) });
     };
     let version = Reader::new(&header[8..]).u32()?;
-    if version != *wanted {
-        return Err(refused(&format!("has format {version}, and this library reads {wanted}")));
-    }
+    require(version == *wanted, format_args!("has format {version}, and this library reads {wanted}"))?;
     let length = u64::from_le_bytes(part(header, *length_at));
-    if length > bytes.len() as u64 {
-        return Err(refused("is cut short"));
-    }
+    require(length <= bytes.len() as u64, "is cut short")?;
     let (body, seal) = bytes.split_at(bytes.len() - SEAL);
-    if length < bytes.len() as u64 || xxh3_128(body).to_le_bytes() != *seal {
-        return Err(refused("is damaged"));
-    }
+    require(length >= bytes.len() as u64 && xxh3_128(body).to_le_bytes() == *seal, "is damaged")?;
     Ok((header, body))
 }
 
 /// Writes the hash of a state at its end.
-pub(in crate::shallow::saved_state) fn seal(state: &mut [u8]) {
+pub(super) fn seal(state: &mut [u8]) {
     let (body, seal) = state.split_at_mut(state.len() - SEAL);
     seal.copy_from_slice(&xxh3_128(body).to_le_bytes());
 }
 
-pub(in crate::shallow::saved_state) fn refused(what: &str) -> Error {
+pub(super) fn refused(what: &str) -> Error {
     Error::Bytes(format!("the saved state {what}"))
 }
 
+/// Checks that something holds of a state; `wrong` says what is wrong otherwise.
+pub(super) fn require(holds: bool, wrong: impl Display) -> Result<()> {
+    if holds { Ok(()) } else { Err(refused(&wrong.to_string())) }
+}
+
 /// Valid sums of units, three of which fit 64 bits; and units that a flow point has pending.
-pub(in crate::shallow::saved_state) const SUMS: RangeInclusive<i64> = -(1 << 61)..=1 << 61;
+pub(super) const SUMS: RangeInclusive<i64> = -(1 << 61)..=1 << 61;

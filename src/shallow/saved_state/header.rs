@@ -48,13 +48,13 @@ impl Counts {
         Self {
             runs: count,
             strips,
-            rows: flow.bands().row_depths().len(),
+            rows: flow.bands.row_depths().len(),
             points: shallow.flows.progress().len(),
             links: flow.links.flux.len(),
             heads: heads(shallow).count(),
             parcels: shallow.remap.held.parcels().len(),
-            packets: shallow.falls.packets().len(),
-            lips: shallow.falls.waiting().len(),
+            packets: shallow.falls.packets.len(),
+            lips: shallow.falls.waiting.len(),
             scalars: shallow.scalars().len(),
         }
     }
@@ -143,10 +143,8 @@ impl Header {
 }
 
 /// Active strips that have the head of a full column.
-pub(in crate::shallow::saved_state) fn heads(
-    shallow: &Shallow,
-) -> impl Iterator<Item = (usize, &[f32; STRIP])> {
-    let all = shallow.flow.heads().as_chunks::<STRIP>().0;
+pub(super) fn heads(shallow: &Shallow) -> impl Iterator<Item = (usize, &[f32; STRIP])> {
+    let all = shallow.flow.network.over().as_chunks::<STRIP>().0;
     let strips = runs(shallow.flow.active()).flatten().map(move |strip| (strip, &all[strip]));
     strips.filter(|(_, heads)| heads.iter().fold(0, |any, head| any | head.to_bits()) != 0)
 }

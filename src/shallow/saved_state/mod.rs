@@ -36,7 +36,7 @@ use super::system::Shallow;
 use crate::error::{Error, Result};
 use crate::numeric::bytes::Reader;
 use crate::numeric::cpu::dispatch;
-use encoding::{Put, SEAL, SUMS, get, open, part, parts, refused, seal};
+use encoding::{Put, SEAL, SUMS, get, open, part, parts, refused, require, seal};
 use header::{ARRAYS, BEGINNING, Counts, HEADER, Header, SHARE, heads};
 use scalars::Scalars;
 
@@ -119,10 +119,10 @@ impl Shallow {
         for run in runs(flow.active()) {
             to.numbers(&[run.start as u32, run.len() as u32], u32::to_le_bytes);
         }
-        to.numbers(flow.bands().row_depths(), i32::to_le_bytes);
+        to.numbers(flow.bands.row_depths(), i32::to_le_bytes);
         self.remap.held.parcels().iter().for_each(|parcel| to.bytes(&parcel.to_bytes()));
-        self.falls.packets().iter().for_each(|packet| to.bytes(&packet.to_bytes()));
-        self.falls.waiting().iter().for_each(|waiting| to.bytes(&waiting.to_bytes()));
+        self.falls.packets.iter().for_each(|packet| to.bytes(&packet.to_bytes()));
+        self.falls.waiting.iter().for_each(|waiting| to.bytes(&waiting.to_bytes()));
         for (kind, waiting, moved) in self.flows.progress() {
             to.numbers(&[code_of_kind(kind), 0], u32::to_le_bytes);
             to.bytes(&waiting.to_le_bytes());
@@ -183,9 +183,7 @@ impl<'a> Saved<'a> {
         let (header, body) = open::<HEADER>(bytes, &BEGINNING)?;
         let header = Header::read(header)?;
         let counts = header.counts;
-        if counts.size() != bytes.len() {
-            return Err(refused("is damaged"));
-        }
+        require(counts.size() == bytes.len(), "is damaged")?;
         let mut from = Reader::new(&body[HEADER..]);
         Ok(Self {
             runs: parts(&mut from, counts.runs)?,
@@ -206,16 +204,14 @@ impl<'a> Saved<'a> {
     /// Whether it belongs to this liquid, and all numbers are valid.
     fn check(&self, shallow: &Shallow) -> Result<()> {
         let (header, counts) = (&self.header, &self.header.counts);
-        if header.terrain != shallow.identity.hash(&shallow.columns) {
-            return Err(refused("belongs to another terrain"));
-        }
+        require(header.terrain == shallow.identity.hash(&shallow.columns), "belongs to another terrain")?;
         if header.border != code_of_border(shallow.params.border) {
             return Err(refused("belongs to a liquid with another border"));
         }
         // On the same terrain, links differ only because of cliffs.
         let (links, most) =
             (shallow.flow.links.flux.len(), shallow.params.falls.map_or(0, |falls| falls.most));
-        if (counts.links, counts.lips) != (links, shallow.falls.waiting().len()) || counts.packets > most {
+        if (counts.links, counts.lips) != (links, shallow.falls.waiting.len()) || counts.packets > most {
             return Err(refused("belongs to a liquid with other falls"));
         }
         let own = shallow.flows.progress();
@@ -232,15 +228,12 @@ impl<'a> Saved<'a> {
         }
         self.scalars.check_laws(shallow)?;
         let strips = shallow.columns.strips().len();
-        let fits = counts.rows == shallow.flow.bands().row_depths().len()
+        let fits = counts.rows == shallow.flow.bands.row_depths().len()
             && is_in_order(self.runs().map(|run| run.start..run.end), strips)
             && self.runs().map(|run| run.len()).sum::<usize>() == counts.strips
             && is_in_order(self.head_strips().map(|strip| strip..strip + 1), strips);
-        if fits && self.has_good_numbers(&shallow.columns) && self.has_good_falls(shallow) {
-            Ok(())
-        } else {
-            Err(refused("is damaged"))
-        }
+        let is_good = fits && self.has_good_numbers(&shallow.columns) && self.has_good_falls(shallow);
+        require(is_good, "is damaged")
     }
 
     fn has_good_numbers(&self, columns: &Columns) -> bool {

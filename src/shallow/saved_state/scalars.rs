@@ -37,7 +37,7 @@ pub(super) fn put(shallow: &Shallow, to: &mut Put<'_>) {
         to.numbers(&amounts.sums[at], i128::to_le_bytes);
         let parcels = shallow.remap.held.parcels();
         parcels.iter().for_each(|parcel| to.bytes(&parcel.amounts[at].to_le_bytes()));
-        let (packets, lips) = (shallow.falls.packets(), shallow.falls.waiting());
+        let (packets, lips) = (&shallow.falls.packets, &shallow.falls.waiting);
         packets.iter().for_each(|packet| to.bytes(&packet.amounts[at].to_le_bytes()));
         lips.iter().for_each(|waiting| to.bytes(&waiting.amounts[at].to_le_bytes()));
         for run in runs(shallow.flow.active()) {

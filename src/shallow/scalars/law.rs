@@ -2,6 +2,7 @@
 
 use super::shares::LEVELS;
 use crate::error::{Error, Result};
+use crate::numeric::checks::ensure;
 
 /// A quantity that the liquid carries along.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,9 +27,7 @@ impl Scalar {
     /// # Errors
     /// `Argument`, naming the field and its range.
     pub fn validate(&self) -> Result<()> {
-        if self.name.is_empty() {
-            return Err(Error::argument("name is empty"));
-        }
+        ensure(!self.name.is_empty(), "name is empty")?;
         if !(1e-9..=1e9).contains(&self.range) {
             return Err(Error::argument(format!("range = {} is not within 1e-9 to 1e9", self.range)));
         }
@@ -67,9 +66,5 @@ pub enum Law {
 }
 
 pub(in crate::shallow) fn check_scalar(scalar: usize, count: usize) -> Result<()> {
-    if scalar < count {
-        Ok(())
-    } else {
-        Err(Error::argument(format!("there is no scalar {scalar} among {count}")))
-    }
+    ensure(scalar < count, format_args!("there is no scalar {scalar} among {count}"))
 }

@@ -13,8 +13,8 @@ use super::columns::STRIP;
 use super::columns::runs::fill_runs;
 use super::system::Shallow;
 use crate::error::{Error, Result};
+use crate::numeric::checks::{check_each, check_room, ensure};
 use crate::numeric::cpu::dispatch;
-use crate::numeric::lists::{check_each, check_room};
 use amounts::{ACCOUNTS, Account, Amounts};
 pub(super) use law::check_scalar;
 pub use law::{Law, Scalar};
@@ -57,9 +57,7 @@ impl Shallow {
     /// # Errors
     /// `Argument`: more than [`MOST`] scalars; one that [`Scalar::validate`] refuses; two of the same name.
     pub fn set_scalars(&mut self, scalars: &[Scalar]) -> Result<()> {
-        if scalars.len() > MOST {
-            return Err(Error::argument(format!("{} scalars are more than {MOST}", scalars.len())));
-        }
+        ensure(scalars.len() <= MOST, format_args!("{} scalars are more than {MOST}", scalars.len()))?;
         for (at, scalar) in scalars.iter().enumerate() {
             scalar.validate().map_err(|error| Error::argument(format!("scalar {at}: {error}")))?;
             if scalars[..at].iter().any(|other| other.name == scalar.name) {

@@ -226,7 +226,7 @@ impl Active {
         &mut self,
         columns: &Columns,
         depth: &[i32],
-        runs: impl Iterator<Item = std::ops::Range<usize>> + Clone,
+        runs: impl Iterator<Item = Range<usize>> + Clone,
     ) {
         self.rouse_all();
         let mut end = 0;
@@ -259,7 +259,7 @@ impl Active {
     }
 
     /// Deactivates the strips of a range.
-    fn let_sleep(&mut self, columns: &Columns, strips: std::ops::Range<usize>) {
+    fn let_sleep(&mut self, columns: &Columns, strips: Range<usize>) {
         let mut strip = find(&self.active[..strips.end], strips.start, true);
         while strip < strips.end {
             (self.active[strip], self.wet[strip], self.moving[strip]) = (false, false, false);
@@ -325,12 +325,7 @@ impl Active {
     }
 
     /// Finds the wet strips, and deactivates those that are dry and beside dry ones; `dried` is called with the indices of each.
-    pub fn settle(
-        &mut self,
-        columns: &Columns,
-        depth: &[i32],
-        mut dried: impl FnMut(std::ops::Range<usize>),
-    ) {
+    pub fn settle(&mut self, columns: &Columns, depth: &[i32], mut dried: impl FnMut(Range<usize>)) {
         let rows = self.counts.len();
         // Sleeping strips stay as wet as they are, and so do those beside them.
         let Self { wet, active, asleep, counts, .. } = self;

@@ -8,7 +8,7 @@ pub const SLACK: i32 = 128;
 
 /// Which columns of a strip are full, given bases, ceilings and depths.
 #[inline]
-pub(in crate::shallow::solver) fn full_of([base, ceiling, depth]: [&[i32; STRIP]; 3]) -> [i32; STRIP] {
+pub(super) fn full_of([base, ceiling, depth]: [&[i32; STRIP]; 3]) -> [i32; STRIP] {
     let mut full = [0; STRIP];
     for x in 0..STRIP {
         let room = ceiling[x] - base[x];

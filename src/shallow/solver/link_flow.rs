@@ -32,20 +32,14 @@ impl LinkFlow {
     }
 
     /// Sets the count of scalars of liquid that falls freely.
-    pub(in crate::shallow::solver) fn carry(&mut self, scalars: usize) {
+    pub(super) fn carry(&mut self, scalars: usize) {
         for (at, fallen) in self.fallen.iter_mut().enumerate() {
             *fallen = vec![0.0; if at < scalars { self.flux.len() } else { 0 }];
         }
     }
 
     /// Replaces a range of links by others with these fluxes and remainders.
-    pub(in crate::shallow) fn replace(
-        &mut self,
-        part: Range<usize>,
-        flux: &[f32],
-        left: &[f32],
-        scalars: usize,
-    ) {
+    pub fn replace(&mut self, part: Range<usize>, flux: &[f32], left: &[f32], scalars: usize) {
         self.flux.splice(part.clone(), flux.iter().copied());
         self.left.splice(part.clone(), left.iter().copied());
         self.transfer.splice(part.clone(), repeat_n(0.0, flux.len()));
@@ -57,12 +51,7 @@ impl LinkFlow {
 
 /// The far end of a link that leaves the domain: its surface and its depth above the base of the link's column (units), and whether it is
 /// liquid at rest.
-pub(in crate::shallow::solver) fn beyond(
-    links: &Links,
-    columns: &Columns,
-    link: usize,
-    still: i32,
-) -> (i32, i32, bool) {
+pub(super) fn beyond(links: &Links, columns: &Columns, link: usize, still: i32) -> (i32, i32, bool) {
     let (eta, is_still) = links.outside(columns, link, still);
     (eta, if is_still { eta - columns.bases()[links.from[link] as usize] } else { 0 }, is_still)
 }

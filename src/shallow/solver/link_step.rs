@@ -22,115 +22,100 @@ pub struct Outside {
     pub gained: i64,
 }
 
+/// The links that a row owns.
+#[derive(Clone, Copy)]
+pub struct RowLinks<'a> {
+    /// All links.
+    pub links: &'a Links,
+    /// Those that liquid falls freely from.
+    pub overflow_edges: &'a OverflowEdges,
+    /// The row.
+    pub row: usize,
+}
+
+impl RowLinks<'_> {
+    /// The column that gives (or receives) a transfer through a link, if any.
+    fn end(&self, link: usize, transfer: f32, gives: bool) -> Option<u32> {
+        let column = if (transfer > 0.0) == gives { self.links.from[link] } else { self.links.to[link] };
+        let is_there = column != NONE && (gives || self.overflow_edges.at(link) == Fall::No);
+        (transfer != 0.0 && is_there).then_some(column)
+    }
+}
+
 impl LinkPart<'_> {
-    /// Computes the flux and the transfer of the links that a row owns; `first` is the part's first link, `depth` gives H of columns of
-    /// this row and the next one.
+    /// Computes the flux and the transfer of the links that a row owns; `depth` gives H of columns of this row and the next one.
     pub fn drive<K: Kind>(
         &mut self,
         step: &Step,
         columns: &Columns,
-        links: &Links,
-        overflow_edges: &OverflowEdges,
-        (row, first): (usize, usize),
+        RowLinks { links, overflow_edges, row }: RowLinks,
         depth: impl Fn(usize) -> i32,
     ) {
         let base = columns.bases();
         for link in links.row(row) {
             let (i, open) = (links.from[link] as usize, links.open[link]);
             let own = depth(i);
-            let at = link - first;
+            let at = link - self.first;
             let (eta, beyond, is_still) = match links.to[link] {
                 // Whatever lies below, as into the void.
                 _ if overflow_edges.at(link) == Fall::Ahead => (base[i] - edge(columns), 0, false),
                 j if overflow_edges.at(link) == Fall::Back => {
                     let (base, depth) = (base[j as usize], depth(j as usize));
-                    self.drive_back::<K>(step, at, base + depth - (base - edge(columns)), depth, open);
+                    let (fall, depth) = (base + depth - (base - edge(columns)), [depth as f32, 0.0]);
+                    self.set_flux(at, 0.0 - driven::<K>(step, fall, depth, -self.flux[at], open));
                     continue;
                 }
                 NONE => beyond(links, columns, link, step.still),
                 j => (base[j as usize] + depth(j as usize), depth(j as usize), false),
             };
             let fall = (base[i] + own).saturating_sub(eta);
-            let f = if is_still {
-                radiated(step, fall, [own as f32, beyond as f32])
-            } else {
-                let depth = [own as f32, beyond as f32];
-                let light =
-                    if K::VISCOUS && !K::WHOLE { fast_films::light(step, depth, self.flux[at]) } else { 1.0 };
-                step.rested::<K>(fall, depth, flux_of::<K>(step, fall, depth, self.flux[at], open, light))
-            };
-            self.flux[at] = f;
-            let [transfer, left] = split(f, self.left[at]);
-            (self.transfer[at], self.left[at]) = (transfer.clamp(-MOST, MOST), left);
+            let depth = [own as f32, beyond as f32];
+            self.set_flux(
+                at,
+                match is_still {
+                    true => radiated(step, fall, depth),
+                    false => driven::<K>(step, fall, depth, self.flux[at], open),
+                },
+            );
         }
     }
 
-    /// Computes the flux and the transfer of a link that liquid falls freely from at its second column, given its surface drop and depth
-    /// (units).
-    fn drive_back<K: Kind>(&mut self, step: &Step, at: usize, fall: i32, depth: i32, open: f32) {
-        let (flux, depth) = (-self.flux[at], [depth as f32, 0.0]);
-        let light = if K::VISCOUS && !K::WHOLE { fast_films::light(step, depth, flux) } else { 1.0 };
-        let flux = flux_of::<K>(step, fall, depth, flux, open, light);
-        self.flux[at] = 0.0 - step.rested::<K>(fall, depth, flux);
-        let [transfer, left] = split(self.flux[at], self.left[at]);
+    /// Sets the flux of a link of the part, and its transfer.
+    fn set_flux(&mut self, at: usize, flux: f32) {
+        self.flux[at] = flux;
+        let [transfer, left] = split(flux, self.left[at]);
         (self.transfer[at], self.left[at]) = (transfer.clamp(-MOST, MOST), left);
     }
 
     /// Calls `add` with each column that gives (or receives) through a link of a row, and how much (units, rounded up to integers, so that
     /// sums do not depend on their order).
-    pub fn each(
-        &self,
-        links: &Links,
-        overflow_edges: &OverflowEdges,
-        (row, first): (usize, usize),
-        within: &Range<u32>,
-        gives: bool,
-        mut add: impl FnMut(u32, i64),
-    ) {
-        for link in links.row(row) {
-            let transfer = self.transfer[link - first];
-            let column = if (transfer > 0.0) == gives { links.from[link] } else { links.to[link] };
-            let is_there = column != NONE && (gives || overflow_edges.at(link) == Fall::No);
-            if transfer != 0.0 && is_there && within.contains(&column) {
+    pub fn each(&self, of: RowLinks, within: &Range<u32>, gives: bool, mut add: impl FnMut(u32, i64)) {
+        for link in of.links.row(of.row) {
+            let transfer = self.transfer[link - self.first];
+            if let Some(column) = of.end(link, transfer, gives).filter(|column| within.contains(column)) {
                 add(column, transfer.abs().ceil() as i64);
             }
         }
     }
 
     /// Multiplies the transfers and fluxes of the links that a row owns by a factor of the donor or of the receiver.
-    pub fn scale(
-        &mut self,
-        links: &Links,
-        overflow_edges: &OverflowEdges,
-        (row, first): (usize, usize),
-        giver: bool,
-        factor: impl Fn(u32) -> f32,
-    ) {
-        for link in links.row(row) {
-            let transfer = self.transfer[link - first];
-            let column = if (transfer > 0.0) == giver { links.from[link] } else { links.to[link] };
-            if transfer != 0.0 && column != NONE && (giver || overflow_edges.at(link) == Fall::No) {
-                let k = factor(column);
-                self.transfer[link - first] *= k;
-                self.flux[link - first] *= k;
+    pub fn scale(&mut self, of: RowLinks, gives: bool, factor: impl Fn(u32) -> f32) {
+        for link in of.links.row(of.row) {
+            let at = link - self.first;
+            if let Some(k) = of.end(link, self.transfer[at], gives).map(&factor) {
+                self.transfer[at] *= k;
+                self.flux[at] *= k;
             }
         }
     }
 
     /// Applies the transfers of a row's links in whole units; `change` is called with each column and its gain. Liquid that falls freely
     /// only leaves its column.
-    pub fn move_units(
-        &mut self,
-        links: &Links,
-        overflow_edges: &OverflowEdges,
-        (row, first): (usize, usize),
-        outside: &mut Outside,
-        mut change: impl FnMut(usize, i32),
-    ) {
+    pub fn move_units(&self, of: RowLinks, outside: &mut Outside, mut change: impl FnMut(usize, i32)) {
+        let RowLinks { links, overflow_edges, row } = of;
         for link in links.row(row) {
-            let transfer = self.transfer[link - first];
             // K limits it to 32 bits.
-            let units = transfer as i32;
+            let units = self.transfer[link - self.first] as i32;
             if units == 0 {
                 continue;
             }
@@ -153,6 +138,12 @@ impl LinkPart<'_> {
             }
         }
     }
+}
+
+/// The flux that the next step drives through a link (units a step), given the surface drop and both depths (units).
+fn driven<K: Kind>(step: &Step, fall: i32, depth: [f32; 2], flux: f32, open: f32) -> f32 {
+    let light = if K::VISCOUS && !K::WHOLE { fast_films::light(step, depth, flux) } else { 1.0 };
+    step.rested::<K>(fall, depth, flux_of::<K>(step, fall, depth, flux, open, light))
 }
 
 /// The flux of a wave that leaves over the border (units a step): a surface that is `fall` above the one at rest flows out at the speed of

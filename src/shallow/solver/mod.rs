@@ -15,9 +15,9 @@ pub mod link_step;
 pub(super) mod overflow_edges;
 mod pressurised;
 pub mod rest;
-pub(in crate::shallow) mod rows;
+pub(super) mod rows;
 pub mod stop;
-pub(in crate::shallow) mod thickening;
+pub(super) mod thickening;
 mod transfers;
 pub mod viscous_flux;
 
@@ -56,11 +56,12 @@ pub struct Flow {
     pub(super) links: LinkFlow,
     pub(super) overflow_edges: OverflowEdges,
     active: Active,
-    bands: Bands,
+    /// Including upper bounds of the depths of rows.
+    pub(super) bands: Bands,
     pub(super) network: Network,
     /// The step length (s) that fluxes refer to.
     pub(super) last: f64,
-    fast: Fast,
+    pub(super) fast: Fast,
     /// Lateral friction of pipes.
     pub(super) walls: Walls,
     /// Amounts of scalars.
@@ -77,7 +78,7 @@ pub(super) struct Stored<'a> {
     pub depth: &'a mut [i32],
     /// As [`Flow::numbers`].
     pub numbers: [&'a mut [f32]; 4],
-    /// As [`Flow::heads`].
+    /// Heads above the surface (units) of full columns, by column index.
     pub heads: &'a mut [f32],
     /// The bands of rows, with an upper bound of the depth in each row.
     pub bands: &'a mut Bands,
@@ -91,7 +92,7 @@ pub(super) struct Stored<'a> {
 
 impl Stored<'_> {
     /// Clears the active strips of a range; inactive ones are already empty.
-    pub fn clear(&mut self, strips: std::ops::Range<usize>) {
+    pub fn clear(&mut self, strips: Range<usize>) {
         let first = strips.start;
         for run in runs(&self.active[strips]) {
             let run = (first + run.start) * STRIP..(first + run.end) * STRIP;
@@ -159,16 +160,6 @@ impl Flow {
         [east, south, left_east, left_south]
     }
 
-    /// Heads above the surface (units) of full columns, by column index.
-    pub(super) fn heads(&self) -> &[f32] {
-        self.network.over()
-    }
-
-    /// Including upper bounds of the depths of rows.
-    pub(super) fn bands(&self) -> &Bands {
-        &self.bands
-    }
-
     /// All parts that a restored state replaces; [`Flow::wake`] must follow.
     pub(super) fn stored(&mut self) -> Stored<'_> {
         let ([east, south], [left_east, left_south]) = (&mut self.flux, &mut self.left);
@@ -186,11 +177,7 @@ impl Flow {
 
     /// Makes the strips of `runs` (in ascending order) active, and besides them only strips beside liquid. Call it after changing what
     /// [`Stored`] refers to.
-    pub(super) fn wake(
-        &mut self,
-        columns: &Columns,
-        runs: impl Iterator<Item = std::ops::Range<usize>> + Clone,
-    ) {
+    pub(super) fn wake(&mut self, columns: &Columns, runs: impl Iterator<Item = Range<usize>> + Clone) {
         self.active.reset(columns, &self.depth, runs);
     }
 
@@ -313,16 +300,6 @@ impl Flow {
     pub fn lighten(&mut self, drive: f64, step: &Step) {
         let Self { fast, active, depth, flux: [east, south], .. } = self;
         fast.lighten(&Films { active, depth, flux: [east, south], drive: drive as f32 }, step);
-    }
-
-    /// Marks no film as fast.
-    pub fn calm(&mut self) {
-        self.fast.clear();
-    }
-
-    /// Upper bound of the depth (units).
-    pub fn deepest(&self) -> i32 {
-        self.bands.deepest()
     }
 
     /// Finds the overflow edges of the next step: the links that liquid falls freely from.
@@ -449,6 +426,9 @@ impl Flow {
     fn flood(&mut self, columns: &Columns, pipes: &Pipes, step: &Step, stop: &Stop) {
         let ([east, south], [left_east, left_south]) = (&self.flux, &self.left);
         let state = State {
+            step,
+            columns,
+            pipes,
             depth: &self.depth,
             flux: [east, south],
             left: [left_east, left_south],
@@ -456,6 +436,6 @@ impl Flow {
             overflow_edges: &self.overflow_edges,
             walls: &self.walls,
         };
-        self.network.find(step, columns, pipes, self.bands.filling(), &state, stop);
+        self.network.find(self.bands.filling(), &state, stop);
     }
 }

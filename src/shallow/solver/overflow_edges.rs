@@ -81,11 +81,7 @@ impl OverflowEdges {
     }
 
     /// The liquid that went over the overflow edges in a step, in their order.
-    pub(in crate::shallow) fn over<'a>(
-        &'a self,
-        links: &'a Links,
-        flow: &'a LinkFlow,
-    ) -> impl Iterator<Item = Over> + 'a {
+    pub fn over<'a>(&'a self, links: &'a Links, flow: &'a LinkFlow) -> impl Iterator<Item = Over> + 'a {
         let overflow_edges = (0..self.falls.len()).filter(|&link| self.falls[link] != Fall::No);
         overflow_edges.filter_map(move |link| {
             let units = i64::from(flow.transfer[link].abs() as i32) + self.flooded[link];

@@ -5,6 +5,8 @@
 //! its pipes do, including those that its neighbours own. It sleeps when its neighbours rest, too (`active.rs`). A step would leave it as
 //! it is, to the bit: so results do not depend on which strips sleep, and strips of 16 cells along x are as good as any others.
 
+use std::ops::Range;
+
 use super::full::full_of;
 use super::link_flow::{LinkFlow, beyond};
 use crate::shallow::columns::{Columns, NONE, STRIP, strip_of};
@@ -83,7 +85,7 @@ impl Still<'_> {
     }
 
     /// The ends of those links of a range that do not rest.
-    pub fn moving_links(&self, links: std::ops::Range<usize>) -> impl Iterator<Item = [u32; 2]> {
+    pub fn moving_links(&self, links: Range<usize>) -> impl Iterator<Item = [u32; 2]> {
         let Links { from, to, .. } = &self.pipes.links;
         links.filter(|&link| !self.link_rests(link)).map(|link| [from[link], to[link]])
     }

@@ -11,6 +11,7 @@ use super::scalars::amounts::Account;
 use super::scalars::shares::{Levels, MOST};
 use super::solver::Flow;
 use crate::error::{Error, Result};
+use crate::numeric::checks::{check_within, ensure};
 
 /// A source, a drain or an absorber.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,11 +91,8 @@ impl FlowPoint {
             return Err(Error::argument(format!("at = ({x}, {y}, {z}) is not finite")));
         }
         let positive = |name: &str, value: f64| {
-            if value >= 0.0 && value.is_finite() {
-                Ok(())
-            } else {
-                Err(Error::argument(format!("{name} = {value} is not 0 or more")))
-            }
+            let holds = value >= 0.0 && value.is_finite();
+            ensure(holds, format_args!("{name} = {value} is not 0 or more"))
         };
         positive("radius", self.radius)?;
         positive("rate", self.rate)?;
@@ -105,10 +103,7 @@ impl FlowPoint {
         }
         let Some(pulse) = self.pulse else { return Ok(()) };
         positive("pulse.frequency", pulse.frequency)?;
-        if !(0.0..=1.0).contains(&pulse.share) {
-            return Err(Error::argument(format!("pulse.share = {} is not within 0 to 1", pulse.share)));
-        }
-        Ok(())
+        check_within("pulse.share", pulse.share, "", 0.0..=1.0)
     }
 
     fn rate_at(&self, time: f64) -> f64 {
@@ -117,8 +112,24 @@ impl FlowPoint {
         (self.rate * (1.0 + self.pulse.map_or(0.0, swing))).max(0.0)
     }
 
+    /// The columns that it acts on.
+    ///
+    /// # Errors
+    /// `Argument`: as [`Flows::set`].
+    pub(super) fn columns(&self, columns: &Columns) -> Result<Vec<u32>> {
+        self.validate()?;
+        let mut found = Vec::new();
+        self.find_columns(columns, &mut found);
+        if found.is_empty() { Err(self.nowhere()) } else { Ok(found) }
+    }
+
+    fn nowhere(&self) -> Error {
+        let [x, y, z] = self.at;
+        Error::argument(format!("at ({x}, {y}, {z}) there is only solid, or it lies outside of the domain"))
+    }
+
     /// Lists the columns in its circle: in each cell the one that contains the centre, or is nearest to it.
-    pub(super) fn find_columns(&self, columns: &Columns, found: &mut Vec<u32>) {
+    fn find_columns(&self, columns: &Columns, found: &mut Vec<u32>) {
         let grid = &columns.grid;
         let [x, y, z] = self.at;
         let near = self.radius.max(2.0 * grid.cell);
@@ -158,11 +169,7 @@ impl Flows {
     ) -> Result<()> {
         let placed = placed(columns, points, &which)?;
         if let Some(at) = placed.iter().position(|placed| placed.columns.is_empty()) {
-            let [x, y, z] = points[at].at;
-            return Err(Error::argument(format!(
-                "{}: at ({x}, {y}, {z}) there is only solid, or it lies outside of the domain",
-                which(at)
-            )));
+            return Err(Error::argument(format!("{}: {}", which(at), points[at].nowhere())));
         }
         self.placed = placed;
         Ok(())
@@ -211,10 +218,7 @@ impl Flows {
     /// # Errors
     /// `Argument`: there is no such point, or the rate is negative or not finite.
     pub fn set_rate(&mut self, point: usize, rate: f64) -> Result<()> {
-        let count = self.placed.len();
-        let Some(placed) = self.placed.get_mut(point) else {
-            return Err(Error::argument(format!("there is no flow point {point} among {count}")));
-        };
+        let placed = self.placed_mut(point)?;
         let changed = FlowPoint { rate, ..placed.point.clone() };
         changed.validate()?;
         placed.point = changed;
@@ -226,12 +230,14 @@ impl Flows {
     /// # Errors
     /// `Argument`: there is no such point.
     pub(super) fn set_levels(&mut self, point: usize, levels: Levels) -> Result<()> {
-        let count = self.placed.len();
-        let Some(placed) = self.placed.get_mut(point) else {
-            return Err(Error::argument(format!("there is no flow point {point} among {count}")));
-        };
-        placed.levels = levels;
+        self.placed_mut(point)?.levels = levels;
         Ok(())
+    }
+
+    fn placed_mut(&mut self, point: usize) -> Result<&mut Placed> {
+        let count = self.placed.len();
+        let none = || Error::argument(format!("there is no flow point {point} among {count}"));
+        self.placed.get_mut(point).ok_or_else(none)
     }
 
     /// What enters through sources carries nothing from now on.

@@ -1,7 +1,7 @@
 //! Liquid that a host pours or takes at once, and the volumes that its flow points have moved.
 
 use super::{FlowPoint, Kind};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::shallow::system::Shallow;
 
 impl Shallow {
@@ -12,15 +12,7 @@ impl Shallow {
     /// `Argument`: as [`Shallow::set_flows`] for a source there.
     pub fn pour_at(&mut self, at: [f64; 3], radius: f64, volume: f64) -> Result<f64> {
         let point = FlowPoint { kind: Kind::Source, at, radius, rate: 0.0, pulse: None };
-        point.validate()?;
-        let mut found = Vec::new();
-        point.find_columns(&self.columns, &mut found);
-        if found.is_empty() {
-            let [x, y, z] = at;
-            return Err(Error::argument(format!(
-                "at ({x}, {y}, {z}) there is only solid, or it lies outside of the domain"
-            )));
-        }
+        let found = point.columns(&self.columns)?;
         let cell = self.columns.grid.cell;
         let share = volume / (found.len() as f64 * cell * cell);
         Ok(found.iter().map(|&column| self.pour(column as usize, share)).sum::<f64>() * (cell * cell))

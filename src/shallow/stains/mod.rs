@@ -15,7 +15,7 @@ use super::scalars::amounts::Account;
 use super::system::Shallow;
 use crate::error::{Error, Result};
 use crate::geometry::Vec3;
-use crate::numeric::lists::check_room;
+use crate::numeric::checks::{check_not_negative, check_room};
 use wet::Wet;
 
 /// Invisible stains are set to 0, before they are so small that processors give different results.
@@ -58,20 +58,13 @@ impl Staining {
     /// # Errors
     /// `Argument`, naming the field and its range.
     pub fn validate(&self) -> Result<()> {
-        let positive = |name: &str, value: f64| {
-            if value >= 0.0 && value.is_finite() {
-                Ok(())
-            } else {
-                Err(Error::argument(format!("{name} = {value} is not finite and 0 or more")))
-            }
-        };
-        positive("film", self.film)?;
-        positive("takes", self.takes)?;
+        check_not_negative("film", self.film)?;
+        check_not_negative("takes", self.takes)?;
         if self.half_life.is_nan() || self.half_life < 1e-3 {
             return Err(Error::argument(format!("half_life = {} s is not 0.001 or more", self.half_life)));
         }
         let Some(Absorbing { capacity, rate }) = self.absorbs else { return Ok(()) };
-        positive("absorbs.rate", rate)?;
+        check_not_negative("absorbs.rate", rate)?;
         if !(capacity > 0.0 && capacity <= 1e3) {
             return Err(Error::argument(format!("absorbs.capacity = {capacity} m is not within 0 to 1000")));
         }

@@ -49,26 +49,17 @@ impl Stains {
     /// `Bytes`, and nothing changes: not stains, truncated or damaged; another terrain: other triangles, another count of vertices, or a
     /// liquid with other cells; ground that absorbs where this does not, or vice versa.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<()> {
-        if !bytes.starts_with(&MAGIC) {
-            return Err(refused("are not of this format"));
-        }
+        require(bytes.starts_with(&MAGIC), "are not of this format")?;
         let (body, seal) = bytes.split_at(bytes.len().saturating_sub(SEAL));
-        if xxh3_128(body).to_le_bytes() != *seal {
-            return Err(refused("are cut short or damaged"));
-        }
+        require(xxh3_128(body).to_le_bytes() == *seal, "are cut short or damaged")?;
         let mut from = Reader::new(&body[MAGIC.len()..]);
         let (mesh, unit): ([u8; 16], _) = (from.take()?, f64::from_le_bytes(from.take()?));
         let time = f64::from_le_bytes(from.take()?);
         let [count, holding] = [u64::from_le_bytes(from.take()?), u64::from_le_bytes(from.take()?)];
-        if (mesh, unit.to_bits(), count) != (self.mesh, self.unit.to_bits(), self.len() as u64) {
-            return Err(refused("are of another terrain"));
-        }
-        if holding != self.held.len() as u64 {
-            return Err(refused("are of ground that absorbs in another way"));
-        }
-        if from.rest().len() as u64 != 12 * count + 8 * holding {
-            return Err(refused("are cut short or damaged"));
-        }
+        let own = (self.mesh, self.unit.to_bits(), self.len() as u64);
+        require((mesh, unit.to_bits(), count) == own, "are of another terrain")?;
+        require(holding == self.held.len() as u64, "are of ground that absorbs in another way")?;
+        require(from.rest().len() as u64 == 12 * count + 8 * holding, "are cut short or damaged")?;
         let stain = from.bytes(4 * self.len())?.as_chunks().0.iter().map(|stain| f32::from_le_bytes(*stain));
         let since = from.bytes(8 * self.len())?.as_chunks().0.iter().map(|since| f64::from_le_bytes(*since));
         let held = from.rest().as_chunks().0.iter().map(|held| i64::from_le_bytes(*held));
@@ -76,9 +67,7 @@ impl Stains {
             && stain.clone().all(|stain| (0.0..=1.0).contains(&stain))
             && since.clone().all(|since| since <= time)
             && held.clone().zip(&self.capacity).all(|(held, capacity)| (0..=*capacity).contains(&held));
-        if !is_good {
-            return Err(refused("are cut short or damaged"));
-        }
+        require(is_good, "are cut short or damaged")?;
         self.stain.iter_mut().zip(stain).for_each(|(to, stain)| *to = stain);
         self.since.iter_mut().zip(since).for_each(|(to, since)| *to = since);
         self.held.iter_mut().zip(held).for_each(|(to, held)| *to = held);
@@ -87,6 +76,7 @@ impl Stains {
     }
 }
 
-fn refused(what: &str) -> Error {
-    Error::Bytes(format!("saved stains {what}"))
+/// Checks that something holds of saved stains; `wrong` says what is wrong otherwise.
+fn require(holds: bool, wrong: &str) -> Result<()> {
+    if holds { Ok(()) } else { Err(Error::Bytes(format!("saved stains {wrong}"))) }
 }

@@ -3,6 +3,7 @@
 use super::counts::Counts;
 use super::rim::ledges::Ledges;
 use crate::error::{Error, Result};
+use crate::numeric::checks::{check_not_negative, ensure};
 use crate::shallow::scalars::MOST;
 
 /// The liquid in columns.
@@ -72,20 +73,13 @@ impl Default for Layout {
 impl Layout {
     pub(in crate::shallow) fn validate(&self) -> Result<()> {
         let positive = |name: &str, value: f64| {
-            if value > 0.0 && value.is_finite() {
-                Ok(())
-            } else {
-                Err(Error::argument(format!("{name} = {value} is not positive and finite")))
-            }
+            let holds = value > 0.0 && value.is_finite();
+            ensure(holds, format_args!("{name} = {value} is not positive and finite"))
         };
         positive("scale", self.scale)?;
         positive("opaque_depth", self.opaque_depth)?;
-        for (name, value) in [("least_depth", self.least_depth), ("fade_depth", self.fade_depth)] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(Error::argument(format!("{name} = {value} is not finite and 0 or more")));
-            }
-        }
-        Ok(())
+        check_not_negative("least_depth", self.least_depth)?;
+        check_not_negative("fade_depth", self.fade_depth)
     }
 }
 
@@ -177,10 +171,9 @@ pub(in crate::shallow) fn check_buffers<'a>(
         }
     }
     let count = counts.vertices;
-    if matches!(indices, Indices::U16(_)) && count > 1 << 16 {
-        return Err(Error::argument(format!(
-            "{count} vertices are too many for indices of 16 bits: take those of 32"
-        )));
-    }
+    ensure(
+        count <= 1 << 16 || !matches!(indices, Indices::U16(_)),
+        format_args!("{count} vertices are too many for indices of 16 bits: take those of 32"),
+    )?;
     Ok(())
 }

@@ -23,17 +23,17 @@
 //! Where a group of four lacks one link, between two cells side by side, its two triangles overlap ([`Check::doubled`]): the liquid of
 //! these columns is on different layers there.
 
-pub(in crate::shallow) mod buffers;
+pub(super) mod buffers;
 pub mod counts;
 pub mod heights;
 pub mod layout;
-pub(in crate::shallow) mod quartets;
+pub(super) mod quartets;
 pub mod rim;
 mod self_check;
 
 use super::columns::{Columns, NONE, STRIP};
 use crate::error::{Error, Result};
-use crate::numeric::lists::check_each;
+use crate::numeric::checks::check_each;
 pub use buffers::capacity::bound;
 use buffers::normals::Normals;
 use buffers::vertices::Vertices;

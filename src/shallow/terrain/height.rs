@@ -2,6 +2,7 @@
 
 use super::Solids;
 use crate::error::{Error, Result};
+use crate::numeric::checks::ensure;
 use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 
 /// One solid per cell, from heights (m) at the centres of the cells, row by row along x (`Grid::index`). Heights are clamped to the range.
@@ -60,11 +61,10 @@ impl Image<'_> {
     /// length, a corner or level that is not finite.
     pub fn validate(&self) -> Result<()> {
         let ([width, height], count) = (self.size, self.greys.len());
-        if width == 0 || height == 0 || width.checked_mul(height) != Some(count) {
-            return Err(Error::argument(format!(
-                "{count} values are not an image of {width} x {height} pixels"
-            )));
-        }
+        ensure(
+            width > 0 && height > 0 && width.checked_mul(height) == Some(count),
+            format_args!("{count} values are not an image of {width} x {height} pixels"),
+        )?;
         if let Some(index) = self.greys.iter().position(|grey| !grey.is_finite()) {
             let (x, z) = (index % width, index / width);
             return Err(Error::argument(format!("pixel ({x}, {z}) of the image is not finite")));

@@ -6,7 +6,7 @@ mod crossings;
 pub mod facing;
 pub mod ground;
 pub mod height;
-pub(in crate::shallow) mod identity;
+pub(super) mod identity;
 mod lines;
 mod piles;
 pub mod sampler;

@@ -20,6 +20,7 @@ use super::piles::{Piles, keep_room};
 use super::solids::Solid;
 use crate::error::{Error, Result};
 use crate::geometry::Vec3;
+use crate::numeric::checks::ensure;
 use crate::numeric::cpu::{FlushDenormals, dispatch};
 use crate::numeric::lists::refill;
 use crate::shallow::columns::grid::{Grid, Heights, check_cells};
@@ -114,9 +115,7 @@ impl Caster {
     ) -> Result<()> {
         let _flushed = FlushDenormals::begin();
         self.begin(&cells)?;
-        if triangles.is_empty() {
-            return Err(Error::argument("the terrain has no triangles"));
-        }
+        ensure(!triangles.is_empty(), "the terrain has no triangles")?;
         self.rank(positions, &cells)?;
         self.cross(positions, triangles, &cells)?;
         self.piles.stack(&mut self.starts, &mut self.solids);

@@ -11,8 +11,7 @@ use crate::shallow::frame::{check_length, too_many_steps};
 use crate::shallow::solver::rows::bands::attended;
 use crate::shallow::solver::stop::Stop;
 use crate::shallow::system::Report;
-use crate::shallow::time_step;
-use crate::shallow::time_step::MOST_STEPS;
+use crate::shallow::time_step::{self, MOST_STEPS};
 
 impl Detail {
     /// One frame of `dt` (s).
@@ -83,7 +82,8 @@ impl Detail {
             report.steps = steps + 1;
             report.seconds = if length >= left { dt } else { report.seconds + length };
         }
-        report.deepest = measures[0].unit * f64::from(fine.flow.deepest().max(coarse.flow.deepest()));
+        report.deepest =
+            measures[0].unit * f64::from(fine.flow.bands.deepest().max(coarse.flow.bands.deepest()));
         Ok(report)
     }
 }

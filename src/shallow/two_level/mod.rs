@@ -11,7 +11,7 @@ mod buffers;
 mod frame;
 mod ground;
 mod momentum;
-pub(in crate::shallow) mod rests;
+pub(super) mod rests;
 mod scalars;
 mod seam;
 mod shift;
@@ -30,6 +30,7 @@ use super::terrain::Solids;
 use super::terrain::shapes::Shape;
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::numeric::checks::ensure;
 use buffers::{Momentum, Shift};
 use ground::Ground;
 use rests::Rests;
@@ -72,13 +73,9 @@ impl Detail {
             return Err(Error::argument(format!("{nx} x {nz} cells are not an even count along both axes")));
         }
         check_near(&near, solids.grid.size)?;
-        if params.falls.is_some() {
-            return Err(Error::argument("liquid with a level of detail does not fall freely"));
-        }
+        ensure(params.falls.is_none(), "liquid with a level of detail does not fall freely")?;
         check_carried(&params)?;
-        if solids.layers() == 0 {
-            return Err(Error::argument("the terrain has no surface that faces up within the domain"));
-        }
+        ensure(solids.layers() > 0, "the terrain has no surface that faces up within the domain")?;
         let ground = Ground::new(solids);
         let [beyond, within] = Ground::apart(&near).map(Some);
         let [fine, coarse] = ground.apart_solids(&near);
@@ -144,9 +141,7 @@ impl Detail {
         if (solids.grid, solids.heights) != (self.fine.columns.grid, self.fine.columns.heights) {
             return Err(Error::argument("the terrain's cells or heights are not those of the liquid"));
         }
-        if solids.layers() == 0 {
-            return Err(Error::argument("the terrain has no surface that faces up within the domain"));
-        }
+        ensure(solids.layers() > 0, "the terrain has no surface that faces up within the domain")?;
         self.ground = Ground::new(solids);
         let Self { ground, near, fine, coarse, .. } = &mut *self;
         // One of the two liquids may have no ground.
@@ -205,16 +200,8 @@ impl Detail {
     pub fn set_flows(&mut self, points: &[FlowPoint], which: impl Fn(usize) -> String) -> Result<()> {
         for (at, point) in points.iter().enumerate() {
             let owner = if self.is_near(point) { &self.fine } else { &self.coarse };
-            let mut found = Vec::new();
-            point.validate().map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
-            point.find_columns(&owner.columns, &mut found);
-            if found.is_empty() {
-                let [x, y, z] = point.at;
-                return Err(Error::argument(format!(
-                    "{}: at ({x}, {y}, {z}) there is only solid, or it lies outside of the domain",
-                    which(at)
-                )));
-            }
+            let found = point.columns(&owner.columns);
+            found.map_err(|error| Error::argument(format!("{}: {error}", which(at))))?;
         }
         self.fine.set_flows_resting(points, &which)?;
         self.coarse.set_flows_resting(points, &which)?;
@@ -322,10 +309,7 @@ impl Detail {
 }
 
 fn check_carried(params: &Params) -> Result<()> {
-    match params.thickening {
-        Some(_) => Err(Error::argument("liquid with a level of detail has no scalar that thickens it")),
-        None => Ok(()),
-    }
+    ensure(params.thickening.is_none(), "liquid with a level of detail has no scalar that thickens it")
 }
 
 /// The smallest box of near cells with everything between two corners (m), as far as there are cells: minimum x and z, then maximum.
@@ -335,9 +319,7 @@ fn check_carried(params: &Params) -> Result<()> {
 pub fn cells_around(grid: &Grid, bounds: [f64; 4]) -> Result<Cells> {
     let [x0, z0, x1, z1] = bounds;
     // Also where one is NaN.
-    if !(x0 < x1 && z0 < z1) {
-        return Err(Error::argument(format!("bounds = {bounds:?} m have no inside")));
-    }
+    ensure(x0 < x1 && z0 < z1, format_args!("bounds = {bounds:?} m have no inside"))?;
     let range = |axis: usize, low: f64, high: f64| {
         let [low, high] = [low, high].map(|at| 0.5 * (at - grid.origin[axis]) / grid.cell);
         let count = (grid.size[axis] / 2) as f64;
@@ -354,11 +336,10 @@ pub fn cells_around(grid: &Grid, bounds: [f64; 4]) -> Result<Cells> {
 
 pub(super) fn check_near(near: &Cells, [nx, nz]: [usize; 2]) -> Result<()> {
     let [x, z] = near;
-    if x.start >= x.end || z.start >= z.end || x.end > nx || z.end > nz {
-        return Err(Error::argument(format!(
-            "near cells {x:?} x {z:?} are not a box within {nx} x {nz} cells"
-        )));
-    }
+    ensure(
+        x.start < x.end && z.start < z.end && x.end <= nx && z.end <= nz,
+        format_args!("near cells {x:?} x {z:?} are not a box within {nx} x {nz} cells"),
+    )?;
     if [x.start, x.end, z.start, z.end].iter().any(|side| side % 2 > 0) {
         return Err(Error::argument(format!("near cells {x:?} x {z:?} do not begin and end at even ones")));
     }

@@ -13,6 +13,7 @@ use crate::error::Result;
 use crate::shallow::Shallow;
 use crate::shallow::columns::grid::Cells;
 use crate::shallow::remap::Parcel;
+use crate::shallow::terrain::solids::Solid;
 
 impl Detail {
     /// Hands the cells that were near, or are now, to the other liquid.
@@ -219,11 +220,7 @@ fn give(liquid: &mut Shallow, cell: [usize; 2], column: Option<usize>, load: &Lo
 }
 
 /// Changes the ground of a box of cells.
-fn lay<'a>(
-    liquid: &mut Shallow,
-    cells: &Cells,
-    solids: impl Fn([usize; 2]) -> &'a [crate::shallow::terrain::solids::Solid],
-) -> Result<()> {
+fn lay<'a>(liquid: &mut Shallow, cells: &Cells, solids: impl Fn([usize; 2]) -> &'a [Solid]) -> Result<()> {
     let [x, z] = cells.clone();
     let width = x.len();
     liquid.update_cells(cells.clone(), |rank| solids([x.start + rank % width, z.start + rank / width]))?;

@@ -8,8 +8,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::voxel_fill;
-use super::voxel_fill::filled;
+use super::voxel_fill::{self, filled};
 use crate::error::Result;
 use crate::numeric::blocks::{BlockEdit, Mask, Origin, Values};
 use crate::vdb::{FloatGrid, Probe};

@@ -8,8 +8,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use rayon::prelude::*;
 
 use super::columns::{CELLS, add_by_cell};
-use super::removal;
-use super::removal::{Edit, Scale};
+use super::removal::{self, Edit, Scale};
 use super::voxel_fill;
 use crate::context::Context;
 use crate::error::Result;

@@ -60,13 +60,11 @@ impl Grids {
     ///
     /// # Errors
     /// Names the grid that is missing or has no volume.
-    pub fn from_named(grids: Vec<FloatGrid>) -> Result<Self> {
-        let mut grids: Vec<Option<FloatGrid>> = grids.into_iter().map(Some).collect();
+    pub fn from_named(mut grids: Vec<FloatGrid>) -> Result<Self> {
         let mut take = |name: &str| {
-            let found = grids.iter_mut().find(|grid| grid.as_ref().is_some_and(|grid| grid.name() == name));
-            found
-                .and_then(Option::take)
-                .ok_or_else(|| Error::argument(format!("there is no grid \"{name}\"")))
+            let found = grids.iter().position(|grid| grid.name() == name);
+            let none = || Error::argument(format!("there is no grid \"{name}\""));
+            found.map(|at| grids.remove(at)).ok_or_else(none)
         };
         let all =
             Self { surface: take("surface")?, compression: take("compression")?, touched: take("touched")? };
@@ -77,6 +75,10 @@ impl Grids {
     /// The grids, in the order of a file.
     pub fn list(&self) -> [&FloatGrid; 3] {
         [&self.surface, &self.compression, &self.touched]
+    }
+
+    fn list_mut(&mut self) -> [&mut FloatGrid; 3] {
+        [&mut self.surface, &mut self.compression, &mut self.touched]
     }
 
     /// The snow's volume (m3).
@@ -97,12 +99,9 @@ impl Grids {
     /// When memory runs out.
     pub fn apply(&mut self, ctx: &Context, changes: &Changes) -> Result<()> {
         // All memory is allocated before any change is applied.
-        let surface = Ready::new(ctx, &changes.surface)?;
-        let compression = Ready::new(ctx, &changes.compression)?;
-        let touched = Ready::new(ctx, &changes.touched)?;
-        self.surface.put(surface)?;
-        self.compression.put(compression)?;
-        self.touched.put(touched)?;
+        let edits = changes.edits().into_iter();
+        let ready = edits.map(|edits| Ready::new(ctx, edits)).collect::<Result<Vec<_>>>()?;
+        self.list_mut().into_iter().zip(ready).try_for_each(|(grid, ready)| grid.put(ready))?;
         self.surface.set_metadata(VOLUME, MetaValue::Double(changes.volume))
     }
 
@@ -112,11 +111,7 @@ impl Grids {
     /// When memory runs out.
     pub fn delta(ctx: &Context, cell: f64, half_width: f32, changes: &Changes) -> Result<Self> {
         let mut delta = Self::new(FloatGrid::level_set(cell, half_width)?, changes.volume)?;
-        for (grid, edits) in [
-            (&mut delta.surface, &changes.surface),
-            (&mut delta.compression, &changes.compression),
-            (&mut delta.touched, &changes.touched),
-        ] {
+        for (grid, edits) in delta.list_mut().into_iter().zip(changes.edits()) {
             // A constant block becomes a leaf without active voxels: a tile could not be told from an absent block.
             let (constant, dense): (Vec<&BlockEdit>, Vec<&BlockEdit>) =
                 edits.iter().partition(|edit| matches!(edit, BlockEdit::Constant(..)));
@@ -142,11 +137,7 @@ impl Grids {
         if delta.surface.voxel_size() != self.surface.voxel_size() {
             return Err(Error::argument("the changes have cells of another size"));
         }
-        for (grid, changed) in [
-            (&mut self.surface, &delta.surface),
-            (&mut self.compression, &delta.compression),
-            (&mut self.touched, &delta.touched),
-        ] {
+        for (grid, changed) in self.list_mut().into_iter().zip(delta.list()) {
             let edits: Vec<BlockEdit> = changed.leaves()?.iter().map(block_of).collect();
             grid.replace_blocks(ctx, &edits)?;
         }
@@ -155,6 +146,11 @@ impl Grids {
 }
 
 impl Changes {
+    /// The blocks of each grid, in the order of [`Grids::list`].
+    fn edits(&self) -> [&[BlockEdit]; 3] {
+        [&self.surface, &self.compression, &self.touched]
+    }
+
     /// No changes.
     pub(super) fn none(grids: &Grids, half_width: f32) -> Result<Self> {
         let removed = empty_removed(grids.surface.voxel_size(), half_width)?;

@@ -10,6 +10,7 @@ use crate::geometry::check::orientation::{Closing, Orientation};
 use crate::geometry::mesh::coincident;
 use crate::geometry::mesh::weld::Weld;
 use crate::geometry::{DVec3, TriMesh};
+use crate::numeric::checks::ensure;
 use crate::sweep::{Face, Fixed, Lattice, Topology, Weights, Window, boundary, fill};
 use crate::vdb::FloatGrid;
 
@@ -61,9 +62,7 @@ pub fn layer(
         let mut faces = Vec::new();
         match cover {
             Cover::Depth(depth) => {
-                if !(*depth > 0.0 && depth.is_finite()) {
-                    return Err(Error::argument(format!("depth = {depth} m is not above 0")));
-                }
+                ensure(*depth > 0.0 && depth.is_finite(), format_args!("depth = {depth} m is not above 0"))?;
                 for mesh in std::iter::once(&ground).chain(&statics).map(Sheet::without_walls) {
                     let raised = |p: DVec3| p + DVec3::y() * *depth;
                     prisms(ctx, &lattice, &mesh, |p| p, raised, 1, &mut faces)?;
@@ -84,11 +83,10 @@ pub fn layer(
         Ok(faces)
     })?;
     let mut layer = fill(ctx, faces, lattice, half_width)?;
-    if layer.active_voxels() == 0 {
-        return Err(Error::argument(
-            "there is no snow: is the depth below a cell, or the top below the ground?",
-        ));
-    }
+    ensure(
+        layer.active_voxels() > 0,
+        "there is no snow: is the depth below a cell, or the top below the ground?",
+    )?;
     layer.prune_level_set()?;
     layer.set_name("surface")?;
     let rough = match cover {
@@ -210,11 +208,10 @@ fn sheet_of(ground: &Ground) -> Result<Sheet> {
         Ground::Mesh(mesh) => return Ok(Sheet::of(mesh)),
         Ground::Plane { height, area } => (*height, *area),
     };
-    if !(x1 > x0 && z1 > z0 && height.is_finite() && (x1 - x0).is_finite() && (z1 - z0).is_finite()) {
-        return Err(Error::argument(format!(
-            "area = [{x0}, {z0}, {x1}, {z1}] is not [x0, z0, x1, z1] with x1 > x0, z1 > z0"
-        )));
-    }
+    ensure(
+        x1 > x0 && z1 > z0 && height.is_finite() && (x1 - x0).is_finite() && (z1 - z0).is_finite(),
+        format_args!("area = [{x0}, {z0}, {x1}, {z1}] is not [x0, z0, x1, z1] with x1 > x0, z1 > z0"),
+    )?;
     let at = |x: f64, z: f64| DVec3::new(x, height, z);
     Ok(Sheet {
         positions: vec![at(x0, z0), at(x1, z0), at(x1, z1), at(x0, z1)],

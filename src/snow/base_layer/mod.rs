@@ -12,7 +12,7 @@ mod noise;
 mod removal;
 mod saved_state;
 mod sweep_region;
-pub(in crate::snow) mod voxel_fill;
+pub(super) mod voxel_fill;
 
 use std::borrow::Borrow;
 use std::collections::{BTreeSet, HashMap, HashSet};
@@ -22,12 +22,13 @@ use rayon::prelude::*;
 pub use far_bodies::Reach;
 pub use grids::{Changes, Grids};
 pub use noise::displace;
-pub(in crate::snow) use voxel_fill::filled;
+pub(super) use voxel_fill::filled;
 
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::numeric::blocks::{BlockEdit, DIM, Origin};
+use crate::numeric::checks::ensure;
 use crate::snow::NoiseParams;
 use crate::snow::base_layer::columns::Mark;
 use crate::sweep::{
@@ -116,12 +117,8 @@ impl BaseLayer {
     /// As [`BaseLayer::new`], with the volume (m3) if it is known.
     fn with_volume(ctx: &Context, surface: FloatGrid, params: Params, known: Option<f64>) -> Result<Self> {
         params.validate(&surface)?;
-        if surface.class() != GridClass::LevelSet {
-            return Err(Error::argument("the snow is not a level set"));
-        }
-        if !surface.is_world_fixed() {
-            return Err(Error::argument("the snow's grid is rotated or shifted against the world's axes"));
-        }
+        ensure(surface.class() == GridClass::LevelSet, "the snow is not a level set")?;
+        ensure(surface.is_world_fixed(), "the snow's grid is rotated or shifted against the world's axes")?;
         let half_width = half_width(&surface);
         let (low, high) = surface.active_bbox().ok_or_else(|| Error::argument("the snow is empty"))?;
         let (volume, initial) = ctx.phase("measure", || {
@@ -143,9 +140,7 @@ impl BaseLayer {
         let initial = std::mem::replace(&mut layer.grids, grids).surface;
         let same = layer.grids.surface.voxel_size() == initial.voxel_size()
             && layer.grids.surface.background() == initial.background();
-        if !same {
-            return Err(Error::argument("the layer to resume from has other cells than the first one"));
-        }
+        ensure(same, "the layer to resume from has other cells than the first one")?;
         layer.changes = Changes::none(&layer.grids, layer.half_width)?;
         let [low, high] = [layer.low[1], layer.high[1]];
         layer.changed = columns::changed(&initial, &layer.grids.surface)?;

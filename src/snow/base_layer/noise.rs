@@ -9,8 +9,7 @@ use std::collections::HashMap;
 use fastnoise_lite::{FastNoiseLite, NoiseType};
 use rayon::prelude::*;
 
-use super::removal;
-use super::removal::Scale;
+use super::removal::{self, Scale};
 use crate::context::Context;
 use crate::error::Result;
 use crate::numeric::blocks::{Block, BlockEdit, Origin, Values, offset};

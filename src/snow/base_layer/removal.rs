@@ -4,8 +4,7 @@
 //! nothing moved.
 
 use super::columns::{CELLS, add_by_cell};
-use super::voxel_fill;
-use super::voxel_fill::filled;
+use super::voxel_fill::{self, filled};
 use crate::numeric::blocks::{Block, BlockEdit, Mask, Origin, VOXELS, Values};
 use crate::sweep::Piece;
 use crate::vdb::Probe;

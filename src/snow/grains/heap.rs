@@ -13,13 +13,13 @@ use super::solver::contacts::MOST as MOST_GRAINS;
 use crate::snow::grains::solver::pairs::Held;
 
 use super::solver::layout::{Layout, SUB_STEPS_AHEAD, holds, locate, order, settle, world};
-use super::solver::rest;
 use super::solver::rows::{Row, Shared, V, norm};
 use super::solver::solve::{Motion, sub_step};
-use super::solver::trapped;
+use super::solver::{rest, trapped};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
+use crate::numeric::checks::ensure;
 use crate::snow::grains::solver::blocks::{At, NONE};
 use crate::snow::grains::solver::collide::Coefficients;
 
@@ -63,9 +63,7 @@ impl Heap {
     /// A position out of range; too many grains.
     pub fn add(&mut self, id: u32, position: DVec3, velocity: V) -> Result<()> {
         let (at, position) = locate(position, self.diameter);
-        if !holds(at) {
-            return Err(Error::argument("a grain is too far from the origin"));
-        }
+        ensure(holds(at), "a grain is too far from the origin")?;
         if self.rows.len() >= MOST_GRAINS {
             return Err(Error::argument(format!("there are more than {MOST_GRAINS} grains")));
         }
@@ -226,11 +224,10 @@ impl Heap {
             }
         });
         let is_finite = |row: &Row| row.position.iter().chain(&row.velocity).all(|x| x.is_finite());
-        if !self.rows.par_iter().all(is_finite) {
-            return Err(Error::argument(
-                "a grain would move infinitely fast: the base layer or an object is not as it should be",
-            ));
-        }
+        ensure(
+            self.rows.par_iter().all(is_finite),
+            "a grain would move infinitely fast: the base layer or an object is not as it should be",
+        )?;
         let is_there =
             |slot: &u32| layout.homes[*slot as usize].block != NONE && holds(self.at[*slot as usize]);
         let kept: Vec<u32> = (0..self.rows.len() as u32).filter(is_there).collect();
@@ -329,7 +326,7 @@ pub const MOST_BEFORE: usize = 64;
 
 /// The grains at the beginning of the last step.
 #[derive(Clone, Default)]
-pub(in crate::snow::grains) struct Starts {
+pub(super) struct Starts {
     /// By identity, ascending.
     pub grains: Vec<(u32, Start)>,
     /// Identities of the grains that the step created: first and end (exclusive).

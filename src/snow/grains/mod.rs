@@ -38,6 +38,7 @@ use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::geometry::points::{Attribute, Column, Points, Values};
 use crate::numeric::blocks::{DIM, Origin};
+use crate::numeric::checks::ensure;
 use birth::claims::Claims;
 use birth::sourcing::Sourcing;
 use heap::{Heap, Starts};
@@ -215,11 +216,12 @@ impl Grains {
     /// Fails if there would be more grains than allowed.
     fn room_for(&self, more: usize, frame: i32) -> Result<()> {
         let (count, most) = (self.heap.count() + more, self.params.most);
-        if count > most || self.next_id as usize + more > solver::contacts::MOST {
-            return Err(Error::argument(format!(
+        ensure(
+            count <= most && self.next_id as usize + more <= solver::contacts::MOST,
+            format_args!(
                 "frame {frame} would have {count} grains, more than max = {most}: larger grains or more compression make fewer"
-            )));
-        }
+            ),
+        )?;
         Ok(())
     }
 

@@ -5,6 +5,7 @@ use super::solver::density;
 use super::solver::rest::Rest;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
+use crate::numeric::checks::ensure;
 use crate::snow::grain_friction;
 
 /// How snow becomes grains and how they behave.
@@ -100,14 +101,11 @@ impl Params {
             return Err(Error::argument(format!("lifetime = {lifetime} must be over 0")));
         }
         let is_box = |[low, high]: &[DVec3; 2]| (0..3).all(|axis| low[axis] < high[axis]);
-        if self.keep_box.is_some_and(|bounds| !is_box(&bounds)) {
-            return Err(Error::argument(
-                "keep_box must be x0, y0, z0, x1, y1, z1 with x0 < x1, y0 < y1, z0 < z1",
-            ));
-        }
-        if self.sub_steps == Some(0) {
-            return Err(Error::argument("sub_steps must be at least 1"));
-        }
+        ensure(
+            self.keep_box.is_none_or(|bounds| is_box(&bounds)),
+            "keep_box must be x0, y0, z0, x1, y1, z1 with x0 < x1, y0 < y1, z0 < z1",
+        )?;
+        ensure(self.sub_steps != Some(0), "sub_steps must be at least 1")?;
         Ok(())
     }
 

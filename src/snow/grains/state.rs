@@ -12,9 +12,8 @@ use super::solver::pairs::Held;
 use super::solver::rows::Row;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
-use crate::numeric::bytes::{Reader, Writer};
-use crate::numeric::packed;
-use crate::numeric::packed::Magic;
+use crate::numeric::bytes::{Reader, Writer, require};
+use crate::numeric::packed::{self, Magic};
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzgrn06";
@@ -85,17 +84,13 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
     }
     grains.next_id = from.u32()?;
     let count = from.count(ROW)?;
-    if count > MOST || grains.next_id as usize > MOST {
-        return Err(wrong("has more grains than there may be"));
-    }
+    require(count <= MOST && grains.next_id as usize <= MOST, "has more grains than there may be")?;
     grains.births = vec![Default::default(); grains.next_id as usize];
     for _ in 0..count {
         let id = from.u32()?;
         heap.ids.push(id);
         heap.at.push(from.i32s()?);
-        if !heap.at.last().is_some_and(|at| holds(*at)) {
-            return Err(wrong("has a grain that is too far from the origin"));
-        }
+        require(heap.at.last().is_some_and(|at| holds(*at)), "has a grain that is too far from the origin")?;
         let (position, velocity, since) = (from.f32s()?, from.f32s()?, from.f32s()?);
         let [hold, still] = from.f32s()?;
         if ![0.0, 1.0, 2.0, 3.0].contains(&hold) || position.iter().any(|x| !(0.0..=EDGE).contains(x)) {
@@ -114,18 +109,14 @@ pub fn load(grains: &mut Grains, bytes: &[u8]) -> Result<()> {
     }
     for _ in 0..from.count(24)? {
         let (grain, collider) = (from.u32()?, from.u32()?);
-        if grain as usize >= count {
-            return Err(wrong("has a contact of a grain that is not there"));
-        }
+        require((grain as usize) < count, "has a contact of a grain that is not there")?;
         let ([impulse], across) = (from.f32s()?, from.f32s()?);
         heap.touches.push(Touch { grain, collider, impulse, across, ..Touch::default() });
     }
     for _ in 0..from.count(4)? {
         heap.trapped.push(from.u32()?);
     }
-    if !heap.trapped.is_sorted_by(|a, b| a < b) {
-        return Err(wrong("has trapped grains out of order"));
-    }
+    require(heap.trapped.is_sorted_by(|a, b| a < b), "has trapped grains out of order")?;
     grains.owed = BTreeMap::new();
     for _ in 0..from.count(20)? {
         grains.owed.insert(from.i32s()?, from.f64()?);

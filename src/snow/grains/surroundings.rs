@@ -7,6 +7,7 @@ use super::colliders::shell::Shell;
 use super::{Base, Params};
 use crate::error::Result;
 use crate::geometry::{DVec3, TriMesh};
+use crate::snow::bounds::bounds;
 use crate::sweep::Body;
 
 /// Inputs of a step of grains.
@@ -158,12 +159,6 @@ impl<'a> Surroundings<'a> {
 /// Largest speed (m/s) of a vertex between two poses (m) that are `dt` (s) apart.
 fn speed(first: &[DVec3], last: &[DVec3], dt: f64) -> f64 {
     first.iter().zip(last).map(|(a, b)| (b - a).norm_squared()).fold(0.0, f64::max).sqrt() / dt
-}
-
-/// Bounding box of positions.
-pub fn bounds(positions: &[DVec3]) -> Bounds {
-    let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
-    positions.iter().fold(none, |[low, high], position| [low.inf(position), high.sup(position)])
 }
 
 /// Displacement of a vertex if it may come near a box, else 0; its path may deviate sideways by as much as the displacement.

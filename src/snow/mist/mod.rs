@@ -17,6 +17,7 @@ use rayon::prelude::*;
 use crate::context::{Context, PhaseTime};
 use crate::error::{Error, Result};
 use crate::flow::{Coord, FARTHEST, Flow, FlowState, Keeping, Solids, Tiles, tiles};
+use crate::numeric::checks::ensure;
 use sources::Seed;
 
 pub use forces::wind::Wind;
@@ -147,12 +148,10 @@ impl Mist {
         if params.cell != old.cell {
             return Err(Error::argument(format!("cell = {} cannot change, it is {}", params.cell, old.cell)));
         }
-        if params.wind != old.wind {
-            return Err(Error::argument(format!(
-                "wind = {:?} cannot change, it is {:?}",
-                params.wind, old.wind
-            )));
-        }
+        ensure(
+            params.wind == old.wind,
+            format_args!("wind = {:?} cannot change, it is {:?}", params.wind, old.wind),
+        )?;
         self.params = params;
         Ok(())
     }
@@ -176,11 +175,10 @@ impl Mist {
     /// context allows; cancel; errors of the boundary.
     pub fn step(&mut self, ctx: &Context, around: &Around<'_>, times: [f64; 2]) -> Result<StepReport> {
         let [from, to] = times;
-        if !(to > from && (to - from).is_finite()) {
-            return Err(Error::argument(format!(
-                "the length of a step, {from} s to {to} s, must be positive and finite"
-            )));
-        }
+        ensure(
+            to > from && (to - from).is_finite(),
+            format_args!("the length of a step, {from} s to {to} s, must be positive and finite"),
+        )?;
         around.sources.iter().try_for_each(|source| source.check(self.params.cell))?;
         let raising = around.sources.iter().filter(|source| source.raises(&self.params));
         let raising: Vec<Source> = raising.copied().collect();
@@ -242,12 +240,13 @@ impl Mist {
     /// Number of parts into which a time (s) is divided for a speed (m/s).
     fn parts(&self, speed: f64, dt: f64) -> Result<usize> {
         let count = (speed * dt / (f64::from(FARTHEST) * self.params.cell)).ceil();
-        if count.is_nan() || count > MOST as f64 {
-            return Err(Error::argument(format!(
+        ensure(
+            count <= MOST as f64,
+            format_args!(
                 "mist moves at {speed:.0} m/s, more than {MOST} steps of {FARTHEST} cells of {} m in {dt:.4} s",
                 self.params.cell
-            )));
-        }
+            ),
+        )?;
         Ok((count as usize).max(1))
     }
 

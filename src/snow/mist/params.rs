@@ -1,8 +1,7 @@
 //! User parameters of mist.
 
-use std::ops::RangeInclusive;
-
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::numeric::checks::{check_within, ensure};
 
 /// Maximum wind speed (m/s) along an axis.
 pub const FASTEST_WIND: f64 = 1000.0;
@@ -66,19 +65,11 @@ impl Params {
     /// # Errors
     /// Names the field and its range.
     pub fn validate(&self) -> Result<()> {
-        let within = |name: &str, value: f64, range: RangeInclusive<f64>| {
-            let (low, high) = (*range.start(), *range.end());
-            if range.contains(&value) {
-                return Ok(());
-            }
-            Err(Error::argument(format!("{name} = {value} is not within {low} to {high}")))
-        };
+        let within = |name, value, range| check_within(name, value, "", range);
         within("cell", self.cell, 1.0e-5..=100.0)?;
         within("from_speed", self.from_speed, 0.0..=1000.0)?;
         within("gravity", self.gravity, -1000.0..=1000.0)?;
-        if self.half_life.is_nan() || self.half_life <= 0.0 {
-            return Err(Error::argument(format!("half_life = {} is not over 0", self.half_life)));
-        }
+        ensure(self.half_life > 0.0, format_args!("half_life = {} is not over 0", self.half_life))?;
         for wind in self.wind {
             within("wind", wind, -FASTEST_WIND..=FASTEST_WIND)?;
         }

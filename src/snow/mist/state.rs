@@ -1,10 +1,9 @@
 //! The exact state of mist as bytes, from which a run resumes.
 
 use super::Mist;
-use crate::error::{Error, Result};
-use crate::numeric::bytes::{Reader, Writer};
-use crate::numeric::packed;
-use crate::numeric::packed::Magic;
+use crate::error::Result;
+use crate::numeric::bytes::{Reader, Writer, require};
+use crate::numeric::packed::{self, Magic};
 
 /// Magic bytes, including the version.
 const MAGIC: &Magic = b"frzmst01";
@@ -33,13 +32,10 @@ pub fn load(mist: &mut Mist, bytes: &[u8]) -> Result<()> {
     let bytes = packed::unpack(bytes, MAGIC, NOUN)?;
     let mut from = Reader::new(&bytes);
     let cell = from.f64()?;
-    if cell != mist.params.cell {
-        return Err(Error::Bytes(format!("has cells of {cell} m, not {}", mist.params.cell)));
-    }
+    require(cell == mist.params.cell, format_args!("has cells of {cell} m, not {}", mist.params.cell))?;
     let wind = [from.f64()?, from.f64()?, from.f64()?];
-    if wind != mist.params.wind {
-        return Err(Error::Bytes(format!("has a wind of {wind:?} m/s, not {:?}", mist.params.wind)));
-    }
+    let own = mist.params.wind;
+    require(wind == own, format_args!("has a wind of {wind:?} m/s, not {own:?}"))?;
     mist.flow.load(&mut from)?;
     from.end()
 }

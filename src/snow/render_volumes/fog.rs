@@ -9,6 +9,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::numeric::blocks::{Block, BlockEdit, DIM, VOXELS, Values};
+use crate::numeric::checks::ensure;
 use crate::vdb::{DENSITY_SCALE_KEY, FloatGrid, GridClass, Leaf, MetaValue, Tile};
 
 /// Factor by which the thesis multiplies the density of base and grains for rendering (1/m, the unit that renderers use).
@@ -26,9 +27,7 @@ const EDGE: usize = 4;
 /// # Errors
 /// A grid that is not world-fixed; cancel; when memory runs out.
 pub fn base(ctx: &Context, surface: &FloatGrid) -> Result<FloatGrid> {
-    if !surface.is_world_fixed() {
-        return Err(Error::argument("the level set's voxels are shifted or turned"));
-    }
+    ensure(surface.is_world_fixed(), "the level set's voxels are shifted or turned")?;
     let inside = |tile: Tile| (tile.value < 0.0).then_some(Tile { value: 1.0, active: true, ..tile });
     let tiles: Vec<Tile> = surface.tiles()?.into_iter().filter_map(inside).collect();
     let voxel = surface.voxel_size();

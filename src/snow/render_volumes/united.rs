@@ -10,6 +10,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::geometry::DVec3;
 use crate::numeric::blocks::{Block, BlockEdit, DIM, Origin, VOXELS, Values, offset};
+use crate::numeric::checks::ensure;
 use crate::vdb::{FloatGrid, Probe};
 
 /// Maximum voxel size (radii of a grain): spheres of less than one and a half voxels are lost between the voxels.
@@ -37,11 +38,10 @@ pub fn division(cell: f64, radius: f64) -> usize {
 /// hundredth of a cell; centres that are not finite or are too far from the origin; cancel; when memory runs out.
 pub fn unite(ctx: &Context, base: &FloatGrid, centres: &[DVec3], radius: f64) -> Result<FloatGrid> {
     let cell = base.voxel_size();
-    if !base.is_world_fixed() || f64::from(base.background()) < 2.0 * cell {
-        return Err(Error::argument(
-            "the base must be a level set on world-fixed cells, at least two cells wide on each side",
-        ));
-    }
+    ensure(
+        base.is_world_fixed() && f64::from(base.background()) >= 2.0 * cell,
+        "the base must be a level set on world-fixed cells, at least two cells wide on each side",
+    )?;
     if !(radius.is_finite() && radius >= 0.01 * cell) {
         return Err(Error::argument(format!("grains of {radius} m are too small for cells of {cell} m")));
     }

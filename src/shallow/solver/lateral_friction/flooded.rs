@@ -3,7 +3,7 @@
 
 use super::Walls;
 use super::beside::{self, Room};
-use crate::shallow::columns::{Columns, STRIP};
+use crate::shallow::columns::STRIP;
 use crate::shallow::pipes::cliffs;
 use crate::shallow::pipes::side::Side;
 use crate::shallow::solver::pressurised::edges::At;
@@ -31,15 +31,8 @@ const CEILING: f64 = 4.0;
 
 impl Walls {
     /// Lateral friction of a pipe of full columns between i and j, which may be the outside; `full` says which of them are full.
-    pub(in crate::shallow::solver) fn beside(
-        &self,
-        step: &Step,
-        columns: &Columns,
-        state: &State,
-        at: At,
-        [i, j]: [usize; 2],
-        full: [bool; 2],
-    ) -> Beside {
+    pub fn beside(&self, state: &State, at: At, [i, j]: [usize; 2], full: [bool; 2]) -> Beside {
+        let State { step, columns, .. } = *state;
         if step.lateral == 0.0 {
             return Beside::NONE;
         }
@@ -51,7 +44,7 @@ impl Walls {
             At::South(_) => (1, [Side::West, Side::East]),
             At::Link(_) => return Beside { ground, ..Beside::NONE },
         };
-        let rooms = rooms(columns, state, [i, j]);
+        let rooms = rooms(state, [i, j]);
         let mean = mean(rooms);
         let rise = (columns.bases()[i] - columns.bases()[j]) as f32 / step.cell;
         let lateral = f64::from(step.lateral) * f64::from(1.0 + min(rise * rise, 3.0));
@@ -59,10 +52,7 @@ impl Walls {
             let column = [i, j][end];
             let beyond = sides.map(|side| {
                 let is_linked = self.linked[column / STRIP][side as usize] >> (column % STRIP) & 1 == 1;
-                (
-                    cliffs::beside(columns, column, side).map_or(ABSENT, |other| room(columns, state, other)),
-                    is_linked,
-                )
+                (cliffs::beside(columns, column, side).map_or(ABSENT, |other| room(state, other)), is_linked)
             });
             if full[end] {
                 over::<true>(step, rooms[end], beyond)
@@ -76,7 +66,7 @@ impl Walls {
         let taken = [0, 1].map(|side| {
             let others = [i, j].map(|column| cliffs::beside(columns, column, sides[side]));
             let [Some(first), Some(second)] = others else { return 0.0 };
-            let depth = self::mean(self::rooms(columns, state, [first, second]));
+            let depth = self::mean(self::rooms(state, [first, second]));
             let contact = [before, behind][side];
             f64::from(min(contact / depth.max(1.0), 1.0) * state.flux[axis][first])
         });
@@ -92,13 +82,14 @@ impl Walls {
 /// Stands in for an absent column.
 const ABSENT: Room = Room { base: 0, ceiling: 0, depth: 0 };
 
-fn room(columns: &Columns, state: &State, i: usize) -> Room {
+fn room(state: &State, i: usize) -> Room {
+    let columns = state.columns;
     Room { base: columns.bases()[i], ceiling: columns.ceilings()[i], depth: state.depth[i] }
 }
 
 /// The columns of a pipe, cut at the top of the opening between both.
-fn rooms(columns: &Columns, state: &State, ends: [usize; 2]) -> [Room; 2] {
-    let rooms = ends.map(|i| room(columns, state, i));
+fn rooms(state: &State, ends: [usize; 2]) -> [Room; 2] {
+    let rooms = ends.map(|i| room(state, i));
     let top = rooms[0].ceiling.min(rooms[1].ceiling);
     rooms.map(|room| Room { depth: room.depth.min(top - room.base).max(0), ..room })
 }

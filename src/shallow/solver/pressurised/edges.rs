@@ -5,7 +5,7 @@ use crate::shallow::solver::overflow_edges::{Fall, edge};
 
 /// A pipe of the network: its index in the array that holds it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::shallow::solver) enum At {
+pub enum At {
     /// To the east of a column.
     East(u32),
     /// To the south of a column.

@@ -1,7 +1,7 @@
 //! Columns that are full to their ceiling: they push with a head instead of a surface.
 
-pub(in crate::shallow::solver) mod edges;
+pub(super) mod edges;
 mod gradients;
 mod heads;
-pub(in crate::shallow::solver) mod network;
+pub(super) mod network;
 mod nodes;

@@ -21,8 +21,7 @@ use crate::shallow::solver::link_flow::LinkFlow;
 use crate::shallow::solver::overflow_edges::{Fall, OverflowEdges};
 use crate::shallow::solver::rows::filling::Filling;
 use crate::shallow::solver::stop::Stop;
-use crate::shallow::solver::transfers::limiter;
-use crate::shallow::solver::transfers::limiter::Party;
+use crate::shallow::solver::transfers::limiter::{self, Party};
 use crate::shallow::solver::viscous_flux::Step;
 
 /// Columns of a network for which capacity is reserved from the beginning.
@@ -42,16 +41,20 @@ pub struct Network {
     pub(in crate::shallow::solver) over: PerColumn<f32>,
     /// Whether each row may have a column with a head.
     has_heads: Vec<bool>,
-    /// The network's pipes, sorted.
-    shut_east: Vec<u32>,
-    shut_south: Vec<u32>,
-    shut_links: Vec<u32>,
+    /// The network's pipes to the east, to the south, and its links, sorted.
+    shut: [Vec<u32>; 3],
     /// Changes by the network: columns, sorted, and units.
     moves: Vec<(u32, i32)>,
 }
 
-/// The state that a network is built from.
+/// What a network is built from.
 pub struct State<'a> {
+    /// The step.
+    pub step: &'a Step,
+    /// Columns.
+    pub columns: &'a Columns,
+    /// Pipes between them.
+    pub pipes: &'a Pipes,
     /// H (units).
     pub depth: &'a [i32],
     /// Flux to the east and to the south (units a step).
@@ -76,9 +79,7 @@ impl Network {
             nodes: Vec::with_capacity(room),
             edges: Vec::with_capacity(2 * room),
             gradients: Gradients::with_room(room),
-            shut_east: Vec::with_capacity(room),
-            shut_south: Vec::with_capacity(room),
-            shut_links: Vec::with_capacity(room),
+            shut: [(); 3].map(|()| Vec::with_capacity(room)),
             moves: Vec::with_capacity(room),
             party_of: vec![NONE; columns],
             over: PerColumn::new(Array::Head, columns, 0.0),
@@ -131,15 +132,8 @@ impl Network {
     }
 
     /// Finds the full columns of the rows that are filling and may have some, their heads, and the flow through their pipes.
-    pub fn find(
-        &mut self,
-        step: &Step,
-        columns: &Columns,
-        pipes: &Pipes,
-        filling: Filling,
-        state: &State,
-        stop: &Stop,
-    ) {
+    pub fn find(&mut self, filling: Filling, state: &State, stop: &Stop) {
+        let columns = state.columns;
         self.clear();
         for row in (0..filling.may_fill.len()).filter(|&row| filling.may_fill[row]) {
             if filling.may_be_full[row] || self.has_heads[row] {
@@ -149,7 +143,7 @@ impl Network {
         if self.nodes.is_empty() {
             return;
         }
-        self.connect(step, columns, pipes, filling.may_fill, state);
+        self.connect(filling.may_fill, state);
         self.find_heads(columns, stop);
         self.flow(columns);
         limiter::settle(&mut self.parties, &mut self.edges, stop);
@@ -165,9 +159,7 @@ impl Network {
         }
         self.nodes.clear();
         self.edges.clear();
-        self.shut_east.clear();
-        self.shut_south.clear();
-        self.shut_links.clear();
+        self.shut.iter_mut().for_each(Vec::clear);
         self.moves.clear();
     }
 
@@ -211,36 +203,36 @@ impl Network {
     }
 
     /// Collects the pipes of full columns.
-    fn connect(&mut self, step: &Step, columns: &Columns, pipes: &Pipes, rows: &[bool], state: &State) {
+    fn connect(&mut self, rows: &[bool], state: &State) {
+        let pipes = state.pipes;
         for node in 0..self.nodes.len() {
             let i = self.parties[node].column as usize;
-            let next = |side| beside(columns, i, side);
+            let next = |side| beside(state.columns, i, side);
             if pipes.east[i] > 0.0 {
-                let edge = self.join(step, columns, state, At::East(i as u32), [i, i + 1], pipes.east[i]);
+                let edge = self.join(state, At::East(i as u32), [i, i + 1], pipes.east[i]);
                 self.meet(edge, node, 0, i + 1, 1);
             }
             if let Some(j) = next(Side::South).filter(|_| pipes.south[i] > 0.0) {
-                let edge = self.join(step, columns, state, At::South(i as u32), [i, j], pipes.south[i]);
+                let edge = self.join(state, At::South(i as u32), [i, j], pipes.south[i]);
                 self.meet(edge, node, 2, j, 3);
             }
             // A pipe between two full columns was already added by the other one.
             let is_node = |network: &Self, j: usize| (network.party_of[j] as usize) < network.nodes.len();
             if let Some(j) = next(Side::West).filter(|&j| pipes.east[j] > 0.0 && !is_node(self, j)) {
-                let edge = self.join(step, columns, state, At::East(j as u32), [j, i], pipes.east[j]);
+                let edge = self.join(state, At::East(j as u32), [j, i], pipes.east[j]);
                 self.nodes[node].edges[1] = edge;
             }
             if let Some(j) = next(Side::North).filter(|&j| pipes.south[j] > 0.0 && !is_node(self, j)) {
-                let edge = self.join(step, columns, state, At::South(j as u32), [j, i], pipes.south[j]);
+                let edge = self.join(state, At::South(j as u32), [j, i], pipes.south[j]);
                 self.nodes[node].edges[3] = edge;
             }
         }
-        self.connect_links(step, columns, pipes, rows, state);
-        self.shut_east.sort_unstable();
-        self.shut_south.sort_unstable();
+        self.connect_links(rows, state);
+        self.shut.iter_mut().for_each(|pipes| pipes.sort_unstable());
     }
 
-    fn connect_links(&mut self, step: &Step, columns: &Columns, pipes: &Pipes, rows: &[bool], state: &State) {
-        let links = &pipes.links;
+    fn connect_links(&mut self, rows: &[bool], state: &State) {
+        let links = &state.pipes.links;
         let count = self.nodes.len();
         for row in 0..rows.len() {
             if !rows[row] && !rows.get(row + 1).is_some_and(|next| *next) {
@@ -256,13 +248,13 @@ impl Network {
                     let giver = if fall == Fall::Ahead { from } else { to };
                     if is_node(giver) {
                         let ends = [giver as usize, NONE as usize];
-                        let edge = self.join(step, columns, state, at, ends, links.open[link]);
-                        self.edges[edge as usize].fall(columns, giver, fall);
+                        let edge = self.join(state, at, ends, links.open[link]);
+                        self.edges[edge as usize].fall(state.columns, giver, fall);
                     }
                 } else if is_node(from) || is_node(to) {
-                    self.join(step, columns, state, at, [from as usize, to as usize], links.open[link]);
+                    self.join(state, at, [from as usize, to as usize], links.open[link]);
                     if let (NONE, Some(edge)) = (to, self.edges.last_mut()) {
-                        edge.outside = f64::from(links.outside(columns, link, step.still).0);
+                        edge.outside = f64::from(links.outside(state.columns, link, state.step.still).0);
                     }
                 }
             }
@@ -270,26 +262,19 @@ impl Network {
     }
 
     /// Adds a pipe; returns its index.
-    fn join(
-        &mut self,
-        step: &Step,
-        columns: &Columns,
-        state: &State,
-        at: At,
-        [i, j]: [usize; 2],
-        open: f32,
-    ) -> u32 {
+    fn join(&mut self, state: &State, at: At, [i, j]: [usize; 2], open: f32) -> u32 {
+        let State { step, columns, .. } = *state;
         let (flux, left, tilt) = match at {
             At::East(at) => {
-                self.shut_east.push(at);
+                self.shut[0].push(at);
                 (state.flux[0][at as usize], state.left[0][at as usize], step.tilt[0])
             }
             At::South(at) => {
-                self.shut_south.push(at);
+                self.shut[1].push(at);
                 (state.flux[1][at as usize], state.left[1][at as usize], step.tilt[1])
             }
             At::Link(at) => {
-                self.shut_links.push(at);
+                self.shut[2].push(at);
                 (state.links.flux[at as usize], state.links.left[at as usize], 0)
             }
         };
@@ -300,7 +285,7 @@ impl Network {
         let square = height * height;
         let thinned = f64::from(step.thinned(flux, square as f32));
         let is_full = |party: u32| (party as usize) < self.nodes.len();
-        let beside = state.walls.beside(step, columns, state, at, [i, j], [from, to].map(is_full));
+        let beside = state.walls.beside(state, at, [i, j], [from, to].map(is_full));
         let drag = f64::from(step.drag) * thinned * beside.ground;
         let lateral = square * thinned * beside.held;
         let held_back = if square > 0.0 && open > 0.0 {
@@ -377,23 +362,17 @@ impl Network {
         columns: &Range<u32>,
         links: &Range<usize>,
         mut change: impl FnMut(u32, i32),
-        mut east: impl FnMut(u32),
-        mut south: impl FnMut(u32),
-        mut link: impl FnMut(u32),
+        mut shut: impl FnMut(At),
     ) {
         let first = self.moves.partition_point(|(column, _)| *column < columns.start);
         for (column, units) in self.moves[first..].iter().take_while(|(column, _)| *column < columns.end) {
             change(*column, *units);
         }
-        let within = |list: &[u32], range: Range<u32>| {
-            list.partition_point(|&at| at < range.start)..list.partition_point(|&at| at < range.end)
-        };
-        let range = within(&self.shut_east, columns.clone());
-        self.shut_east[range].iter().for_each(|&at| east(at));
-        let range = within(&self.shut_south, columns.clone());
-        self.shut_south[range].iter().for_each(|&at| south(at));
-        let range = within(&self.shut_links, links.start as u32..links.end as u32);
-        self.shut_links[range].iter().for_each(|&at| link(at));
+        let ranges = [columns.clone(), columns.clone(), links.start as u32..links.end as u32];
+        for ((pipes, range), at) in self.shut.iter().zip(ranges).zip([At::East, At::South, At::Link]) {
+            let first = pipes.partition_point(|&at| at < range.start);
+            pipes[first..].iter().take_while(|&&at| at < range.end).for_each(|&pipe| shut(at(pipe)));
+        }
     }
 
     /// Fluxes of the pipes to the east (0) and to the south (1) of columns.

@@ -1,5 +1,7 @@
 //! Full columns, as nodes of the network.
 
+use std::cmp::Ordering;
+
 use crate::shallow::columns::{Columns, NONE};
 
 /// Heads closer than this (units) are equal, like surfaces that differ by less than a unit: liquid at rest stays at rest.
@@ -40,26 +42,17 @@ pub(in crate::shallow::solver) fn scaled(number: f64) -> i64 {
 }
 
 /// The height of a pipe's section (units): the depth of the last donor, within the opening between both columns.
-pub(in crate::shallow::solver) fn section(
-    columns: &Columns,
-    depth: &[i32],
-    i: usize,
-    j: Option<usize>,
-    flux: f32,
-) -> f64 {
+pub fn section(columns: &Columns, depth: &[i32], i: usize, j: Option<usize>, flux: f32) -> f64 {
     let (base, ceiling) = (columns.bases(), columns.ceilings());
     let Some(j) = j else { return f64::from(depth[i]) };
     let opening = ceiling[i].min(ceiling[j]) - base[i].max(base[j]);
     let eta = |k: usize| base[k] + depth[k];
-    let gives = match flux.partial_cmp(&0.0) {
-        Some(std::cmp::Ordering::Greater) => depth[i],
-        Some(std::cmp::Ordering::Less) => depth[j],
+    let flows = flux.partial_cmp(&0.0).filter(|order| order.is_ne());
+    let gives = match flows.unwrap_or_else(|| eta(i).cmp(&eta(j))) {
+        Ordering::Greater => depth[i],
+        Ordering::Less => depth[j],
         // The result is the same from either end.
-        _ => match eta(i).cmp(&eta(j)) {
-            std::cmp::Ordering::Greater => depth[i],
-            std::cmp::Ordering::Less => depth[j],
-            std::cmp::Ordering::Equal => depth[i].min(depth[j]),
-        },
+        Ordering::Equal => depth[i].min(depth[j]),
     };
     f64::from(gives.min(opening))
 }

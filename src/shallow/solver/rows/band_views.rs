@@ -16,8 +16,6 @@ pub const BEYOND: usize = 4;
 pub struct Part<'a> {
     /// First column index.
     pub start: usize,
-    /// First link.
-    pub first_link: usize,
     /// H (units).
     pub depth: &'a mut [i32],
     /// Flux to the east and to the south (units a step).
@@ -32,6 +30,8 @@ pub struct Part<'a> {
 
 /// Links of a run of rows.
 pub struct LinkPart<'a> {
+    /// First link.
+    pub first: usize,
     /// Flux (units a step).
     pub flux: &'a mut [f32],
     /// Remainder of the transfer (units).
@@ -87,19 +87,16 @@ impl Copy {
 
     /// The copies, as a part.
     pub fn part(&mut self, columns: &Columns, links: &Links) -> Part<'_> {
-        let start = indices(columns, &self.rows).start;
-        let first_link = link_range(links, &self.rows).start;
-        Part {
-            start,
-            first_link,
-            ..Part::new(
-                &mut self.depth,
-                self.flux.each_mut().map(Vec::as_mut_slice),
-                self.left.each_mut().map(Vec::as_mut_slice),
-                &mut self.links,
-                self.amounts.each_mut().map(Vec::as_mut_slice),
-            )
-        }
+        let mut part = Part::new(
+            &mut self.depth,
+            self.flux.each_mut().map(Vec::as_mut_slice),
+            self.left.each_mut().map(Vec::as_mut_slice),
+            &mut self.links,
+            self.amounts.each_mut().map(Vec::as_mut_slice),
+        );
+        part.start = indices(columns, &self.rows).start;
+        part.links.first = link_range(links, &self.rows).start;
+        part
     }
 }
 
@@ -114,11 +111,11 @@ impl<'a> Part<'a> {
     ) -> Self {
         Self {
             start: 0,
-            first_link: 0,
             depth,
             flux,
             left,
             links: LinkPart {
+                first: 0,
                 flux: &mut links.flux,
                 left: &mut links.left,
                 transfer: &mut links.transfer,
@@ -132,17 +129,16 @@ impl<'a> Part<'a> {
     pub fn split(self, columns: &Columns, links: &Links, row: usize) -> [Self; 2] {
         let index = indices(columns, &(row..row)).start;
         let link = link_range(links, &(row..row)).start;
-        let Self { start, first_link, .. } = self;
+        let Self { start, .. } = self;
         let at = index - start;
         let [[depth], [depth_behind]] = split_each([self.depth], at);
         let [flux, flux_behind] = split_each(self.flux, at);
         let [left, left_behind] = split_each(self.left, at);
-        let [links, links_behind] = self.links.split(link - first_link);
+        let [links, links_behind] = self.links.split(link);
         let [amounts, amounts_behind] = split_each(self.amounts, at);
-        let before = Self { start, first_link, depth, flux, left, links, amounts };
+        let before = Self { start, depth, flux, left, links, amounts };
         let behind = Self {
             start: index,
-            first_link: link,
             depth: depth_behind,
             flux: flux_behind,
             left: left_behind,
@@ -155,12 +151,18 @@ impl<'a> Part<'a> {
 
 impl<'a> LinkPart<'a> {
     /// Splits the part before a link.
-    fn split(self, at: usize) -> [Self; 2] {
-        let numbers = split_each([self.flux, self.left, self.transfer], at);
-        let [fallen, fallen_behind] = split_each(self.fallen, at);
-        let [before, behind] = numbers;
-        let part = |[flux, left, transfer]: [&'a mut [f32]; 3], fallen| Self { flux, left, transfer, fallen };
-        [part(before, fallen), part(behind, fallen_behind)]
+    fn split(self, link: usize) -> [Self; 2] {
+        let Self { first, flux, left, transfer, fallen } = self;
+        let [before, behind] = split_each([flux, left, transfer], link - first);
+        let [fallen, fallen_behind] = split_each(fallen, link - first);
+        let part = |first, [flux, left, transfer]: [&'a mut [f32]; 3], fallen| Self {
+            first,
+            flux,
+            left,
+            transfer,
+            fallen,
+        };
+        [part(first, before, fallen), part(link, behind, fallen_behind)]
     }
 }
 

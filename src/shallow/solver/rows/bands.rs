@@ -117,13 +117,7 @@ impl Bands {
     }
 
     /// Measures rows again after their columns have changed.
-    pub(in crate::shallow) fn refit(
-        &mut self,
-        columns: &Columns,
-        pipes: usize,
-        rows: Range<usize>,
-        depth: &[i32],
-    ) {
+    pub fn refit(&mut self, columns: &Columns, pipes: usize, rows: Range<usize>, depth: &[i32]) {
         self.takes = pipes as i64 + 1;
         for row in rows.clone() {
             self.clearance[row] = clearance(columns, row);

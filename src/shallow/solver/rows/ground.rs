@@ -8,7 +8,7 @@ use crate::shallow::scalars::amounts::{Act, Changes};
 use crate::shallow::solver::active::Active;
 use crate::shallow::solver::fast_films::Fast;
 use crate::shallow::solver::lateral_friction::Walls;
-use crate::shallow::solver::link_step::{Outside, indices_of};
+use crate::shallow::solver::link_step::{Outside, RowLinks, indices_of};
 use crate::shallow::solver::overflow_edges::OverflowEdges;
 use crate::shallow::solver::pressurised::network::Network;
 
@@ -38,7 +38,12 @@ pub struct Ground<'a> {
     pub acts: &'a [Act],
 }
 
-impl Ground<'_> {
+impl<'a> Ground<'a> {
+    /// The links that a row owns.
+    pub fn links_of(&self, row: usize) -> RowLinks<'a> {
+        RowLinks { links: &self.pipes.links, overflow_edges: self.overflow_edges, row }
+    }
+
     /// Whether there is nothing to do in a row.
     #[inline(always)]
     pub fn is_idle(&self, row: usize) -> bool {
@@ -65,20 +70,12 @@ pub struct Stepped {
 }
 
 /// Calls `add` with each column of a row that gives or receives through a link, and how much.
-pub(in crate::shallow::solver) fn each_link(
-    ground: &Ground,
-    parts: &Parts,
-    row: usize,
-    gives: bool,
-    mut add: impl FnMut(u32, i64),
-) {
-    let links = &ground.pipes.links;
-    if links.columns_of(row).is_empty() {
+pub fn each_link(ground: &Ground, parts: &Parts, row: usize, gives: bool, mut add: impl FnMut(u32, i64)) {
+    if ground.pipes.links.columns_of(row).is_empty() {
         return;
     }
     let within = indices_of(ground.columns, row);
     for owner in row.saturating_sub(1).max(parts.first)..row + 1 {
-        let part = parts.see(owner);
-        part.links.each(links, ground.overflow_edges, (owner, part.first_link), &within, gives, &mut add);
+        parts.see(owner).links.each(ground.links_of(owner), &within, gives, &mut add);
     }
 }

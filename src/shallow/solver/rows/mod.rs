@@ -6,14 +6,15 @@
 //! are then final, and its depths change; no later stage reads that row again. A band starts some rows before its own rows and ends some
 //! rows after them, on copies, so that it computes the same values there as its neighbours.
 
-pub(in crate::shallow::solver) mod band_views;
+pub(super) mod band_views;
 pub(in crate::shallow) mod bands;
-pub(in crate::shallow::solver) mod buffers;
-pub(in crate::shallow::solver) mod filling;
+pub(super) mod buffers;
+pub(super) mod filling;
 mod ground;
-pub(in crate::shallow::solver) mod positions;
+pub(super) mod positions;
 
 use super::link_step::{Outside, indices_of};
+use super::pressurised::edges::At;
 use super::transfers::inflow_limit::most_through_links;
 use super::transfers::scale;
 use super::transfers::whole_units::{find_woken, move_units};
@@ -24,9 +25,8 @@ use crate::shallow::scalars::MOST;
 use crate::shallow::scalars::amounts::Changes;
 use band_views::Parts;
 use buffers::{Buffer, RING, Rows, SWEEPS};
-pub use ground::Ground;
-pub use ground::Stepped;
 pub(super) use ground::each_link;
+pub use ground::{Ground, Stepped};
 use positions::{PAD, Place};
 
 impl Rows {
@@ -172,20 +172,12 @@ impl Rows {
             }
         }
         if !pipes.links.is_empty() {
-            let (start, first_link) = (own.start, own.first_link);
             let next = beyond.as_ref().map(|next| (next.start, &*next.depth));
             let depth = |index: usize| match next {
                 Some((start, depth)) if index >= start => depth[index - start],
-                _ => own.depth[index - start],
+                _ => own.depth[index - own.start],
             };
-            own.links.drive::<K>(
-                step,
-                columns,
-                &pipes.links,
-                ground.overflow_edges,
-                (row, first_link),
-                depth,
-            );
+            own.links.drive::<K>(step, columns, ground.links_of(row), depth);
         }
         is_held
     }
@@ -194,15 +186,17 @@ impl Rows {
     fn shut(&mut self, ground: &Ground, parts: &mut Parts, row: usize) {
         let (position, buffer) = (Place::new(ground.columns, row), &mut self.ring[row % RING]);
         let part = parts.of(row);
-        let (start, first_link) = (part.start, part.first_link);
+        let (start, first_link) = (part.start, part.links.first);
         let (depth, transfer) = (&mut *part.depth, &mut *part.links.transfer);
         ground.network.move_units(
             &indices_of(ground.columns, row),
             &ground.pipes.links.row(row),
             |column, units| depth[column as usize - start] += units,
-            |column| buffer.east[position.of(column)] = 0.0,
-            |column| buffer.south[position.of(column)] = 0.0,
-            |link| transfer[link as usize - first_link] = 0.0,
+            |at| match at {
+                At::East(column) => buffer.east[position.of(column)] = 0.0,
+                At::South(column) => buffer.south[position.of(column)] = 0.0,
+                At::Link(link) => transfer[link as usize - first_link] = 0.0,
+            },
         );
     }
 
@@ -282,15 +276,13 @@ impl Rows {
                 &mut flux_south[mine..mine + len],
             );
         }
-        let first_link = part.first_link;
         let factor = |column| position.pick(factors, beyond, column);
-        part.links.scale(&ground.pipes.links, ground.overflow_edges, (row, first_link), GIVES, factor);
+        part.links.scale(ground.links_of(row), GIVES, factor);
     }
 
     /// Applies the transfers of a row's links to the band's own columns.
     fn move_links(&self, ground: &Ground, parts: &mut Parts, row: usize, outside: &mut Outside) {
-        let links = &ground.pipes.links;
-        if links.row(row).is_empty() {
+        if ground.pipes.links.row(row).is_empty() {
             return;
         }
         let is_own = parts.rows.contains(&row);
@@ -298,10 +290,9 @@ impl Rows {
         let mut elsewhere = Outside::default();
         let outside = if is_own { outside } else { &mut elsewhere };
         let (part, next) = parts.both(row);
-        let (first_link, start) = (part.first_link, part.start);
-        let depth = &mut *part.depth;
+        let (start, depth) = (part.start, &mut *part.depth);
         let mut next = next.map(|next| (next.start, &mut *next.depth));
-        part.links.move_units(links, ground.overflow_edges, (row, first_link), outside, |column, units| {
+        part.links.move_units(ground.links_of(row), outside, |column, units| {
             if own.contains(&column) {
                 match &mut next {
                     Some((start, depth)) if column >= *start => depth[column - *start] += units,

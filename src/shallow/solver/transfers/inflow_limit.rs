@@ -11,12 +11,7 @@ use crate::shallow::solver::viscous_flux::{max, min};
 impl Rows {
     /// K_max of a row's columns, as if nothing flowed out; returns whether any is not 1.
     #[inline(always)]
-    pub(in crate::shallow::solver) fn find_most(
-        &mut self,
-        ground: &Ground,
-        parts: &Parts,
-        row: usize,
-    ) -> bool {
+    pub fn find_most(&mut self, ground: &Ground, parts: &Parts, row: usize) -> bool {
         let Ground { columns, active, .. } = ground;
         let part = parts.see(row);
         let [own, north] =
@@ -94,12 +89,7 @@ impl Rows {
 }
 
 /// The maximum inflow through links of a column of a row (units); `sums` are 0 before and after.
-pub(in crate::shallow::solver) fn most_through_links(
-    ground: &Ground,
-    parts: &Parts,
-    row: usize,
-    sums: &mut [i64],
-) -> f32 {
+pub fn most_through_links(ground: &Ground, parts: &Parts, row: usize, sums: &mut [i64]) -> f32 {
     let position = Place::new(ground.columns, row);
     each_link(ground, parts, row, false, |column, units| sums[position.of(column)] += units);
     let columns = ground.pipes.links.columns_of(row).iter();

@@ -78,7 +78,7 @@ impl Lanes {
             let [levels, beyond] = [row, row + 1].map(|row| &lane.level[row % RING]);
             for link in links.row(row) {
                 // The same whole units that the liquid moves.
-                let units = part.links.transfer[link - part.first_link] as i32;
+                let units = part.links.transfer[link - part.links.first] as i32;
                 if units == 0 {
                     continue;
                 }
@@ -100,7 +100,7 @@ impl Lanes {
                 if fall != Fall::No {
                     let fallen = if units > 0 { moved } else { -moved };
                     change(giver, -fallen);
-                    part.links.fallen[scalar][link - part.first_link] = fallen;
+                    part.links.fallen[scalar][link - part.links.first] = fallen;
                     continue;
                 }
                 change(from, -moved);

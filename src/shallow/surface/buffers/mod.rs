@@ -1,7 +1,7 @@
 //! Writing the mesh into the caller's buffers.
 
-pub(in crate::shallow::surface) mod capacity;
+pub(super) mod capacity;
 pub(in crate::shallow) mod frame;
-pub(in crate::shallow::surface) mod indices;
+pub(super) mod indices;
 pub(in crate::shallow) mod normals;
-pub(in crate::shallow::surface) mod vertices;
+pub(super) mod vertices;

@@ -4,8 +4,7 @@
 use crate::numeric::cpu::dispatch;
 use crate::numeric::lists::reset;
 use crate::shallow::columns::grid::TOP;
-use crate::shallow::columns::{Columns, STRIP};
-use crate::shallow::columns::{strip_mut, strip_of};
+use crate::shallow::columns::{Columns, STRIP, strip_mut, strip_of};
 use crate::shallow::surface::quartets::strips::Found;
 use crate::shallow::surface::{Depths, Layout};
 
@@ -52,12 +51,7 @@ pub(in crate::shallow::surface) fn find_heights(
 }
 
 /// The height of one column.
-pub(in crate::shallow) fn height_of(
-    columns: &Columns,
-    depths: &Depths<'_>,
-    layout: &Layout,
-    index: usize,
-) -> i32 {
+pub fn height_of(columns: &Columns, depths: &Depths<'_>, layout: &Layout, index: usize) -> i32 {
     let units = |length: f64| (length / columns.heights.unit).round().min(f64::from(TOP)) as i32;
     let (least, fade) = (units(layout.least_depth), units(layout.fade_depth));
     let of = |numbers: &[i32]| [numbers.get(index).copied().unwrap_or(least); STRIP];

@@ -2,8 +2,8 @@
 
 pub(in crate::shallow) mod cells;
 pub(in crate::shallow) mod divide;
-pub(in crate::shallow::surface) mod full;
-pub(in crate::shallow::surface) mod links;
+pub(super) mod full;
+pub(super) mod links;
 pub(in crate::shallow) mod odd;
-pub(in crate::shallow::surface) mod strips;
+pub(super) mod strips;
 mod wall;

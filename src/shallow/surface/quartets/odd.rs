@@ -75,12 +75,7 @@ impl Search {
 
 /// Adds the triangles of groups whose first wet column is `wet`, at `corner`, given the columns that it is linked with.
 #[inline(always)]
-pub(in crate::shallow) fn add_triangles(
-    corner: usize,
-    wet: &Entry,
-    near: [Option<&Entry>; 4],
-    triangles: &mut Vec<[u32; 3]>,
-) {
+pub fn add_triangles(corner: usize, wet: &Entry, near: [Option<&Entry>; 4], triangles: &mut Vec<[u32; 3]>) {
     let fit = |a: &Entry, b: &Entry| !a.wet && !b.wet || a.is_linked(b);
     let is_first = |at: usize, entry: &Entry| at > corner || !entry.wet;
     let [p, q, r] = OTHERS[corner];

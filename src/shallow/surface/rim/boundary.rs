@@ -1,5 +1,7 @@
 //! Where the liquid ends: walls, the extra vertices within them, and the averages for dry and extra vertices (thesis 4.2.3).
 
+use std::ops::Range;
+
 use crate::shallow::columns::{NONE, STRIP};
 use crate::shallow::surface::quartets::links::{RING, Scene, are_near, cell_at};
 use crate::shallow::surface::quartets::strips::{Found, positions};
@@ -27,7 +29,7 @@ impl Wall {
 }
 
 /// Positions of a column's walls in a list in order of columns.
-pub(in crate::shallow::surface) fn walls_of(list: &[Wall], column: u32) -> std::ops::Range<usize> {
+pub(in crate::shallow::surface) fn walls_of(list: &[Wall], column: u32) -> Range<usize> {
     let first = list.partition_point(|wall| wall.column < column);
     let count = list[first..].iter().take_while(|wall| wall.column == column).count();
     first..first + count

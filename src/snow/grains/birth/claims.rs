@@ -3,8 +3,9 @@
 
 use crate::error::Result;
 use crate::geometry::DVec3;
+use crate::snow::bounds::bounds;
 use crate::snow::grains::colliders::shell::Shell;
-use crate::snow::grains::surroundings::{Bounds, Object, bounds};
+use crate::snow::grains::surroundings::{Bounds, Object};
 
 /// Count of poses that are examined in a step.
 const MOMENTS: u32 = 9;

@@ -1,5 +1,5 @@
 //! Snow that was removed becomes grains.
 
-pub(in crate::snow::grains) mod claims;
-pub(in crate::snow::grains) mod removed_snow;
-pub(in crate::snow::grains) mod sourcing;
+pub(super) mod claims;
+pub(super) mod removed_snow;
+pub(super) mod sourcing;

@@ -44,11 +44,7 @@ pub fn removals(before: &FloatGrid, after: &FloatGrid) -> Result<Vec<Removal>> {
 }
 
 /// The snow removed from blocks; blocks that lost none are omitted.
-pub(in crate::snow::grains::birth) fn volumes(
-    before: &FloatGrid,
-    after: &FloatGrid,
-    origins: &[Origin],
-) -> Result<Vec<Removal>> {
+pub(super) fn volumes(before: &FloatGrid, after: &FloatGrid, origins: &[Origin]) -> Result<Vec<Removal>> {
     let cell = after.voxel_size() as f32;
     let (old, new) = (before.probe(origins)?, after.probe(origins)?);
     let removed = origins.par_iter().zip(old.par_iter().zip(&new)).map(|(origin, (old, new))| {
@@ -59,7 +55,7 @@ pub(in crate::snow::grains::birth) fn volumes(
 }
 
 /// Volume (cells) that a block lost.
-pub(in crate::snow::grains::birth) fn lost(old: &Probe<'_>, new: &Probe<'_>, cell: f32) -> f64 {
+pub(super) fn lost(old: &Probe<'_>, new: &Probe<'_>, cell: f32) -> f64 {
     let volume = |probe: &Probe<'_>| match probe {
         Probe::Leaf(leaf) => voxel_fill::volume(leaf.values, cell),
         Probe::Tile { value, .. } => f64::from(filled(*value, cell)) * VOXELS as f64,
@@ -138,7 +134,7 @@ impl Before<'_> {
 }
 
 /// A block and its neighbours.
-pub(in crate::snow::grains::birth) fn around([x, y, z]: Origin) -> impl Iterator<Item = Origin> {
+pub(super) fn around([x, y, z]: Origin) -> impl Iterator<Item = Origin> {
     let side = |at: i32| [-1, 0, 1].map(|step| at + step * DIM as i32);
     let rows = side(x).into_iter().flat_map(move |x| side(y).map(move |y| [x, y]));
     rows.flat_map(move |[x, y]| side(z).map(move |z| [x, y, z]))

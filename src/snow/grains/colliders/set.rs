@@ -2,10 +2,11 @@
 
 use super::field::Field;
 use super::shell::Shell;
-use super::touch;
-use super::touch::Touch;
+use super::touch::{self, Touch};
 use crate::error::Result;
 use crate::geometry::DVec3;
+use crate::snow::grains::solver::blocks::{Block, EDGE};
+use crate::snow::grains::solver::pairs::SKIN;
 use crate::snow::grains::solver::rows::{Row, norm};
 
 /// Colliders: grains cannot move them.
@@ -32,19 +33,16 @@ impl Floor {
     /// Touches of a block's members near the floor.
     pub(in crate::snow::grains) fn touches(
         &self,
-        block: &crate::snow::grains::solver::blocks::Block,
+        block: &Block,
         rows: &[Row],
         diameter: f64,
         reach: f32,
     ) -> Vec<Touch> {
         // Height of the floor above the bottom of the block (diameters).
-        let height = (self.height / diameter
-            - f64::from(block.at[1]) * f64::from(crate::snow::grains::solver::blocks::EDGE))
-            as f32;
+        let height = (self.height / diameter - f64::from(block.at[1]) * f64::from(EDGE)) as f32;
         let near = block.members.iter().filter(|slot| {
             let row = &rows[**slot as usize];
-            row.position[1] - height - 0.5
-                < crate::snow::grains::solver::pairs::SKIN + norm(row.velocity) * reach
+            row.position[1] - height - 0.5 < SKIN + norm(row.velocity) * reach
         });
         let touch = |&grain: &u32| Touch {
             grain,

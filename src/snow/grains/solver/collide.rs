@@ -2,8 +2,7 @@
 
 use super::density::SURROUNDED;
 use super::pairs::Batch;
-use super::rest;
-use super::rest::Rest;
+use super::rest::{self, Rest};
 use super::rows::{Part, Row, SUPPORTED, Shared, V, add, dot, scaled, sub};
 use crate::numeric::lanes::{LaneMask, Lanes};
 

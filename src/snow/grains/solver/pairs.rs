@@ -13,7 +13,7 @@ pub const SKIN: f32 = 0.25;
 pub const THIN_SKIN: f32 = 0.12;
 
 /// Bits of the slot in a code; the bits above are the step to the block of the other grain, two bits per axis.
-pub(in crate::snow::grains::solver) const INDEX: u32 = 26;
+pub(super) const INDEX: u32 = 26;
 
 /// Eight pairs that share no grain. Unused lanes repeat the first one.
 #[derive(Clone, Copy)]
@@ -103,6 +103,6 @@ impl Held {
 
 /// The slot in a code.
 #[inline(always)]
-pub(in crate::snow::grains::solver) fn other(code: u32) -> u32 {
+pub(super) fn other(code: u32) -> u32 {
     code & ((1 << INDEX) - 1)
 }

@@ -4,6 +4,7 @@ use super::blocks::At;
 use super::rows::{V, dot};
 use crate::error::Result;
 use crate::geometry::DVec3;
+use crate::snow::bounds::bounds;
 use crate::snow::grains::colliders::field::Window;
 use crate::snow::grains::colliders::nearby::Nearby;
 use crate::snow::grains::colliders::set::{Colliders, Floor, Pose};
@@ -94,9 +95,7 @@ impl<'a> Surfaces<'a> {
 
     /// Collects the triangles near positions (m) for [`Surfaces::release`].
     pub fn find(&self, positions: impl Iterator<Item = DVec3>, nearby: &mut Vec<Nearby>) {
-        let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
-        let [low, high] =
-            positions.fold(none, |[low, high], position| [low.inf(&position), high.sup(&position)]);
+        let [low, high] = bounds(positions);
         let room = DVec3::repeat((FARTHEST + 0.5) * self.diameter);
         nearby.resize_with(self.shells.len(), Nearby::default);
         for ((shell, _), nearby) in self.shells.iter().zip(nearby) {
@@ -113,9 +112,7 @@ impl<'a> Surfaces<'a> {
         };
         let mut position = from;
         for _ in 0..ROUNDS {
-            let mut is_out = true;
-            self.for_each_way_out(&mut position, nearby, false, |depth| is_out &= depth <= ROUNDED * DEEP);
-            if is_out {
+            if self.push_out(&mut position, nearby, false) {
                 return (way(position), false);
             }
             if (position - from).norm() > FARTHEST * self.diameter {
@@ -123,34 +120,24 @@ impl<'a> Surfaces<'a> {
             }
         }
         position = from;
-        for _ in 0..ROUNDS {
-            let mut is_out = true;
-            self.for_each_way_out(&mut position, nearby, true, |depth| is_out &= depth <= ROUNDED * DEEP);
-            if is_out {
-                break;
-            }
-        }
+        let _ = (0..ROUNDS).any(|_| self.push_out(&mut position, nearby, true));
         (way(position), true)
     }
 
-    /// Moves a position (m) out of each surface in turn, or only out of ground, and reports its depth (diameters) in each.
-    fn for_each_way_out(
-        &self,
-        position: &mut DVec3,
-        nearby: &mut [Nearby],
-        only_ground: bool,
-        mut tell: impl FnMut(f64),
-    ) {
+    /// Moves a position (m) out of each surface in turn, or only out of ground; returns whether it was outside of all.
+    fn push_out(&self, position: &mut DVec3, nearby: &mut [Nearby], only_ground: bool) -> bool {
         let half = 0.5 * self.diameter;
+        let mut is_out = true;
+        let mut tell = |depth: f64| is_out &= depth / self.diameter <= ROUNDED * DEEP;
         if let Some(floor) = &self.floor {
             let depth = floor.height + half - position.y;
-            tell(depth / self.diameter);
+            tell(depth);
             position.y += depth.max(0.0);
         }
         if let Some((cell, window)) = self.field.as_ref().filter(|_| !only_ground) {
             let (distance, gradient) = window.sample([0, 1, 2].map(|axis| position[axis] / cell));
             let depth = half - f64::from(distance);
-            tell(depth / self.diameter);
+            tell(depth);
             let steep = dot(gradient, gradient).sqrt();
             if depth > 0.0 && steep > 1.0e-6 {
                 *position += DVec3::from(gradient.map(f64::from)) * (depth / f64::from(steep));
@@ -162,10 +149,11 @@ impl<'a> Surfaces<'a> {
             }
             let nearest = nearby.nearest(shell, *position, DEPTHS * half);
             if let Some((depth, out)) = shell.depth_beside(*position, half, nearest) {
-                tell(depth / self.diameter);
+                tell(depth);
                 *position += out * depth.max(0.0);
             }
         }
+        is_out
     }
 }
 

@@ -1,8 +1,8 @@
 //! Forces on the air.
 
 mod coarse_grid;
-pub(in crate::snow::mist) mod turbulence;
-pub(in crate::snow::mist) mod wind;
+pub(super) mod turbulence;
+pub(super) mod wind;
 
 use rayon::prelude::*;
 

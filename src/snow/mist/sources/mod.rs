@@ -1,6 +1,6 @@
 //! Where grains raise mist (thesis section 3.4.2): in a tube of twice the grain's radius along the path of each fast grain within the frame.
 
-pub(in crate::snow::mist) mod new_mist;
+pub(super) mod new_mist;
 
 use rayon::prelude::*;
 
@@ -9,6 +9,7 @@ use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::flow::{Coord, Tile};
 use crate::geometry::DVec3;
+use crate::numeric::checks::ensure;
 
 /// Maximum coordinate of a grain (cells).
 const FARTHEST_CELL: f64 = 1e7;
@@ -48,21 +49,21 @@ impl Source {
     pub(super) fn check(&self, cell: f64) -> Result<()> {
         let [x, y, z] = self.position.into();
         let at = format!("grain at ({x:.3}, {y:.3}, {z:.3}) m");
-        if !self.position.iter().all(|x| x.abs() <= FARTHEST_CELL * cell) {
-            return Err(Error::argument(format!(
-                "the {at} is farther than {FARTHEST_CELL:.0} cells from the origin"
-            )));
-        }
+        ensure(
+            self.position.iter().all(|x| x.abs() <= FARTHEST_CELL * cell),
+            format_args!("the {at} is farther than {FARTHEST_CELL:.0} cells from the origin"),
+        )?;
         if !self.velocity.iter().all(|speed| speed.is_finite()) {
             return Err(Error::argument(format!("the velocity of the {at} is not finite")));
         }
         if let Some(start) = self.start {
             let is_near = start.position.iter().all(|x| x.abs() <= FARTHEST_CELL * cell);
-            if !(is_near && start.velocity.iter().all(|speed| speed.is_finite())) {
-                return Err(Error::argument(format!(
+            ensure(
+                is_near && start.velocity.iter().all(|speed| speed.is_finite()),
+                format_args!(
                     "the {at} began the step with a velocity that is not finite, or farther than {FARTHEST_CELL:.0} cells from the origin"
-                )));
-            }
+                ),
+            )?;
         }
         let most = LARGEST * cell;
         if !(0.0..=most).contains(&self.radius) {

@@ -4,6 +4,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::flow::Coord;
 use crate::geometry::DVec3;
+use crate::snow::bounds::bounds;
 use crate::snow::grains::colliders::field::Window;
 use crate::vdb::FloatGrid;
 
@@ -30,9 +31,7 @@ impl Lattice {
     /// Minimum and maximum corner (m) of tiles.
     pub fn bounds(&self, tiles: &[Coord]) -> [DVec3; 2] {
         let low = |coord: &Coord| DVec3::from(coord.map(f64::from)) * (8.0 * self.cell);
-        let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
-        let [least, greatest] =
-            tiles.iter().map(low).fold(none, |[least, most], at| [least.inf(&at), most.sup(&at)]);
+        let [least, greatest] = bounds(tiles.iter().map(low));
         [least, greatest.add_scalar(8.0 * self.cell)]
     }
 

@@ -18,6 +18,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::flow::{Coord, Faces, Solids, Tiles};
 use crate::geometry::DVec3;
+use crate::snow::bounds::bounds;
 use crate::snow::grains::colliders::shell::Shell;
 use crate::snow::grains::{FASTEST_OBJECT, HOLES};
 use crate::sweep::{self, Body, Settings};
@@ -137,9 +138,7 @@ impl<'a> Moving<'a> {
         // A rotation may carry vertices outside the bounding box of both poses.
         let room = DVec3::repeat(if jumps { 0.0 } else { farthest });
         let positions = last.iter().chain(first.iter().filter(|_| !jumps));
-        let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
-        let [low, high] =
-            positions.fold(none, |[low, high], position| [low.inf(position), high.sup(position)]);
+        let [low, high] = bounds(positions);
         Ok(Self {
             body,
             is_sheet,
@@ -219,8 +218,7 @@ impl Walls<'_> {
         let raising = sources.iter().filter(|source| source.raises(mist.params()));
         let positions =
             raising.map(|source| source.position).chain(lattice.bounds(mist.flow().tiles().coords()));
-        let none = [DVec3::repeat(f64::MAX), DVec3::repeat(f64::MIN)];
-        let bounds = positions.fold(none, |[low, high], at| [low.inf(&at), high.sup(&at)]);
+        let bounds = bounds(positions);
         let near = self.bodies.iter().filter(|body| body.is_near(&bounds, NEAR * cell));
         near.map(|body| body.speed).fold(0.0, f64::max)
     }
