@@ -246,7 +246,6 @@ pub unsafe extern "C" fn frz_tracker_ahead(
     guard(|| unsafe {
         let mut follower = change(tracker)?;
         let particles = self::particles(particles)?;
-        particles.validate()?;
         follower.tracker.set_ahead(std::sync::Arc::new(particles));
         Ok(())
     })
