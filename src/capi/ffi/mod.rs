@@ -17,3 +17,4 @@ pub(in crate::capi) use lists::*;
 pub(in crate::capi) mod saved;
 
 pub(in crate::capi) mod fields;
+pub(in crate::capi) use fields::*;

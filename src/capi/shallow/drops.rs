@@ -1,17 +1,16 @@
 //! Shallow liquid in the air: its drops, and their mesh.
 
-use super::snapshot::{Taken, frz_shallow_snapshot};
-use super::spill::{ShallowHandle, frz_shallow};
+use super::calls::informs;
+use super::lists::list;
+use super::snapshot::frz_shallow_snapshot;
+use super::spill::frz_shallow;
 use super::surface::{
-    Buffer, NO_SPAN, check_buffers, check_room, frz_shallow_layout, frz_shallow_size, indices_in, layout,
+    Buffer, Wanted, check_buffers, check_room, frz_shallow_layout, frz_shallow_size, indices_in, writes,
 };
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{change, read, required};
-use crate::capi::ffi::views::{Plain, Sized32, fill, frz_span, sized};
-use crate::capi::runtime::context::{enter_light, frz_context};
+use crate::capi::ffi::*;
+use crate::capi::runtime::context::frz_context;
 use crate::shallow::free_fall::Droplet;
 use crate::shallow::free_fall::mesh::{Balls, Target, bound};
-use crate::shallow::surface::{Counts, Layout};
 
 /// A drop of liquid in the air.
 #[repr(C)]
@@ -46,18 +45,6 @@ impl From<Droplet> for frz_shallow_drop {
     }
 }
 
-/// Lists drops, or only counts them.
-///
-/// # Safety
-/// The span must describe memory that can be written, and `count` must be NULL or valid.
-unsafe fn list(drops: impl ExactSizeIterator<Item = Droplet>, dst: &frz_span, count: *mut usize) -> Outcome {
-    // SAFETY: guaranteed by the caller.
-    unsafe {
-        required(count, "count")?.write_unaligned(drops.len());
-        if dst.data.is_null() { Ok(()) } else { dst.put("dst", drops.map(frz_shallow_drop::from)) }
-    }
-}
-
 /// Lists the drops in the air, in the order in which they left their edges, in real time (frz_shallow).
 ///
 /// dst: room for a frz_shallow_drop for each, at most frz_shallow_params.falls_most. With data NULL only the count is reported.
@@ -71,12 +58,10 @@ pub unsafe extern "C" fn frz_shallow_drops(
     dst: frz_span,
     count: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            required(count, "count")?.write_unaligned(0);
-            list(read(shallow)?.shallow.drops(), &dst, count)
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        required(count, "count")?.write_unaligned(0);
+        list(read(shallow)?.shallow.drops().map(frz_shallow_drop::from), &dst, count)
     })
 }
 
@@ -92,12 +77,10 @@ pub unsafe extern "C" fn frz_shallow_snapshot_drops(
     dst: frz_span,
     count: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            required(count, "count")?.write_unaligned(0);
-            list(read(snapshot)?.snapshot.drops().iter().copied(), &dst, count)
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        required(count, "count")?.write_unaligned(0);
+        list(read(snapshot)?.snapshot.drops().iter().copied().map(frz_shallow_drop::from), &dst, count)
     })
 }
 
@@ -123,21 +106,10 @@ pub struct frz_shallow_drops_target {
 
 // SAFETY: numbers and pointers.
 unsafe impl Sized32 for frz_shallow_drops_target {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_drops_target";
 }
 
 impl frz_shallow_drops_target {
-    const NONE: Self = Self {
-        struct_size: 0,
-        index_bits: 0,
-        positions: NO_SPAN,
-        normals: NO_SPAN,
-        velocities: NO_SPAN,
-        drops: NO_SPAN,
-        indices: NO_SPAN,
-    };
-
     fn buffers(&self) -> [Buffer<'_>; 5] {
         [
             ("positions", &self.positions, 12, true),
@@ -168,49 +140,20 @@ impl frz_shallow_drops_target {
     }
 }
 
-/// What a mesh of drops is made from and into.
-struct Wanted {
-    layout: Layout,
-    given: frz_shallow_drops_target,
-    size: *mut frz_shallow_size,
-}
-
-impl Wanted {
-    /// The request of a host.
-    ///
-    /// # Safety
-    /// The pointers must be NULL or valid.
-    unsafe fn new(
-        given: *const frz_shallow_layout,
-        target: *const frz_shallow_drops_target,
-        size: *mut frz_shallow_size,
-    ) -> Outcome<Self> {
-        // SAFETY: guaranteed by the caller.
-        unsafe {
-            if !size.is_null() {
-                fill(size, None, Counts::default().into())?;
-            }
-            let (layout, _) = layout(given)?;
-            Ok(Self { layout, given: sized(target, frz_shallow_drops_target::NONE)?, size })
-        }
-    }
-
+impl Wanted<frz_shallow_drops_target> {
     /// Writes the mesh and its size.
     ///
     /// # Safety
     /// As in [`Wanted::new`], and the spans must describe memory that can be written.
-    unsafe fn write(&self, balls: &mut Balls, drops: &[Droplet]) -> Outcome {
+    unsafe fn write_drops(&self, balls: &mut Balls, drops: &[Droplet]) -> Outcome {
         // SAFETY: guaranteed by the caller.
-        unsafe {
-            let mut target = self.given.target()?;
-            let counts = balls.count(drops);
-            if !self.size.is_null() {
-                fill(self.size, None, counts.into())?;
-            }
-            check_room(&self.given.buffers(), &counts)?;
-            balls.build(drops, &self.layout, &mut target)?;
-            Ok(())
-        }
+        let mut target = unsafe { self.given.target() }?;
+        let counts = balls.count(drops);
+        // SAFETY: as above.
+        unsafe { self.tell(counts) }?;
+        check_room(&self.given.buffers(), &counts)?;
+        balls.build(drops, &self.layout, &mut target)?;
+        Ok(())
     }
 }
 
@@ -224,14 +167,13 @@ pub unsafe extern "C" fn frz_shallow_drops_bound(
     shallow: *const frz_shallow,
     size: *mut frz_shallow_size,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            fill(size, None, Counts::default().into())?;
+    // SAFETY: the pointers are NULL or valid.
+    unsafe {
+        informs(size, || {
             let most = read(shallow)?.shallow.params().falls.map_or(0, |falls| falls.most);
-            fill(size, None, bound(most).into())
-        }
-    })
+            Ok(bound(most))
+        })
+    }
 }
 
 /// Writes the liquid in the air as triangles, in real time (frz_shallow): a sphere for each drop, and strands between consecutive drops
@@ -251,18 +193,14 @@ pub unsafe extern "C" fn frz_shallow_drops_mesh(
     target: *const frz_shallow_drops_target,
     size: *mut frz_shallow_size,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so are the spans.
-        unsafe {
-            let wanted = Wanted::new(layout, target, size)?;
-            let _call = enter_light(context)?;
-            let mut spill = change(shallow)?;
-            let ShallowHandle { shallow, balls, drops, .. } = &mut *spill;
-            drops.clear();
-            drops.extend(shallow.drops());
-            wanted.write(balls, drops)
-        }
-    })
+    // SAFETY: the pointers are NULL or valid, and so are the spans.
+    unsafe {
+        writes(context, shallow, (layout, target, size), |spill, wanted| {
+            spill.drops.clear();
+            spill.drops.extend(spill.shallow.drops());
+            wanted.write_drops(&mut spill.balls, &spill.drops)
+        })
+    }
 }
 
 /// Writes the liquid that was in the air when a snapshot was taken, as frz_shallow_drops_mesh does, in real time (frz_shallow).
@@ -281,14 +219,10 @@ pub unsafe extern "C" fn frz_shallow_snapshot_drops_mesh(
     target: *const frz_shallow_drops_target,
     size: *mut frz_shallow_size,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so are the spans.
-        unsafe {
-            let wanted = Wanted::new(layout, target, size)?;
-            let _call = enter_light(context)?;
-            let mut taken = change(snapshot)?;
-            let Taken { snapshot, balls, .. } = &mut *taken;
-            wanted.write(balls, snapshot.drops())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid, and so are the spans.
+    unsafe {
+        writes(context, snapshot, (layout, target, size), |taken, wanted| {
+            wanted.write_drops(&mut taken.balls, taken.snapshot.drops())
+        })
+    }
 }

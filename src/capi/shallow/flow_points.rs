@@ -1,9 +1,7 @@
 //! Flow points of a host, and the triangles that they move with.
 
 use super::ground::Terrain;
-use super::lists::each_sized;
-use crate::capi::ffi::guard::{Failure, Outcome};
-use crate::capi::ffi::views::{Sized32, meaning};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::shallow::sources::{FlowPoint, Kind, Pulse};
 
@@ -67,25 +65,7 @@ pub struct frz_shallow_flow {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_flow {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_flow";
-}
-
-impl frz_shallow_flow {
-    const NONE: Self = Self {
-        struct_size: 0,
-        flags: 0,
-        kind: 0,
-        triangle: 0,
-        shares: [0.0; 3],
-        at: [0.0; 3],
-        radius: 0.0,
-        rate: 0.0,
-        capacity: 0.0,
-        pulse_frequency: 0.0,
-        pulse_share: 0.0,
-        opening: 0.0,
-    };
 }
 
 /// A flow point, and the triangle that it moves with.
@@ -97,25 +77,7 @@ pub(in crate::capi) struct Attached {
 }
 
 impl Attached {
-    /// The flow points of a host.
-    ///
-    /// # Safety
-    /// As [`each_sized`].
-    pub(in crate::capi) unsafe fn all(
-        flows: *const frz_shallow_flow,
-        count: usize,
-        terrain: &Terrain,
-    ) -> Outcome<Vec<Self>> {
-        let mut attached = Vec::with_capacity(count.min(1 << 16));
-        let take = |given: frz_shallow_flow| {
-            attached.push(Self::of(&given, terrain)?);
-            Ok(())
-        };
-        // SAFETY: guaranteed by the caller.
-        unsafe { each_sized(flows, count, ["flow", "flows"], frz_shallow_flow::NONE, take) }?;
-        Ok(attached)
-    }
-
+    /// A flow point of a host.
     pub fn of(given: &frz_shallow_flow, terrain: &Terrain) -> Outcome<Self> {
         no_flags(given.flags, FRZ_SHALLOW_ON_TRIANGLE)?;
         let kind = match meaning("kind", "frz_shallow_flow_kind", given.kind, &KINDS)? {
@@ -128,14 +90,10 @@ impl Attached {
         let on = is_attached.then_some((given.triangle, given.shares));
         if let Some((_, shares)) = &on {
             let sum: f64 = shares.iter().sum();
-            if sum.is_nan() || (sum - 1.0).abs() >= 1e-6 {
-                return Err(Failure::argument(format!("the sum of the shares {shares:?} is not 1")));
-            }
+            let is_one = (sum - 1.0).abs() < 1e-6;
+            refuse(!is_one, || format!("the sum of the shares {shares:?} is not 1"))?;
         }
-        let at = match &on {
-            None => given.at,
-            Some(on) => terrain.position(on)?,
-        };
+        let at = on.as_ref().map_or(Ok(given.at), |on| terrain.position(on))?;
         let pulse = Pulse { frequency: given.pulse_frequency, share: given.pulse_share };
         let pulse = (pulse.frequency != 0.0).then_some(pulse);
         Ok(Self { point: FlowPoint { kind, at, radius: given.radius, rate: given.rate, pulse }, on })

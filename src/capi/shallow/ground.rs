@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use crate::capi::ffi::guard::{Failure, Outcome};
-use crate::capi::ffi::views::frz_view;
+use super::lists::one_for_each;
+use crate::capi::ffi::*;
 use crate::context::Context;
+use crate::error::Result;
 use crate::geometry::{TriMesh, Vec3};
 use crate::shallow::columns::grid::{BOTTOMLESS, Grid, Heights};
 use crate::shallow::terrain::facing::facing;
@@ -43,17 +44,16 @@ impl Terrain {
         if let Some(what) = orientation.warning() {
             ctx.warn(&format!("the mesh: {what}"));
         }
-        let mut caster = Caster::new(grid, heights)?;
-        let solids = ctx.phase("cast", || {
-            caster.cast(&mesh.positions, &triangles, all_cells(&grid))?;
-            let mut solids = Solids::empty(grid, heights);
-            (0..grid.cells()).for_each(|cell| solids.push(caster.at(cell)));
-            Ok(solids)
-        })?;
-        let positions = mesh.positions.clone();
-        let own = (!orientation.is_unchanged()).then(|| mesh.triangles.clone());
-        let coming = Vec::with_capacity(positions.len());
-        Ok((Self::Mesh(Box::new(Moving { positions, coming, triangles, own, caster })), solids))
+        let mut moving = Box::new(Moving {
+            positions: Vec::with_capacity(mesh.positions.len()),
+            coming: mesh.positions.clone(),
+            triangles,
+            own: (!orientation.is_unchanged()).then(|| mesh.triangles.clone()),
+            caster: Caster::new(grid, heights)?,
+        });
+        let solids = ctx.phase("cast", || moving.cast(grid, heights))?;
+        moving.come();
+        Ok((Self::Mesh(moving), solids))
     }
 
     /// The ground of a height for each cell (m), and its solids.
@@ -82,6 +82,22 @@ impl Terrain {
             })
         })?;
         Ok((Self::LevelSet, solids))
+    }
+
+    /// The mesh, to move it.
+    pub(in crate::capi) fn mesh(&mut self) -> Outcome<&mut Moving> {
+        match self {
+            Self::Mesh(mesh) => Ok(mesh),
+            _ => Err(Failure::argument("the liquid was not made with a mesh that could move")),
+        }
+    }
+
+    /// The solids of a height field, to change it.
+    pub(in crate::capi) fn heights(&mut self) -> Outcome<&mut Vec<[Solid; 1]>> {
+        match self {
+            Self::Heights(solids) => Ok(solids),
+            _ => Err(Failure::argument("the liquid was not made on a height field that could change")),
+        }
     }
 
     /// The position (m) on a triangle with these barycentric coordinates.
@@ -113,7 +129,7 @@ pub(in crate::capi) struct Moving {
 
 impl Moving {
     /// The solids of all cells with the incoming vertices.
-    pub(in crate::capi) fn cast(&mut self, grid: Grid, heights: Heights) -> Outcome<Solids> {
+    pub(in crate::capi) fn cast(&mut self, grid: Grid, heights: Heights) -> Result<Solids> {
         self.caster.cast(&self.coming, &self.triangles, all_cells(&grid))?;
         let mut solids = Solids::empty(grid, heights);
         (0..grid.cells()).for_each(|cell| solids.push(self.caster.at(cell)));
@@ -130,13 +146,10 @@ impl Moving {
     /// # Safety
     /// The view must describe memory that can be read.
     pub(in crate::capi) unsafe fn take(&mut self, positions: &frz_view) -> Outcome {
-        // SAFETY: guaranteed by the caller.
-        let given = unsafe { positions.in_place::<[f32; 3]>("positions") }?;
         let count = self.positions.len();
-        if given.len() != count {
-            let text = format!("positions: {} elements, but the mesh has {count} vertices", given.len());
-            return Err(Failure::argument(text));
-        }
+        // SAFETY: guaranteed by the caller.
+        let given =
+            unsafe { one_for_each::<[f32; 3]>(positions, "positions", count, ["the mesh has", "vertices"]) }?;
         self.coming.clear();
         self.coming.extend(given.map(Vec3::from));
         let is_wild = |position: &Vec3| !position.iter().all(|number| number.is_finite());
@@ -148,7 +161,7 @@ impl Moving {
 }
 
 /// All cells of a grid.
-fn all_cells(grid: &Grid) -> [Range<usize>; 2] {
+pub(in crate::capi) fn all_cells(grid: &Grid) -> [Range<usize>; 2] {
     grid.size.map(|count| 0..count)
 }
 
@@ -167,9 +180,7 @@ pub(in crate::capi) unsafe fn cells_in(grid: &Grid, bounds: *const f64) -> Outco
     let bounds = unsafe { bounds.cast::<[f64; 4]>().read_unaligned() };
     let [x0, z0, x1, z1] = bounds;
     // Negated, so that NaN is refused too.
-    if !(x0 <= x1 && z0 <= z1) {
-        return Err(Failure::argument(format!("bounds = {bounds:?} m have no inside")));
-    }
+    refuse(!(x0 <= x1 && z0 <= z1), || format!("bounds = {bounds:?} m have no inside"))?;
     let range = |axis: usize, low: f64, high: f64| {
         let count = grid.size[axis] as f64;
         // In cells, from the centre of the first; rounding excludes none.
@@ -192,12 +203,9 @@ pub(in crate::capi) unsafe fn read_heights(
     [across, rows]: [Range<usize>; 2],
     solids: &mut Vec<[Solid; 1]>,
 ) -> Outcome {
+    let count = grid.cells();
     // SAFETY: guaranteed by the caller.
-    let tops = unsafe { heights.in_place::<f32>("heights") }?;
-    if tops.len() != grid.cells() {
-        let text = format!("heights: {} elements, but there are {} cells", tops.len(), grid.cells());
-        return Err(Failure::argument(text));
-    }
+    let tops = unsafe { one_for_each::<f32>(heights, "heights", count, ["there are", "cells"]) }?;
     if let Some(at) = tops.clone().position(|top| !top.is_finite()) {
         return Err(Failure::argument(format!("heights: element {at} is not finite")));
     }

@@ -1,16 +1,16 @@
 //! Small amounts of liquid on a terrain, in real time.
 
+use super::calls::changes;
 use super::ground::Terrain;
-use super::params::{domain, frz_shallow_domain, frz_shallow_params, params};
+use super::lists::list;
+use super::params::{frz_shallow_domain, frz_shallow_params};
 use super::spill::{ShallowHandle, frz_shallow};
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{change, destroy, read, required};
-use crate::capi::ffi::views::{Sized32, fill, frz_span, frz_view, within};
+use super::surroundings::Setup;
+use crate::capi::ffi::*;
 #[cfg(feature = "vdb")]
 use crate::capi::grid::sparse::frz_grid;
 use crate::capi::mesh::triangles::frz_mesh;
-use crate::capi::runtime::context::{creates, enter_light, frz_context};
-use crate::context::Context;
+use crate::capi::runtime::context::{creates, frz_context};
 use crate::shallow::Report;
 use crate::shallow::time_step::MOST_STEPS;
 
@@ -39,22 +39,14 @@ pub struct frz_shallow_report {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_report {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_report";
 }
 
+fields_of!(Report => frz_shallow_report { steps, seconds, deepest, emptied, filled, slowed });
+
 impl frz_shallow_report {
-    pub(in crate::capi) fn of(done: &Report, dt: f64) -> Self {
-        Self {
-            struct_size: 0,
-            steps: done.steps,
-            seconds: done.seconds,
-            dropped: (dt - done.seconds).max(0.0),
-            deepest: done.deepest,
-            emptied: done.emptied,
-            filled: done.filled,
-            slowed: done.slowed,
-        }
+    pub(in crate::capi) fn of(done: Report, dt: f64) -> Self {
+        Self { dropped: (dt - done.seconds).max(0.0), ..done.into() }
     }
 }
 
@@ -81,11 +73,8 @@ pub unsafe extern "C" fn frz_shallow_create(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
-            let params = self::params(params)?;
-            let (grid, heights) = self::domain(ctx, domain)?;
-            let mesh = read(mesh)?;
-            let (terrain, solids) = Terrain::of_mesh(ctx, &mesh.triangles, grid, heights)?;
-            ShallowHandle::new(ctx, params, terrain, &solids)
+            let terrain = |grid, range| Terrain::of_mesh(ctx, &read(mesh)?.triangles, grid, range);
+            ShallowHandle::new(ctx, Setup::new(ctx, params, domain, terrain)?)
         })
     }
 }
@@ -110,11 +99,8 @@ pub unsafe extern "C" fn frz_shallow_create_heights(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
-            let params = self::params(params)?;
-            let (grid, range) = self::domain(ctx, domain)?;
-            let tops = heights.in_place::<f32>("heights")?;
-            let (terrain, solids) = Terrain::of_heights(tops, grid, range)?;
-            ShallowHandle::new(ctx, params, terrain, &solids)
+            let terrain = |grid, range| Terrain::of_heights(heights.in_place::<f32>("heights")?, grid, range);
+            ShallowHandle::new(ctx, Setup::new(ctx, params, domain, terrain)?)
         })
     }
 }
@@ -140,11 +126,8 @@ pub unsafe extern "C" fn frz_shallow_create_grid(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
-            let params = self::params(params)?;
-            let (grid, heights) = self::domain(ctx, domain)?;
-            let held = read(level_set)?;
-            let (terrain, solids) = Terrain::of_level_set(ctx, held.floats()?, grid, heights)?;
-            ShallowHandle::new(ctx, params, terrain, &solids)
+            let terrain = |grid, range| Terrain::of_level_set(ctx, read(level_set)?.floats()?, grid, range);
+            ShallowHandle::new(ctx, Setup::new(ctx, params, domain, terrain)?)
         })
     }
 }
@@ -170,14 +153,8 @@ pub unsafe extern "C" fn frz_shallow_set_params(
     shallow: *mut frz_shallow,
     params: *const frz_shallow_params,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut spill = change(shallow)?;
-            required(params.cast_mut(), frz_shallow_params::NAME)?;
-            Ok(spill.shallow.set_params(self::params(params)?)?)
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe { Ok(change(shallow)?.shallow.set_params(given(params)?.params()?)?) })
 }
 
 /// Computes a frame, in real time (frz_shallow), in steps as frz_shallow_params.pace states.
@@ -197,19 +174,17 @@ pub unsafe extern "C" fn frz_shallow_step(
     budget_seconds: f64,
     report: *mut frz_shallow_report,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            computes(context, shallow, report, |ctx, spill| {
-                within("budget_seconds", budget_seconds, 0.0..=1e6, " s")?;
-                let done = match budget_seconds {
-                    0.0 => spill.shallow.step(ctx, dt),
-                    budget => spill.shallow.step_within(ctx, dt, budget),
-                };
-                Ok((done?, dt))
-            })
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    unsafe {
+        changes(context, shallow, report, |ctx, spill| {
+            within("budget_seconds", budget_seconds, 0.0..=1e6, " s")?;
+            let done = match budget_seconds {
+                0.0 => spill.shallow.step(ctx, dt),
+                budget => spill.shallow.step_within(ctx, dt, budget),
+            };
+            Ok(frz_shallow_report::of(done?, dt))
+        })
+    }
 }
 
 /// Computes a frame with given steps, in real time (frz_shallow): from the same state, with the same parameters, flow points and bodies,
@@ -227,40 +202,16 @@ pub unsafe extern "C" fn frz_shallow_replay(
     steps: frz_view,
     report: *mut frz_shallow_report,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            computes(context, shallow, report, |ctx, spill| {
-                let ShallowHandle { shallow, steps: own, .. } = spill;
-                let given = steps.in_place::<f64>("steps")?;
-                within("the count of steps", given.len() as f64, 1.0..=f64::from(MOST_STEPS), "")?;
-                own.clear();
-                own.extend(given);
-                let dt = own.iter().sum();
-                Ok((shallow.replay(ctx, own)?, dt))
-            })
-        }
-    })
-}
-
-/// A call that computes a frame and reports it.
-///
-/// # Safety
-/// The pointers must be NULL or valid.
-unsafe fn computes(
-    context: *mut frz_context,
-    shallow: *mut frz_shallow,
-    report: *mut frz_shallow_report,
-    compute: impl FnOnce(&Context, &mut ShallowHandle) -> Outcome<(Report, f64)>,
-) -> Outcome {
-    // SAFETY: guaranteed by the caller.
+    // SAFETY: the pointers are NULL or valid.
     unsafe {
-        if !report.is_null() {
-            fill(report, None, frz_shallow_report::of(&Report::default(), 0.0))?;
-        }
-        let call = enter_light(context)?;
-        let (done, dt) = compute(call.ctx(), &mut *change(shallow)?)?;
-        if report.is_null() { Ok(()) } else { fill(report, None, frz_shallow_report::of(&done, dt)) }
+        changes(context, shallow, report, |ctx, spill| {
+            let given = steps.in_place::<f64>("steps")?;
+            within("the count of steps", given.len() as f64, 1.0..=f64::from(MOST_STEPS), "")?;
+            spill.steps.clear();
+            spill.steps.extend(given);
+            let dt = spill.steps.iter().sum();
+            Ok(frz_shallow_report::of(spill.shallow.replay(ctx, &spill.steps)?, dt))
+        })
     }
 }
 
@@ -276,15 +227,9 @@ pub unsafe extern "C" fn frz_shallow_last_steps(
     dst: frz_span,
     count: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let count = required(count, "count")?;
-            count.write_unaligned(0);
-            let spill = read(shallow)?;
-            let steps = spill.shallow.last_steps();
-            count.write_unaligned(steps.len());
-            if dst.data.is_null() { Ok(()) } else { dst.fill("dst", steps) }
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        required(count, "count")?.write_unaligned(0);
+        list(read(shallow)?.shallow.last_steps().iter().copied(), &dst, count)
     })
 }

@@ -1,9 +1,8 @@
 //! Loads of shallow liquid on the bodies in it.
 
+use super::lists::{one_for_each, stride_of};
 use super::spill::{ShallowHandle, frz_shallow};
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::change;
-use crate::capi::ffi::views::{Sized32, check_size, fill, frz_view};
+use crate::capi::ffi::*;
 use crate::shallow::Load;
 
 /// The load of a liquid on a body.
@@ -28,36 +27,18 @@ pub struct frz_shallow_load {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_load {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_load";
 }
 
-impl From<Load> for frz_shallow_load {
-    fn from(load: Load) -> Self {
-        let Load { pressure, drag, torque, displaced, wetted } = load;
-        Self { struct_size: 0, reserved: 0, pressure, drag, torque, displaced, wetted }
-    }
-}
+fields_of!(Load => frz_shallow_load { pressure, drag, torque, displaced, wetted });
 
 /// Writes a host's loads, which are contiguous and all of one size.
 ///
 /// # Safety
 /// `dst` must be NULL or point to as many structs as there are loads.
 unsafe fn put(dst: *mut frz_shallow_load, loads: impl ExactSizeIterator<Item = Load>) -> Outcome {
-    if loads.len() == 0 {
-        return Ok(());
-    }
-    if dst.is_null() {
-        return Err(Failure::argument(format!("loads: the data is NULL, but the count is {}", loads.len())));
-    }
-    // SAFETY: guaranteed by the caller: at least the size of one is there.
-    let stride = unsafe { dst.cast::<u32>().read_unaligned() } as usize;
-    check_size::<frz_shallow_load>(stride)?;
-    let sizes = frz_view { data: dst.cast_const().cast(), count: loads.len(), stride };
-    // SAFETY: as above; the sizes must be equal for the structs to be contiguous.
-    if unsafe { sizes.in_place::<u32>("loads") }?.any(|size| size as usize != stride) {
-        return Err(Failure::argument("loads: their struct_size differs"));
-    }
+    // SAFETY: guaranteed by the caller.
+    let stride = unsafe { stride_of(dst.cast_const(), loads.len(), "loads", |failure| failure) }?;
     for (at, load) in loads.enumerate() {
         // SAFETY: as above.
         unsafe { fill(dst.byte_add(at * stride), None, load.into())? };
@@ -83,31 +64,21 @@ pub unsafe extern "C" fn frz_shallow_loads(
     loads: *mut frz_shallow_load,
     count: usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so is the view.
-        unsafe {
-            put(loads, (0..count).map(|_| Load::default()))?;
-            let mut spill = change(shallow)?;
-            let ShallowHandle { shallow, velocities_of_bodies: own, loads: felt, .. } = &mut *spill;
-            let bodies = shallow.bodies().len();
-            if count != bodies {
-                return Err(Failure::argument(format!("count = {count} is not that of the {bodies} bodies")));
-            }
-            own.clear();
-            if velocities.data.is_null() && velocities.count == 0 {
-                own.resize(bodies, [0.0; 3]);
-            } else {
-                let given = velocities.in_place::<[f64; 3]>("velocities")?;
-                if given.len() != bodies {
-                    let text = format!("velocities: {} elements, but there are {bodies} bodies", given.len());
-                    return Err(Failure::argument(text));
-                }
-                own.extend(given);
-            }
-            felt.clear();
-            felt.resize(bodies, Load::default());
-            shallow.loads(density, own, felt)?;
-            put(loads, felt.iter().copied())
+    // SAFETY: the pointers are NULL or valid, and so is the view.
+    guard(|| unsafe {
+        put(loads, (0..count).map(|_| Load::default()))?;
+        let ShallowHandle { shallow, velocities_of_bodies: own, loads: felt, .. } = &mut *change(shallow)?;
+        let bodies = shallow.bodies().len();
+        refuse(count != bodies, || format!("count = {count} is not that of the {bodies} bodies"))?;
+        own.clear();
+        if velocities.data.is_null() && velocities.count == 0 {
+            own.resize(bodies, [0.0; 3]);
+        } else {
+            own.extend(one_for_each::<[f64; 3]>(&velocities, "velocities", bodies, ["there are", "bodies"])?);
         }
+        felt.clear();
+        felt.resize(bodies, Load::default());
+        shallow.loads(density, own, felt)?;
+        put(loads, felt.iter().copied())
     })
 }

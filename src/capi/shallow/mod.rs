@@ -29,6 +29,7 @@ pub mod stains;
 
 pub mod snapshot;
 
-pub(in crate::capi) mod flowing;
+pub(in crate::capi) mod calls;
 pub(in crate::capi) mod ground;
-mod lists;
+pub(in crate::capi) mod lists;
+pub(in crate::capi) mod surroundings;

@@ -1,7 +1,6 @@
 //! The liquid, its parameters and its domain, in C.
 
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::views::{Sized32, fill, meaning, sized, within};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::context::Context;
 use crate::shallow::columns::grid::{Grid, Heights};
@@ -169,43 +168,29 @@ unsafe impl Sized32 for frz_shallow_params {
     const SIZES: &'static [usize] =
         &[std::mem::offset_of!(frz_shallow_params, falls_height), size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_params";
-}
 
-impl frz_shallow_params {
-    pub(in crate::capi) fn defaults() -> Self {
-        let defaults = Params::default();
-        let falls = Falls::default();
+    fn defaults() -> Self {
+        let (defaults, falls) = (Params::default(), Falls::default());
         let longest_step = if let TimeStepping::Realtime(longest) = defaults.pace { longest } else { 0.0 };
+        // Enums have their first value.
         let mut params = Self {
-            struct_size: 0,
-            flags: 0,
-            viscosity: 0.0,
-            thinnest: 0.0,
-            thinning_time: 0.0,
-            thinning_power: 0.0,
             gravity: defaults.gravity,
             kept: defaults.kept,
             longest_step,
-            pace: FRZ_SHALLOW_REALTIME as u32,
-            border: FRZ_SHALLOW_CLOSED as u32,
-            section: FRZ_SHALLOW_WETTED as u32,
-            reserved: 0,
             falls_height: falls.height,
             falls_interval: falls.interval,
             falls_drop: falls.drop,
-            falls_most: 0,
-            reserved2: 0,
             rest: defaults.rest,
-            friction: FRZ_SHALLOW_GROUND as u32,
             thickening_scalar: FRZ_SHALLOW_NO_SCALAR,
-            thickening_from: 0.0,
-            thickening_to: 0.0,
             thickening_times: 1.0,
+            ..Self::zeroed()
         };
         params.set_liquid(&defaults.liquid);
         params
     }
+}
 
+impl frz_shallow_params {
     fn set_liquid(&mut self, liquid: &Liquid) {
         let law = liquid.thinning.unwrap_or(Carreau { thinnest: 0.0, time: 0.0, power: 0.0 });
         self.viscosity = liquid.viscosity;
@@ -268,7 +253,7 @@ pub(in crate::capi) unsafe fn params(pointer: *const frz_shallow_params) -> Outc
         return Ok(Params::default());
     }
     // SAFETY: guaranteed by the caller.
-    unsafe { sized(pointer, frz_shallow_params::defaults()) }?.params()
+    unsafe { given(pointer) }?.params()
 }
 
 /// Fills parameters with the defaults: blood, in real time.
@@ -280,7 +265,7 @@ pub(in crate::capi) unsafe fn params(pointer: *const frz_shallow_params) -> Outc
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_params_init(params: *mut frz_shallow_params, size: usize) -> frz_status {
     // SAFETY: the parameters are NULL or have `size` bytes.
-    guard(|| unsafe { fill(params, Some(size), frz_shallow_params::defaults()) })
+    guard(|| unsafe { fill(params, Some(size), Sized32::defaults()) })
 }
 
 /// Sets the viscosity of parameters, and its shear thinning, to those of a known liquid; the other fields stay.
@@ -294,13 +279,11 @@ pub unsafe extern "C" fn frz_shallow_params_liquid(
     params: *mut frz_shallow_params,
     liquid: u32,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the parameters are NULL or have as many bytes as they state.
-        unsafe {
-            let mut changed = sized(params.cast_const(), frz_shallow_params::defaults())?;
-            changed.set_liquid(&meaning("liquid", "frz_liquid", liquid, &LIQUIDS)?);
-            fill(params, None, changed)
-        }
+    // SAFETY: the parameters are NULL or have as many bytes as they state.
+    guard(|| unsafe {
+        let mut changed = given(params.cast_const())?;
+        changed.set_liquid(&meaning("liquid", "frz_liquid", liquid, &LIQUIDS)?);
+        fill(params, None, changed)
     })
 }
 
@@ -327,7 +310,6 @@ pub struct frz_shallow_domain {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_domain {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_domain";
 }
 
@@ -342,17 +324,8 @@ pub(in crate::capi) unsafe fn domain(
     ctx: &Context,
     pointer: *const frz_shallow_domain,
 ) -> Outcome<(Grid, Heights)> {
-    let none = frz_shallow_domain {
-        struct_size: 0,
-        flags: 0,
-        cell: 0.0,
-        origin: [0.0; 2],
-        cells: [0; 2],
-        low: 0.0,
-        high: 0.0,
-    };
     // SAFETY: guaranteed by the caller.
-    let given = unsafe { sized(pointer, none) }?;
+    let given = unsafe { given(pointer) }?;
     no_flags(given.flags, 0)?;
     let grid = Grid { cell: given.cell, origin: given.origin, size: given.cells.map(|count| count as usize) };
     grid.validate()?;

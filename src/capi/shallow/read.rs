@@ -1,10 +1,10 @@
 //! Shallow liquid as numbers: its columns, at points, in boxes.
 
+use super::calls::informs;
+use super::lists::numbers;
 use super::spill::frz_shallow;
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{clear, read, required};
-use crate::capi::ffi::views::{Plain, Sized32, fill, frz_span, frz_view, meaning};
-use crate::shallow::{Shallow, View};
+use crate::capi::ffi::*;
+use crate::shallow::View;
 
 /// Layer of a volume: all layers.
 pub const FRZ_SHALLOW_ALL_LAYERS: u32 = 0xffff_ffff;
@@ -38,7 +38,6 @@ pub struct frz_shallow_info {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_info {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_info";
 }
 
@@ -112,34 +111,24 @@ pub unsafe extern "C" fn frz_shallow_get_info(
     shallow: *const frz_shallow,
     info: *mut frz_shallow_info,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut value = frz_shallow_info {
+    // SAFETY: the pointers are NULL or valid.
+    unsafe {
+        informs(info, || {
+            let shallow = &read(shallow)?.shallow;
+            let columns = shallow.columns();
+            Ok(frz_shallow_info {
                 struct_size: 0,
-                layers: 0,
-                index_count: 0,
-                column_count: 0,
-                cell: 0.0,
-                low: 0.0,
-                unit: 0.0,
-                time: 0.0,
-                last_step: 0.0,
-            };
-            fill(info, None, value)?;
-            let spill = read(shallow)?;
-            let (shallow, columns) = (&spill.shallow, spill.shallow.columns());
-            value.layers = shallow.view().layers() as u32;
-            value.index_count = columns.len() as u64;
-            value.column_count = columns.count() as u64;
-            value.cell = columns.grid.cell;
-            value.low = columns.heights.low;
-            value.unit = columns.heights.unit;
-            value.time = shallow.time();
-            value.last_step = shallow.last_step();
-            fill(info, None, value)
-        }
-    })
+                layers: shallow.view().layers() as u32,
+                index_count: columns.len() as u64,
+                column_count: columns.count() as u64,
+                cell: columns.grid.cell,
+                low: columns.heights.low,
+                unit: columns.heights.unit,
+                time: shallow.time(),
+                last_step: shallow.last_step(),
+            })
+        })
+    }
 }
 
 /// Copies an array of columns.
@@ -156,61 +145,62 @@ pub unsafe extern "C" fn frz_shallow_read(
     columns: frz_view,
     dst: frz_span,
 ) -> frz_status {
-    guard(|| {
+    // SAFETY: the liquid is NULL or alive; view and span are valid.
+    guard(|| unsafe {
         let array = meaning("array", "frz_shallow_array", array, &ARRAYS)?;
-        // SAFETY: the liquid is NULL or alive; view and span are valid.
-        unsafe {
-            let spill = read(shallow)?;
-            let count = spill.shallow.columns().len();
-            if columns.data.is_null() && columns.count == 0 {
-                return copy(&spill.shallow, array, &dst, 0..count);
-            }
-            let indices = columns.in_place::<u32>("columns")?;
-            dst.check_room("dst", indices.len())?;
-            if let Some((at, index)) = indices.clone().enumerate().find(|(_, index)| *index as usize >= count)
-            {
-                let text = format!("columns: element {at}, {index}, is none of the {count} column indices");
-                return Err(Failure::argument(text));
-            }
-            copy(&spill.shallow, array, &dst, indices.map(|index| index as usize))
+        let shallow = &read(shallow)?.shallow;
+        let (all, wanted) = (shallow.columns(), Requested { columns, dst, count: shallow.columns().len() });
+        let heights = all.heights;
+        let length = |units: i32| heights.length(f64::from(units)) as f32;
+        let height = |units: i32| heights.metres(units) as f32;
+        let flow = all.grid.cell * all.grid.cell * heights.unit / shallow.last_step();
+        let [east, south] =
+            shallow.fluxes().map(|flux| move |index: usize| (f64::from(flux[index]) * flow) as f32);
+        let cell = |index: usize| match all.is_column(index) {
+            true => all.cell(index).map(|at| at as i32),
+            false => [-1; 2],
+        };
+        match array {
+            FRZ_SHALLOW_DEPTH => wanted.copy(|index| length(shallow.depths()[index])),
+            FRZ_SHALLOW_BASE => wanted.copy(|index| height(all.bases()[index])),
+            FRZ_SHALLOW_CEILING => wanted.copy(|index| height(all.ceilings()[index])),
+            FRZ_SHALLOW_CELL => wanted.copy(cell),
+            FRZ_SHALLOW_LAYER => wanted.copy(|index| all.layer(index) as u32),
+            FRZ_SHALLOW_FLUX_EAST => wanted.copy(east),
+            FRZ_SHALLOW_FLUX_SOUTH => wanted.copy(south),
+            FRZ_SHALLOW_VELOCITY => wanted.copy(|index| shallow.velocity(index)),
         }
     })
 }
 
-/// # Safety
-/// The span must describe memory that can be written.
-unsafe fn copy(
-    shallow: &Shallow,
-    array: frz_shallow_array,
-    dst: &frz_span,
-    indices: impl ExactSizeIterator<Item = usize>,
-) -> Outcome {
-    let columns = shallow.columns();
-    let heights = columns.heights;
-    let length = |units: i32| heights.length(f64::from(units)) as f32;
-    let height = |units: i32| heights.metres(units) as f32;
-    let area = columns.grid.cell * columns.grid.cell;
-    let flow = area * heights.unit / shallow.last_step();
-    let [east, south] = shallow.fluxes();
-    let cell = |index: usize| match columns.is_column(index) {
-        true => columns.cell(index).map(|at| at as i32),
-        false => [-1; 2],
-    };
-    // SAFETY: guaranteed by the caller.
-    unsafe {
-        match array {
-            FRZ_SHALLOW_DEPTH => dst.put("dst", indices.map(|index| length(shallow.depths()[index]))),
-            FRZ_SHALLOW_BASE => dst.put("dst", indices.map(|index| height(columns.bases()[index]))),
-            FRZ_SHALLOW_CEILING => dst.put("dst", indices.map(|index| height(columns.ceilings()[index]))),
-            FRZ_SHALLOW_CELL => dst.put("dst", indices.map(cell)),
-            FRZ_SHALLOW_LAYER => dst.put("dst", indices.map(|index| columns.layer(index) as u32)),
-            FRZ_SHALLOW_FLUX_EAST => {
-                dst.put("dst", indices.map(|index| (f64::from(east[index]) * flow) as f32))
+/// Columns that a host requests, of `count` indices, and its memory for what it wants to know of them.
+pub(in crate::capi) struct Requested {
+    pub columns: frz_view,
+    pub dst: frz_span,
+    pub count: usize,
+}
+
+impl Requested {
+    /// Copies the value of each column, or of all indices if there is no list of columns.
+    ///
+    /// # Safety
+    /// View and span must describe memory that can be read and written.
+    pub(in crate::capi) unsafe fn copy<T: Plain>(&self, value: impl Fn(usize) -> T) -> Outcome {
+        let Self { columns, dst, count } = self;
+        // SAFETY: guaranteed by the caller.
+        unsafe {
+            if columns.data.is_null() && columns.count == 0 {
+                return dst.put("dst", (0..*count).map(value));
             }
-            FRZ_SHALLOW_FLUX_SOUTH => {
-                dst.put("dst", indices.map(|index| (f64::from(south[index]) * flow) as f32))
+            let indices = columns.in_place::<u32>("columns")?;
+            dst.check_room("dst", indices.len())?;
+            if let Some((at, index)) =
+                indices.clone().enumerate().find(|(_, index)| *index as usize >= *count)
+            {
+                let text = format!("columns: element {at}, {index}, is none of the {count} column indices");
+                return Err(Failure::argument(text));
             }
-            FRZ_SHALLOW_VELOCITY => dst.put("dst", indices.map(|index| shallow.velocity(index))),
+            dst.put("dst", indices.map(|index| value(index as usize)))
         }
     }
 }
@@ -228,30 +218,27 @@ pub unsafe extern "C" fn frz_shallow_lend(
     array: u32,
     out: *mut frz_view,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(out);
-            let out = required(out, "out")?;
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        answer(out, "out", || {
             let array = meaning("array", "frz_shallow_lent", array, &LENT)?;
-            let spill = read(shallow)?;
-            let (columns, [east, south]) = (spill.shallow.columns(), spill.shallow.fluxes());
+            let shallow = &read(shallow)?.shallow;
+            let (columns, [east, south]) = (shallow.columns(), shallow.fluxes());
             let data = match array {
-                FRZ_SHALLOW_LENT_DEPTH => spill.shallow.depths().as_ptr().cast(),
+                FRZ_SHALLOW_LENT_DEPTH => shallow.depths().as_ptr().cast(),
                 FRZ_SHALLOW_LENT_BASE => columns.bases().as_ptr().cast(),
                 FRZ_SHALLOW_LENT_CEILING => columns.ceilings().as_ptr().cast(),
                 FRZ_SHALLOW_LENT_EAST => east.as_ptr().cast(),
                 FRZ_SHALLOW_LENT_SOUTH => south.as_ptr().cast(),
             };
-            out.write_unaligned(frz_view { data, count: columns.len(), stride: 4 });
-            Ok(())
-        }
+            Ok(frz_view { data, count: columns.len(), stride: 4 })
+        })
     })
 }
 
 /// The liquid at a point.
 #[repr(C)]
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct frz_shallow_sample {
     /// Height of its surface (m); that of the ground if dry; NaN without a column.
     pub height: f64,
@@ -296,11 +283,8 @@ pub(in crate::capi) unsafe fn probe(view: &View<'_>, points: &frz_view, dst: &fr
     let sample = |point: [f64; 3]| match view.at(point) {
         None => frz_shallow_sample {
             height: f64::NAN,
-            depth: 0.0,
-            velocity: [0.0; 2],
-            surface_velocity: [0.0; 2],
             column: FRZ_SHALLOW_NO_COLUMN,
-            layer: 0,
+            ..frz_shallow_sample::default()
         },
         Some(there) => frz_shallow_sample {
             height: there.height,
@@ -331,29 +315,21 @@ pub unsafe extern "C" fn frz_shallow_volume(
     layer: u32,
     volume: *mut f64,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            clear(volume);
-            let volume = required(volume, "volume")?;
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        answer(volume, "volume", || {
             let spill = read(shallow)?;
             let view = spill.shallow.view();
-            let found = match (low.is_null() && high.is_null(), layer) {
+            Ok(match (low.is_null() && high.is_null(), layer) {
                 (true, FRZ_SHALLOW_ALL_LAYERS) => view.volume([f64::NEG_INFINITY; 3], [f64::INFINITY; 3])?,
                 (true, layer) => view.layer_volume(layer as usize),
                 (false, FRZ_SHALLOW_ALL_LAYERS) => {
-                    let corner = |corner: *const f64, name: &str| {
-                        let corner = required(corner.cast_mut(), name)?;
-                        Outcome::Ok(corner.cast::<[f64; 3]>().read_unaligned())
-                    };
-                    view.volume(corner(low, "low")?, corner(high, "high")?)?
+                    view.volume(numbers(low, "low")?, numbers(high, "high")?)?
                 }
                 (false, _) => {
                     return Err(Failure::argument("layer: a box has no layer: give one of the two"));
                 }
-            };
-            volume.write_unaligned(found);
-            Ok(())
-        }
+            })
+        })
     })
 }

@@ -2,17 +2,19 @@
 
 use std::ffi::c_char;
 
-use super::lists::each_sized;
+use super::calls::informs;
+use super::lists::{check_index, one_for_each, read_list};
+use super::read::Requested;
 use super::spill::frz_shallow;
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{change, read};
-use crate::capi::ffi::views::{Sized32, fill, frz_span, frz_view, meaning, required_text};
-use crate::shallow::{Law, Scalar, ScalarBalance, Shallow};
+use crate::capi::ffi::*;
+use crate::error::Result;
+use crate::shallow::scalars::MOST;
+use crate::shallow::{Law, Scalar, ScalarBalance};
 
 /// Maximum number of scalars that a liquid carries.
 pub const FRZ_SHALLOW_MOST_SCALARS: u32 = 4;
 
-const _: () = assert!(FRZ_SHALLOW_MOST_SCALARS as usize == crate::shallow::scalars::MOST);
+const _: () = assert!(FRZ_SHALLOW_MOST_SCALARS as usize == MOST);
 
 /// How a scalar changes, besides being carried.
 #[repr(u32)]
@@ -53,13 +55,10 @@ pub struct frz_shallow_scalar {
 
 // SAFETY: numbers and a pointer.
 unsafe impl Sized32 for frz_shallow_scalar {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_scalar";
 }
 
 impl frz_shallow_scalar {
-    const NONE: Self = Self { struct_size: 0, law: 0, name: std::ptr::null(), range: 0.0, half_life: 0.0 };
-
     /// # Safety
     /// The name must be NULL or a zero-terminated text.
     unsafe fn scalar(&self) -> Outcome<Scalar> {
@@ -79,23 +78,17 @@ impl frz_shallow_scalar {
 /// Reads the scalars of a host.
 ///
 /// # Safety
-/// As [`each_sized`]; names must be NULL or zero-terminated texts.
+/// As [`read_list`]; names must be NULL or zero-terminated texts.
 pub(in crate::capi) unsafe fn read_scalars(
     scalars: *const frz_shallow_scalar,
     count: usize,
 ) -> Outcome<Vec<Scalar>> {
-    if count > FRZ_SHALLOW_MOST_SCALARS as usize {
-        let text = format!("{count} scalars are more than {FRZ_SHALLOW_MOST_SCALARS}");
-        return Err(Failure::argument(text));
-    }
-    let mut given = Vec::with_capacity(count);
+    refuse(count > MOST, || format!("{count} scalars are more than {MOST}"))?;
+    let mut given = Vec::new();
     // SAFETY: guaranteed by the caller.
-    unsafe {
-        each_sized(scalars, count, ["scalar", "scalars"], frz_shallow_scalar::NONE, |scalar| {
-            given.push(scalar.scalar()?);
-            Ok(())
-        })?;
-    }
+    let scalar = |scalar: frz_shallow_scalar| unsafe { scalar.scalar() };
+    // SAFETY: as above.
+    unsafe { read_list(scalars, count, ["scalar", "scalars"], &mut given, scalar) }?;
     Ok(given)
 }
 
@@ -113,14 +106,8 @@ pub unsafe extern "C" fn frz_shallow_set_scalars(
     scalars: *const frz_shallow_scalar,
     count: usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut spill = change(shallow)?;
-            let given = read_scalars(scalars, count)?;
-            Ok(spill.shallow.set_scalars(&given)?)
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe { Ok(change(shallow)?.shallow.set_scalars(&read_scalars(scalars, count)?)?) })
 }
 
 /// Sets the concentrations of scalars in liquid that frz_shallow_pour, _fill and _set_depths add from now on; initially 0.
@@ -133,13 +120,10 @@ pub unsafe extern "C" fn frz_shallow_set_poured(
     shallow: *mut frz_shallow,
     concentrations: frz_view,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the liquid is NULL or alive; the view is valid.
-        unsafe {
-            let mut spill = change(shallow)?;
-            let given = of_scalars(spill.shallow.scalars().len(), &concentrations)?;
-            Ok(spill.shallow.set_poured(&given[..concentrations.count])?)
-        }
+    // SAFETY: the liquid is NULL or alive; the view is valid.
+    guard(|| unsafe {
+        let shallow = &mut change(shallow)?.shallow;
+        with_concentrations(shallow.scalars().len(), &concentrations, |given| shallow.set_poured(given))
     })
 }
 
@@ -155,33 +139,30 @@ pub unsafe extern "C" fn frz_shallow_set_sourced(
     flow: usize,
     concentrations: frz_view,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the liquid is NULL or alive; the view is valid.
-        unsafe {
-            let mut spill = change(shallow)?;
-            let given = of_scalars(spill.shallow.scalars().len(), &concentrations)?;
-            Ok(spill.shallow.set_sourced(flow, &given[..concentrations.count])?)
-        }
+    // SAFETY: the liquid is NULL or alive; the view is valid.
+    guard(|| unsafe {
+        let shallow = &mut change(shallow)?.shallow;
+        with_concentrations(shallow.scalars().len(), &concentrations, |given| {
+            shallow.set_sourced(flow, given)
+        })
     })
 }
 
-/// A number for each scalar.
+/// Passes on a host's numbers, one for each of `count` scalars.
 ///
 /// # Safety
 /// The view must describe memory that can be read.
-pub(in crate::capi) unsafe fn of_scalars(
+pub(in crate::capi) unsafe fn with_concentrations(
     count: usize,
-    numbers: &frz_view,
-) -> Outcome<[f64; FRZ_SHALLOW_MOST_SCALARS as usize]> {
+    concentrations: &frz_view,
+    set: impl FnOnce(&[f64]) -> Result<()>,
+) -> Outcome {
     // SAFETY: guaranteed by the caller.
-    let given = unsafe { numbers.in_place::<f64>("concentrations") }?;
-    if given.len() != count {
-        let text = format!("concentrations: {} elements, but there are {count} scalars", given.len());
-        return Err(Failure::argument(text));
-    }
-    let mut out = [0.0; FRZ_SHALLOW_MOST_SCALARS as usize];
-    out.iter_mut().zip(given).for_each(|(out, number)| *out = number);
-    Ok(out)
+    let given =
+        unsafe { one_for_each::<f64>(concentrations, "concentrations", count, ["there are", "scalars"]) }?;
+    let mut numbers = [0.0; MOST];
+    numbers.iter_mut().zip(given).for_each(|(number, given)| *number = given);
+    Ok(set(&numbers[..count])?)
 }
 
 /// Copies the concentrations of a scalar, in real time (frz_shallow); 0 where it is dry.
@@ -198,35 +179,13 @@ pub unsafe extern "C" fn frz_shallow_read_scalar(
     columns: frz_view,
     dst: frz_span,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the liquid is NULL or alive; view and span are valid.
-        unsafe {
-            let spill = read(shallow)?;
-            let (own, scalar) = (&spill.shallow, check_scalar(&spill.shallow, scalar)?);
-            let count = own.columns().len();
-            let value = |index: usize| own.concentration(scalar, index);
-            if columns.data.is_null() && columns.count == 0 {
-                return dst.put("dst", (0..count).map(value));
-            }
-            let indices = columns.in_place::<u32>("columns")?;
-            dst.check_room("dst", indices.len())?;
-            if let Some((at, index)) = indices.clone().enumerate().find(|(_, index)| *index as usize >= count)
-            {
-                let text = format!("columns: element {at}, {index}, is none of the {count} column indices");
-                return Err(Failure::argument(text));
-            }
-            dst.put("dst", indices.map(|index| value(index as usize)))
-        }
+    // SAFETY: the liquid is NULL or alive; view and span are valid.
+    guard(|| unsafe {
+        let shallow = &read(shallow)?.shallow;
+        let scalar = check_index("scalar", scalar as usize, shallow.scalars().len())?;
+        let count = shallow.columns().len();
+        Requested { columns, dst, count }.copy(|index| shallow.concentration(scalar, index))
     })
-}
-
-/// A scalar's index, if the scalar exists.
-pub(in crate::capi) fn check_scalar(shallow: &Shallow, scalar: u32) -> Outcome<usize> {
-    let count = shallow.scalars().len();
-    match (scalar as usize) < count {
-        true => Ok(scalar as usize),
-        false => Err(Failure::argument(format!("scalar = {scalar} is none of the {count} that were set"))),
-    }
 }
 
 /// Where all of a scalar is, and where it came from: concentration x volume (its own unit x m3). inside + held + falling = poured + sourced
@@ -266,28 +225,16 @@ pub struct frz_shallow_scalar_balance {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_scalar_balance {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_scalar_balance";
 }
 
-impl From<ScalarBalance> for frz_shallow_scalar_balance {
-    fn from(sum: ScalarBalance) -> Self {
-        Self {
-            struct_size: 0,
-            reserved: 0,
-            inside: sum.inside,
-            poured: sum.poured,
-            sourced: sum.sourced,
-            drained: sum.drained,
-            absorbed: sum.absorbed,
-            lost: sum.lost,
-            gained: sum.gained,
-            held: sum.held,
-            falling: sum.falling,
-            grown: sum.grown,
-            dried: sum.dried,
-            error: sum.error.clamp(i64::MIN.into(), i64::MAX.into()) as i64,
-        }
+fields_of!(ScalarBalance => frz_shallow_scalar_balance {
+    inside, poured, sourced, drained, absorbed, lost, gained, held, falling, grown, dried
+});
+
+impl frz_shallow_scalar_balance {
+    pub(in crate::capi) fn of(sum: ScalarBalance) -> Self {
+        Self { error: sum.error.clamp(i64::MIN.into(), i64::MAX.into()) as i64, ..sum.into() }
     }
 }
 
@@ -303,13 +250,13 @@ pub unsafe extern "C" fn frz_shallow_get_scalar_balance(
     scalar: u32,
     balance: *mut frz_shallow_scalar_balance,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            fill(balance, None, ScalarBalance::default().into())?;
-            let spill = read(shallow)?;
-            let scalar = check_scalar(&spill.shallow, scalar)?;
-            fill(balance, None, spill.shallow.scalar_balance(scalar)?.into())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    unsafe {
+        informs(balance, || {
+            let shallow = &read(shallow)?.shallow;
+            let sum =
+                shallow.scalar_balance(check_index("scalar", scalar as usize, shallow.scalars().len())?)?;
+            Ok(frz_shallow_scalar_balance::of(sum))
+        })
+    }
 }

@@ -2,12 +2,12 @@
 
 use super::read::probe;
 use super::spill::{ShallowHandle, frz_shallow};
-use super::surface::prepared::{Ledged, no_lifts};
-use super::surface::{Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target};
-use crate::capi::ffi::guard::{frz_status, guard};
-use crate::capi::ffi::handle::{HandleType, change, destroy, read};
-use crate::capi::ffi::views::{frz_span, frz_view};
-use crate::capi::runtime::context::{creates, enter_light, frz_context};
+use super::surface::prepared::{Ledged, wanted_lifts};
+use super::surface::{
+    FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, frz_shallow_layout, frz_shallow_size, frz_shallow_target, writes,
+};
+use crate::capi::ffi::*;
+use crate::capi::runtime::context::{creates, frz_context};
 use crate::shallow::Snapshot;
 use crate::shallow::free_fall::mesh::Balls;
 use crate::shallow::surface::{Depths, Surface};
@@ -98,15 +98,13 @@ pub unsafe extern "C" fn frz_shallow_snapshot_take(
     snapshot: *mut frz_shallow_snapshot,
     shallow: *const frz_shallow,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut taken = change(snapshot)?;
-            let spill = read(shallow)?;
-            taken.snapshot.take(&spill.shallow);
-            taken.fit(&spill);
-            Ok(())
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let mut taken = change(snapshot)?;
+        let spill = read(shallow)?;
+        taken.snapshot.take(&spill.shallow);
+        taken.fit(&spill);
+        Ok(())
     })
 }
 
@@ -137,30 +135,25 @@ pub unsafe extern "C" fn frz_shallow_snapshot_surface(
     target: *const frz_shallow_target,
     size: *mut frz_shallow_size,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so are the spans.
-        unsafe {
-            let wanted = Wanted::new(layout, target, size)?;
-            let _call = enter_light(context)?;
-            let mut taken = change(snapshot)?;
-            let Taken { snapshot, surface, least, sunk, ledged, .. } = &mut *taken;
-            if wanted.is_lifted && least.is_empty() {
-                return Err(no_lifts("when the snapshot was taken"));
-            }
-            let ledges = ledged.wanted(wanted.is_skirted, "when the snapshot was taken")?;
-            let lifts: [&[i32]; 2] = if wanted.is_lifted { [least, sunk] } else { [&[]; 2] };
+    // SAFETY: the pointers are NULL or valid, and so are the spans.
+    unsafe {
+        writes(context, snapshot, (layout, target, size), |taken, wanted| {
+            let Taken { snapshot, surface, least, sunk, ledged, .. } = taken;
+            let when = "when the snapshot was taken";
+            let known = (!least.is_empty()).then_some((&least[..], &sunk[..]));
+            let (least, sunk) = wanted_lifts(wanted.has(FRZ_SHALLOW_LIFTED), known, when)?;
             let depths = Depths {
                 depth: snapshot.depths(),
                 velocity: snapshot.velocities(),
                 active: Some(snapshot.active()),
-                least: lifts[0],
-                sunk: lifts[1],
+                least,
+                sunk,
                 carried: std::array::from_fn(|scalar| snapshot.concentrations(scalar)),
-                ledges,
+                ledges: ledged.wanted(wanted.has(FRZ_SHALLOW_SKIRTED), when)?,
             };
             wanted.write(surface, snapshot.columns(), &depths)
-        }
-    })
+        })
+    }
 }
 
 /// Reads the liquid at points as it was when the snapshot was taken, as frz_shallow_probe does, in real time (frz_shallow).

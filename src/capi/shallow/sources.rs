@@ -1,11 +1,10 @@
 //! Where shallow liquid enters and leaves, and the balance of its volume.
 
+use super::calls::{answers, informs};
 use super::flow_points::frz_shallow_flow;
-use super::flowing;
+use super::lists::{check_index, numbers, one_for_each};
 use super::spill::{ShallowHandle, frz_shallow};
-use crate::capi::ffi::guard::{Failure, frz_status, guard};
-use crate::capi::ffi::handle::{change, read};
-use crate::capi::ffi::views::{Sized32, fill, frz_view};
+use crate::capi::ffi::*;
 use crate::shallow::Balance;
 
 /// Sets sources, drains and absorbers, replacing those before; what those have moved remains in frz_shallow_balance. An absorber that is
@@ -23,7 +22,10 @@ pub unsafe extern "C" fn frz_shallow_set_flows(
     count: usize,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    guard(|| unsafe { flowing::set_flows(shallow, flows, count) })
+    guard(|| unsafe {
+        let ShallowHandle { shallow, around, .. } = &mut *change(shallow)?;
+        around.set_flows(flows, count, |points| shallow.set_flows(points, |at| format!("flow {at}")))
+    })
 }
 
 /// Reports the volume that entered or left through a flow point since it was set.
@@ -39,7 +41,12 @@ pub unsafe extern "C" fn frz_shallow_flow_moved(
     volume: *mut f64,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    guard(|| unsafe { flowing::moved(shallow, flow, volume) })
+    guard(|| unsafe {
+        answer(volume, "volume", || {
+            let liquid = read(shallow)?;
+            Ok(liquid.shallow.moved(check_index("flow", flow, liquid.around.flows.len())?))
+        })
+    })
 }
 
 /// Pours a volume at a position, shared by the columns that a flow point there would act on; each takes what it has room for, or gives what
@@ -60,7 +67,14 @@ pub unsafe extern "C" fn frz_shallow_pour(
     poured: *mut f64,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    guard(|| unsafe { flowing::pour(shallow, at, radius, volume, poured) })
+    guard(|| unsafe {
+        answers(poured, || {
+            let mut liquid = change(shallow)?;
+            let at = numbers(at, "at")?;
+            finite("volume", volume)?;
+            Ok(liquid.shallow.pour_at(at, radius, volume)?)
+        })
+    })
 }
 
 /// Fills all columns up to a height, or to their ceiling; fuller ones are unchanged.
@@ -71,7 +85,12 @@ pub unsafe extern "C" fn frz_shallow_pour(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_fill(shallow: *mut frz_shallow, height: f64) -> frz_status {
     // SAFETY: the liquid is NULL or alive.
-    guard(|| unsafe { flowing::fill_up(shallow, height) })
+    guard(|| unsafe {
+        let mut liquid = change(shallow)?;
+        finite("height", height)?;
+        liquid.shallow.fill(height);
+        Ok(())
+    })
 }
 
 /// Sets the depths of all columns: an initial state from a host, or the liquid of the host's own solver, for its surface. What this adds
@@ -83,37 +102,25 @@ pub unsafe extern "C" fn frz_shallow_fill(shallow: *mut frz_shallow, height: f64
 /// One thread at a time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_set_depths(shallow: *mut frz_shallow, depths: frz_view) -> frz_status {
-    guard(|| {
-        // SAFETY: the liquid is NULL or alive; the view is valid.
-        unsafe {
-            let mut spill = change(shallow)?;
-            let count = spill.shallow.columns().len();
-            let wanted = depths.in_place::<f32>("depths")?;
-            if wanted.len() != count {
-                let text = format!("depths: {} elements, but there are {count} column indices", wanted.len());
-                return Err(Failure::argument(text));
-            }
-            let is_bad = |&(index, depth): &(usize, f32)| {
-                spill.shallow.columns().is_column(index) && !(depth >= 0.0 && depth.is_finite())
-            };
-            if let Some((at, depth)) = wanted.clone().enumerate().find(is_bad) {
-                return Err(Failure::argument(format!("depths: element {at}, {depth} m, is not 0 or more")));
-            }
-            set_depths(&mut spill, wanted);
-            Ok(())
+    // SAFETY: the liquid is NULL or alive; the view is valid.
+    guard(|| unsafe {
+        let shallow = &mut change(shallow)?.shallow;
+        let (count, heights) = (shallow.columns().len(), shallow.columns().heights);
+        let wanted = one_for_each::<f32>(&depths, "depths", count, ["there are", "column indices"])?;
+        let is_bad = |&(index, depth): &(usize, f32)| {
+            shallow.columns().is_column(index) && !(depth >= 0.0 && depth.is_finite())
+        };
+        if let Some((at, depth)) = wanted.clone().enumerate().find(is_bad) {
+            return Err(Failure::argument(format!("depths: element {at}, {depth} m, is not 0 or more")));
         }
+        for (index, depth) in wanted.enumerate() {
+            if shallow.columns().is_column(index) {
+                let now = heights.length(f64::from(shallow.depths()[index]));
+                shallow.pour(index, f64::from(depth) - now);
+            }
+        }
+        Ok(())
     })
-}
-
-fn set_depths(spill: &mut ShallowHandle, wanted: impl Iterator<Item = f32>) {
-    let shallow = &mut spill.shallow;
-    let heights = shallow.columns().heights;
-    for (index, depth) in wanted.enumerate() {
-        if shallow.columns().is_column(index) {
-            let now = heights.length(f64::from(shallow.depths()[index]));
-            shallow.pour(index, f64::from(depth) - now);
-        }
-    }
 }
 
 /// Where all liquid is, and where it came from (m3; 1 ml is 1e-6). inside + held + falling = poured + sourced + gained - drained - absorbed
@@ -153,24 +160,9 @@ unsafe impl Sized32 for frz_shallow_balance {
     const NAME: &'static str = "frz_shallow_balance";
 }
 
-impl From<Balance> for frz_shallow_balance {
-    fn from(sum: Balance) -> Self {
-        Self {
-            struct_size: 0,
-            reserved: 0,
-            inside: sum.inside,
-            poured: sum.poured,
-            sourced: sum.sourced,
-            drained: sum.drained,
-            absorbed: sum.absorbed,
-            lost: sum.lost,
-            gained: sum.gained,
-            held: sum.held,
-            error: sum.error,
-            falling: sum.falling,
-        }
-    }
-}
+fields_of!(Balance => frz_shallow_balance {
+    inside, poured, sourced, drained, absorbed, lost, gained, held, error, falling
+});
 
 /// Reports where all liquid is, and where it came from.
 ///
@@ -182,11 +174,6 @@ pub unsafe extern "C" fn frz_shallow_get_balance(
     shallow: *const frz_shallow,
     balance: *mut frz_shallow_balance,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            fill(balance, None, Balance::default().into())?;
-            fill(balance, None, read(shallow)?.shallow.balance().into())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    unsafe { informs(balance, || Ok(read(shallow)?.shallow.balance())) }
 }

@@ -1,21 +1,13 @@
 //! A liquid, as its handle holds it.
 
-use super::flow_points::Attached;
-use super::flowing::Flowing;
-use super::ground::Terrain;
-use super::surface::prepared::{Ledged, Lifted};
-use crate::capi::ffi::guard::Outcome;
-use crate::capi::ffi::handle::HandleType;
+use super::surface::prepared::{Ledged, Lifted, Shown};
+use super::surroundings::{Setup, Surroundings};
+use crate::capi::ffi::*;
 use crate::context::Context;
-use crate::error::Result;
 use crate::shallow::free_fall::Droplet;
 use crate::shallow::free_fall::mesh::Balls;
-use crate::shallow::scalars::MOST;
-use crate::shallow::sources::FlowPoint;
 use crate::shallow::surface::Surface;
-use crate::shallow::terrain::Solids;
-use crate::shallow::terrain::shapes::Shape;
-use crate::shallow::{Load, Params, Shallow};
+use crate::shallow::{Load, Moved, Shallow};
 
 /// A small amount of liquid on the ground (blood, coffee or paint), computed in a fraction of a frame's time.
 ///
@@ -45,22 +37,16 @@ impl HandleType for frz_shallow {
 pub(in crate::capi) struct ShallowHandle {
     /// The liquid.
     pub shallow: Shallow,
-    /// What it flows over.
-    pub terrain: Terrain,
-    /// The host's flow points, in its order.
-    pub flows: Vec<Attached>,
-    /// The bodies of the last call.
-    pub shapes: Vec<Shape>,
+    /// What it flows over, and what is set in it.
+    pub around: Surroundings,
     /// Builds surfaces.
     pub surface: Surface,
     /// Minimum heights, once found.
     pub lifted: Lifted,
     /// Ledges, once found.
     pub ledged: Ledged,
-    /// Mean velocities of all column indices (m/s), if a surface needs them.
-    pub velocities: Vec<[f32; 2]>,
-    /// Concentrations of scalars by column index, if a surface needs them.
-    pub concentrations: [Vec<f32>; MOST],
+    /// What surfaces show of the flow.
+    pub shown: Shown,
     /// Builds and holds meshes of the liquid in the air.
     pub balls: Balls,
     /// Drops of the last such mesh.
@@ -72,38 +58,10 @@ pub(in crate::capi) struct ShallowHandle {
     pub steps: Vec<f64>,
 }
 
-impl Flowing for ShallowHandle {
-    fn terrain(&self) -> &Terrain {
-        &self.terrain
-    }
-
-    fn flows(&self) -> &[Attached] {
-        &self.flows
-    }
-
-    fn set_flows(&mut self, flows: Vec<Attached>, points: &[FlowPoint]) -> Result<()> {
-        self.shallow.set_flows(points, |at| format!("flow {at}"))?;
-        self.flows = flows;
-        Ok(())
-    }
-
-    fn moved(&self, flow: usize) -> f64 {
-        self.shallow.moved(flow)
-    }
-
-    fn pour_at(&mut self, at: [f64; 3], radius: f64, volume: f64) -> Result<f64> {
-        self.shallow.pour_at(at, radius, volume)
-    }
-
-    fn fill(&mut self, height: f64) {
-        self.shallow.fill(height);
-    }
-}
-
 impl ShallowHandle {
     /// Dry ground.
-    pub fn new(ctx: &Context, params: Params, terrain: Terrain, solids: &Solids) -> Outcome<Self> {
-        let shallow = ctx.phase("columns", || Shallow::new(ctx, solids, params))?;
+    pub fn new(ctx: &Context, setup: Setup) -> Outcome<Self> {
+        let shallow = ctx.phase("columns", || Shallow::new(ctx, &setup.solids, setup.params))?;
         let mut surface = Surface::default();
         surface.reserve(shallow.columns());
         let most = shallow.params().falls.map_or(0, |falls| falls.most);
@@ -111,19 +69,24 @@ impl ShallowHandle {
         balls.reserve(most);
         Ok(Self {
             shallow,
-            terrain,
-            flows: Vec::new(),
-            shapes: Vec::new(),
+            around: Surroundings::new(setup.terrain),
             surface,
             lifted: Lifted::default(),
             ledged: Ledged::default(),
-            velocities: Vec::new(),
-            concentrations: Default::default(),
+            shown: Shown::default(),
             balls,
             drops: Vec::with_capacity(most),
             velocities_of_bodies: Vec::new(),
             loads: Vec::new(),
             steps: Vec::with_capacity(1024),
         })
+    }
+    /// After a change of the ground: minimum heights and ledges must be found again where it has moved.
+    pub fn after(&mut self, moved: Moved) -> Moved {
+        if moved.cells > 0 {
+            self.lifted.is_current = false;
+            self.ledged.is_current = false;
+        }
+        moved
     }
 }

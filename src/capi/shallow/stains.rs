@@ -2,12 +2,12 @@
 
 use std::ffi::c_void;
 
+use super::calls::answers;
+use super::lists::one_for_each;
 use super::params::FRZ_SHALLOW_NO_SCALAR;
 use super::spill::frz_shallow;
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{HandleType, change, destroy, read, required};
 use crate::capi::ffi::saved::{restores, write_bytes};
-use crate::capi::ffi::views::{Sized32, fill, frz_span, frz_view, sized};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{creates, enter_light, frz_context};
 use crate::geometry::Vec3;
@@ -41,31 +41,18 @@ pub struct frz_shallow_staining {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_staining {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_staining";
+
+    fn defaults() -> Self {
+        let Staining { film, takes, half_life, .. } = Staining::default();
+        Self { scalar: FRZ_SHALLOW_NO_SCALAR, film, takes, half_life, ..Self::zeroed() }
+    }
 }
 
 impl frz_shallow_staining {
-    fn defaults() -> Self {
-        let Staining { film, takes, half_life, .. } = Staining::default();
-        Self {
-            struct_size: 0,
-            flags: 0,
-            scalar: FRZ_SHALLOW_NO_SCALAR,
-            reserved: 0,
-            film,
-            takes,
-            half_life,
-            capacity: 0.0,
-            rate: 0.0,
-        }
-    }
-
     fn staining(&self) -> Outcome<Staining> {
         no_flags(self.flags, 0)?;
-        if self.reserved != 0 {
-            return Err(Failure::argument(format!("reserved = {} is not 0", self.reserved)));
-        }
+        refuse(self.reserved != 0, || format!("reserved = {} is not 0", self.reserved))?;
         let absorbing = Absorbing { capacity: self.capacity, rate: self.rate };
         let staining = Staining {
             scalar: (self.scalar != FRZ_SHALLOW_NO_SCALAR).then_some(self.scalar as usize),
@@ -91,7 +78,7 @@ pub unsafe extern "C" fn frz_shallow_staining_init(
     size: usize,
 ) -> frz_status {
     // SAFETY: the description is NULL or has `size` bytes.
-    guard(|| unsafe { fill(staining, Some(size), frz_shallow_staining::defaults()) })
+    guard(|| unsafe { fill(staining, Some(size), Sized32::defaults()) })
 }
 
 /// Stains on the vertices of a mesh, and the liquid that it has absorbed: they move with ground that deforms. The mesh need not be the one
@@ -134,11 +121,7 @@ pub unsafe extern "C" fn frz_shallow_stains_create(
     // SAFETY: the pointers are NULL or valid, and so are the views.
     unsafe {
         creates(context, out, |ctx| {
-            let staining = match staining.is_null() {
-                true => frz_shallow_staining::defaults(),
-                false => sized(staining, frz_shallow_staining::defaults())?,
-            };
-            let staining = staining.staining()?;
+            let staining = given_or_defaults(staining)?.staining()?;
             let spill = read(shallow)?;
             let vertices = positions.count as u64;
             ctx.allow("the stains", vertices.saturating_mul(BYTES))?;
@@ -169,33 +152,19 @@ pub unsafe extern "C" fn frz_shallow_stains_update(
     positions: frz_view,
     absorbed: *mut f64,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so is the view.
-        unsafe {
-            if !absorbed.is_null() {
-                absorbed.write_unaligned(0.0);
-            }
+    // SAFETY: the pointers are NULL or valid, and so is the view.
+    guard(|| unsafe {
+        answers(absorbed, || {
             let _call = enter_light(context)?;
-            let mut stained = change(stains)?;
+            let Stained { stains, positions: own } = &mut *change(stains)?;
             let mut spill = change(shallow)?;
-            let Stained { stains, positions: own } = &mut *stained;
-            let given = positions.in_place::<[f32; 3]>("positions")?;
-            if given.len() != stains.len() {
-                let text = format!(
-                    "positions: {} elements, but the mesh has {} vertices",
-                    given.len(),
-                    stains.len()
-                );
-                return Err(Failure::argument(text));
-            }
+            let count = stains.len();
+            let given =
+                one_for_each::<[f32; 3]>(&positions, "positions", count, ["the mesh has", "vertices"])?;
             own.clear();
             own.extend(given.map(Vec3::from));
-            let volume = stains.update(&mut spill.shallow, own)?;
-            if !absorbed.is_null() {
-                absorbed.write_unaligned(volume);
-            }
-            Ok(())
-        }
+            Ok(stains.update(&mut spill.shallow, own)?)
+        })
     })
 }
 
@@ -237,15 +206,8 @@ pub unsafe extern "C" fn frz_shallow_stains_absorbed(
     stains: *const frz_shallow_stains,
     volume: *mut f64,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let volume = required(volume, "volume")?;
-            volume.write_unaligned(0.0);
-            volume.write_unaligned(read(stains)?.stains.absorbed());
-            Ok(())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe { answer(volume, "volume", || Ok(read(stains)?.stains.absorbed())) })
 }
 
 /// Saves stains as bytes, for frz_shallow_stains_restore. The frz_shallow_staining parameters are not part of them, nor is the liquid
@@ -264,14 +226,12 @@ pub unsafe extern "C" fn frz_shallow_stains_save(
     capacity: usize,
     size: *mut usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so is the memory at dst.
-        unsafe {
-            required(size, "size")?.write_unaligned(0);
-            let _call = enter_light(context)?;
-            let stained = read(stains)?;
-            write_bytes(dst, capacity, size, || stained.stains.save_size(), || Ok(stained.stains.save()))
-        }
+    // SAFETY: the pointers are NULL or valid, and so is the memory at dst.
+    guard(|| unsafe {
+        required(size, "size")?.write_unaligned(0);
+        let _call = enter_light(context)?;
+        let stains = &read(stains)?.stains;
+        write_bytes(dst, capacity, size, || stains.save_size(), || Ok(stains.save()))
     })
 }
 

@@ -1,12 +1,11 @@
 //! The ground below shallow liquid: made once, then moved.
 
-use super::ground::{Terrain, cells_in, read_heights};
-use super::lists::each_sized;
+use super::calls::changes;
+use super::ground::{cells_in, read_heights};
+use super::lists::read_list;
 use super::spill::{ShallowHandle, frz_shallow};
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::change;
-use crate::capi::ffi::views::{Sized32, fill, frz_view, meaning};
-use crate::capi::runtime::context::{enter_light, frz_context};
+use crate::capi::ffi::*;
+use crate::capi::runtime::context::frz_context;
 use crate::geometry::DVec3;
 use crate::shallow::Moved;
 use crate::shallow::terrain::shapes::Shape;
@@ -32,48 +31,10 @@ pub struct frz_shallow_moved {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_moved {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_moved";
 }
 
-impl From<Moved> for frz_shallow_moved {
-    fn from(moved: Moved) -> Self {
-        Self {
-            struct_size: 0,
-            reserved: 0,
-            cells: moved.cells as u64,
-            displaced: moved.displaced,
-            held: moved.held,
-            fallen: moved.fallen,
-        }
-    }
-}
-
-/// A call that changes the ground and reports the effect.
-///
-/// # Safety
-/// The pointers must be NULL or valid.
-unsafe fn moves(
-    context: *mut frz_context,
-    shallow: *mut frz_shallow,
-    moved: *mut frz_shallow_moved,
-    make: impl FnOnce(&mut ShallowHandle) -> Outcome<Moved>,
-) -> Outcome {
-    // SAFETY: guaranteed by the caller.
-    unsafe {
-        if !moved.is_null() {
-            fill(moved, None, Moved::default().into())?;
-        }
-        let _call = enter_light(context)?;
-        let mut spill = change(shallow)?;
-        let done = make(&mut spill)?;
-        if done.cells > 0 {
-            spill.lifted.is_current = false;
-            spill.ledged.is_current = false;
-        }
-        if moved.is_null() { Ok(()) } else { fill(moved, None, done.into()) }
-    }
-}
+fields_of!(Moved => frz_shallow_moved { cells, displaced, held, fallen });
 
 /// Moves the vertices of the mesh that the liquid was created with, in real time (frz_shallow): bones and organs move or deform. The liquid
 /// is carried along, and none of it is lost; flow points on triangles move with them. After a failure all is as it was.
@@ -92,30 +53,20 @@ pub unsafe extern "C" fn frz_shallow_update_terrain(
     bounds: *const f64,
     moved: *mut frz_shallow_moved,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so is the view.
-        unsafe {
-            moves(context, shallow, moved, |spill| {
-                let ShallowHandle { shallow, terrain, flows, .. } = spill;
-                let cells = cells_in(&shallow.columns().grid, bounds)?;
-                let Terrain::Mesh(mesh) = terrain else {
-                    return Err(Failure::argument("the liquid was not made with a mesh that could move"));
-                };
-                mesh.take(&positions)?;
-                mesh.caster.cast(&mesh.coming, &mesh.triangles, cells.clone())?;
-                let caster = &mesh.caster;
-                let moved = shallow.update_cells(cells, |cell| caster.at(cell))?;
-                mesh.come();
-                for (index, flow) in flows.iter_mut().enumerate() {
-                    if let Some(on) = &flow.on {
-                        flow.point.at = terrain.position(on)?;
-                        shallow.move_flow(index, flow.point.at);
-                    }
-                }
-                Ok(moved)
-            })
-        }
-    })
+    // SAFETY: the pointers are NULL or valid, and so is the view.
+    unsafe {
+        changes(context, shallow, moved, |_, spill| {
+            let ShallowHandle { shallow, around, .. } = &mut *spill;
+            let cells = cells_in(&shallow.columns().grid, bounds)?;
+            let mesh = around.terrain.mesh()?;
+            mesh.take(&positions)?;
+            mesh.caster.cast(&mesh.coming, &mesh.triangles, cells.clone())?;
+            let moved = shallow.update_cells(cells, |cell| mesh.caster.at(cell))?;
+            mesh.come();
+            around.carry_flows(|flow, at| shallow.move_flow(flow, at))?;
+            Ok(spill.after(moved))
+        })
+    }
 }
 
 /// Changes the heights of the height field that the liquid was created with, in real time (frz_shallow). The liquid is carried along, and
@@ -134,23 +85,18 @@ pub unsafe extern "C" fn frz_shallow_update_heights(
     bounds: *const f64,
     moved: *mut frz_shallow_moved,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so is the view.
-        unsafe {
-            moves(context, shallow, moved, |spill| {
-                let ShallowHandle { shallow, terrain, .. } = spill;
-                let (grid, range) = (shallow.columns().grid, shallow.columns().heights);
-                let cells = cells_in(&grid, bounds)?;
-                let Terrain::Heights(solids) = terrain else {
-                    return Err(Failure::argument(
-                        "the liquid was not made on a height field that could change",
-                    ));
-                };
-                read_heights(&heights, &grid, &range, cells.clone(), solids)?;
-                Ok(shallow.update_cells(cells, |cell| &solids[cell])?)
-            })
-        }
-    })
+    // SAFETY: the pointers are NULL or valid, and so is the view.
+    unsafe {
+        changes(context, shallow, moved, |_, spill| {
+            let ShallowHandle { shallow, around, .. } = &mut *spill;
+            let (grid, range) = (shallow.columns().grid, shallow.columns().heights);
+            let cells = cells_in(&grid, bounds)?;
+            let solids = around.terrain.heights()?;
+            read_heights(&heights, &grid, &range, cells.clone(), solids)?;
+            let moved = shallow.update_cells(cells, |cell| &solids[cell])?;
+            Ok(spill.after(moved))
+        })
+    }
 }
 
 /// Shapes of bodies.
@@ -195,22 +141,11 @@ pub struct frz_shallow_body {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_body {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_body";
 }
 
 impl frz_shallow_body {
-    const NONE: Self = Self {
-        struct_size: 0,
-        shape: 0,
-        at: [0.0; 3],
-        end: [0.0; 3],
-        radius: 0.0,
-        half: [0.0; 3],
-        axes: [[0.0; 3]; 3],
-    };
-
-    fn shape(&self) -> Outcome<Shape> {
+    pub(in crate::capi) fn shape(self) -> Outcome<Shape> {
         let at = DVec3::from(self.at);
         let shape = match meaning("shape", "frz_shallow_shape", self.shape, &SHAPES)? {
             FRZ_SHALLOW_SPHERE => Shape::Sphere { centre: at, radius: self.radius },
@@ -224,25 +159,6 @@ impl frz_shallow_body {
         };
         shape.validate()?;
         Ok(shape)
-    }
-}
-
-/// Reads the bodies of a host.
-///
-/// # Safety
-/// As [`each_sized`].
-pub(in crate::capi) unsafe fn read_bodies(
-    bodies: *const frz_shallow_body,
-    count: usize,
-    shapes: &mut Vec<Shape>,
-) -> Outcome {
-    shapes.clear();
-    // SAFETY: guaranteed by the caller.
-    unsafe {
-        each_sized(bodies, count, ["body", "bodies"], frz_shallow_body::NONE, |body| {
-            shapes.push(body.shape()?);
-            Ok(())
-        })
     }
 }
 
@@ -264,14 +180,13 @@ pub unsafe extern "C" fn frz_shallow_set_bodies(
     count: usize,
     moved: *mut frz_shallow_moved,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            moves(context, shallow, moved, |spill| {
-                let ShallowHandle { shallow, shapes, .. } = spill;
-                read_bodies(bodies, count, shapes)?;
-                Ok(shallow.set_bodies(shapes)?)
-            })
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    unsafe {
+        changes(context, shallow, moved, |_, spill| {
+            let ShallowHandle { shallow, around, .. } = &mut *spill;
+            read_list(bodies, count, ["body", "bodies"], &mut around.shapes, frz_shallow_body::shape)?;
+            let moved = shallow.set_bodies(&around.shapes)?;
+            Ok(spill.after(moved))
+        })
+    }
 }

@@ -1,43 +1,20 @@
 //! Shallow liquid in cells of two sizes: its ground, its surface, its states.
 
-use std::cell::RefCell;
 use std::ffi::c_void;
 
 use super::liquid::{DetailHandle, frz_shallow_detail};
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{change, read};
 use crate::capi::ffi::saved::{restores, saves_in_place};
-use crate::capi::ffi::views::{fill, frz_view};
-use crate::capi::runtime::context::{enter_light, frz_context};
-use crate::capi::shallow::ground::{Terrain, read_heights};
-use crate::capi::shallow::surface::{Wanted, frz_shallow_layout, frz_shallow_size, frz_shallow_target};
-use crate::capi::shallow::terrain::{frz_shallow_body, frz_shallow_moved, read_bodies};
-use crate::shallow::Moved;
-use crate::shallow::surface::{Counts, Depths};
+use crate::capi::ffi::*;
+use crate::capi::runtime::context::frz_context;
+use crate::capi::shallow::calls::{changes, informs};
+use crate::capi::shallow::ground::{all_cells, read_heights};
+use crate::capi::shallow::lists::read_list;
+use crate::capi::shallow::surface::{
+    FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, frz_shallow_layout, frz_shallow_size, frz_shallow_target, writes,
+};
+use crate::capi::shallow::terrain::{frz_shallow_body, frz_shallow_moved};
 use crate::shallow::terrain::Solids;
-use crate::shallow::two_level::surface;
-
-/// A call that changes the ground and reports the effect.
-///
-/// # Safety
-/// The pointers must be NULL or valid.
-unsafe fn moves(
-    context: *mut frz_context,
-    detail: *mut frz_shallow_detail,
-    moved: *mut frz_shallow_moved,
-    make: impl FnOnce(&mut DetailHandle) -> Outcome<Moved>,
-) -> Outcome {
-    // SAFETY: guaranteed by the caller.
-    unsafe {
-        if !moved.is_null() {
-            fill(moved, None, Moved::default().into())?;
-        }
-        let _call = enter_light(context)?;
-        let mut spread = change(detail)?;
-        let done = make(&mut spread)?;
-        if moved.is_null() { Ok(()) } else { fill(moved, None, done.into()) }
-    }
-}
+use crate::shallow::two_level::surface::bound;
 
 /// Moves the vertices of the mesh that the liquid was created with, as frz_shallow_update_terrain does, everywhere. After a failure all is
 /// as it was.
@@ -53,29 +30,20 @@ pub unsafe extern "C" fn frz_shallow_detail_update_terrain(
     positions: frz_view,
     moved: *mut frz_shallow_moved,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so is the view.
-        unsafe {
-            moves(context, detail, moved, |spread| {
-                let DetailHandle { detail, terrain, flows, .. } = spread;
-                let columns = detail.fine().columns();
-                let Terrain::Mesh(mesh) = terrain else {
-                    return Err(Failure::argument("the liquid was not made with a mesh that could move"));
-                };
-                mesh.take(&positions)?;
-                let solids = mesh.cast(columns.grid, columns.heights)?;
-                let moved = detail.update_terrain(&solids)?;
-                mesh.come();
-                for (index, flow) in flows.iter_mut().enumerate() {
-                    if let Some(on) = &flow.on {
-                        flow.point.at = terrain.position(on)?;
-                        detail.move_flow(index, flow.point.at);
-                    }
-                }
-                Ok(moved)
-            })
-        }
-    })
+    // SAFETY: the pointers are NULL or valid, and so is the view.
+    unsafe {
+        changes(context, detail, moved, |_, spread| {
+            let DetailHandle { detail, around, .. } = spread;
+            let columns = detail.fine().columns();
+            let mesh = around.terrain.mesh()?;
+            mesh.take(&positions)?;
+            let solids = mesh.cast(columns.grid, columns.heights)?;
+            let moved = detail.update_terrain(&solids)?;
+            mesh.come();
+            around.carry_flows(|flow, at| detail.move_flow(flow, at))?;
+            Ok(moved)
+        })
+    }
 }
 
 /// Changes the heights of the height field that the liquid was created with, as frz_shallow_update_heights does, everywhere. After a
@@ -92,24 +60,18 @@ pub unsafe extern "C" fn frz_shallow_detail_update_heights(
     heights: frz_view,
     moved: *mut frz_shallow_moved,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so is the view.
-        unsafe {
-            moves(context, detail, moved, |spread| {
-                let DetailHandle { detail, terrain, .. } = spread;
-                let (grid, range) = (detail.fine().columns().grid, detail.fine().columns().heights);
-                let Terrain::Heights(own) = terrain else {
-                    return Err(Failure::argument(
-                        "the liquid was not made on a height field that could change",
-                    ));
-                };
-                read_heights(&heights, &grid, &range, [0, 1].map(|axis| 0..grid.size[axis]), own)?;
-                let mut solids = Solids::empty(grid, range);
-                own.iter().for_each(|solid| solids.push(solid));
-                Ok(detail.update_terrain(&solids)?)
-            })
-        }
-    })
+    // SAFETY: the pointers are NULL or valid, and so is the view.
+    unsafe {
+        changes(context, detail, moved, |_, spread| {
+            let DetailHandle { detail, around, .. } = spread;
+            let (grid, range) = (detail.fine().columns().grid, detail.fine().columns().heights);
+            let own = around.terrain.heights()?;
+            read_heights(&heights, &grid, &range, all_cells(&grid), own)?;
+            let mut solids = Solids::empty(grid, range);
+            own.iter().for_each(|solid| solids.push(solid));
+            Ok(detail.update_terrain(&solids)?)
+        })
+    }
 }
 
 /// Sets the solids that move over the ground, as frz_shallow_set_bodies does, in real time (frz_shallow_detail). They may cross the edge of
@@ -128,16 +90,14 @@ pub unsafe extern "C" fn frz_shallow_detail_set_bodies(
     count: usize,
     moved: *mut frz_shallow_moved,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            moves(context, detail, moved, |spread| {
-                let DetailHandle { detail, shapes, .. } = spread;
-                read_bodies(bodies, count, shapes)?;
-                Ok(detail.set_bodies(shapes)?)
-            })
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    unsafe {
+        changes(context, detail, moved, |_, spread| {
+            let shapes = &mut spread.around.shapes;
+            read_list(bodies, count, ["body", "bodies"], shapes, frz_shallow_body::shape)?;
+            Ok(spread.detail.set_bodies(shapes)?)
+        })
+    }
 }
 
 /// Reports the maximum size of the surface of any liquid, as frz_shallow_surface_bound does. It holds until the ground, a body or the box
@@ -151,13 +111,8 @@ pub unsafe extern "C" fn frz_shallow_detail_surface_bound(
     detail: *const frz_shallow_detail,
     size: *mut frz_shallow_size,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            fill(size, None, Counts::default().into())?;
-            fill(size, None, surface::bound(&read(detail)?.detail).into())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    unsafe { informs(size, || Ok(bound(&read(detail)?.detail))) }
 }
 
 /// Writes the surface of all liquid as triangles, in real time (frz_shallow_detail): one mesh, without a crack between small and large
@@ -177,56 +132,27 @@ pub unsafe extern "C" fn frz_shallow_detail_surface(
     target: *const frz_shallow_target,
     size: *mut frz_shallow_size,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so are the spans.
-        unsafe {
-            let wanted = Wanted::new(layout, target, size)?;
-            let _call = enter_light(context)?;
-            let mut spread = change(detail)?;
-            let DetailHandle { detail, surface, velocities, concentrations, is_reserved, .. } = &mut *spread;
-            for (is_wanted, name) in
-                [(wanted.is_lifted, "FRZ_SHALLOW_LIFTED"), (wanted.is_skirted, "FRZ_SHALLOW_SKIRTED")]
+    // SAFETY: the pointers are NULL or valid, and so are the spans.
+    unsafe {
+        writes(context, detail, (layout, target, size), |spread, wanted| {
+            let DetailHandle { detail, surface, shown: [fine, coarse], is_reserved, .. } = spread;
+            for (flag, name) in
+                [(FRZ_SHALLOW_LIFTED, "FRZ_SHALLOW_LIFTED"), (FRZ_SHALLOW_SKIRTED, "FRZ_SHALLOW_SKIRTED")]
             {
-                if is_wanted {
-                    return Err(Failure::argument(format!("{name} is not for liquid in cells of two sizes")));
-                }
+                refuse(wanted.has(flag), || format!("{name} is not for liquid in cells of two sizes"))?;
             }
             if !*is_reserved {
                 surface.reserve(detail);
                 *is_reserved = true;
             }
-            let liquids = [detail.fine(), detail.coarse()];
-            for (velocities, liquid) in velocities.iter_mut().zip(liquids) {
-                let len = if wanted.velocities() { liquid.columns().len() } else { 0 };
-                velocities.resize(len, [0.0; 2]);
-                if len > 0 {
-                    liquid.velocities(velocities)?;
-                }
-            }
-            for (concentrations, liquid) in concentrations.iter_mut().zip(liquids) {
-                for (scalar, numbers) in concentrations.iter_mut().enumerate() {
-                    let len = if wanted.scalar(scalar) { liquid.columns().len() } else { 0 };
-                    numbers.resize(len, 0.0);
-                    if wanted.scalar(scalar) {
-                        liquid.concentrations(scalar, numbers)?;
-                    }
-                }
-            }
-            let depths = [0, 1].map(|at| Depths {
-                depth: liquids[at].depths(),
-                velocity: &velocities[at],
-                active: Some(liquids[at].active()),
-                carried: concentrations[at].each_ref().map(|numbers| &numbers[..]),
-                ..Depths::default()
-            });
-            let depths = depths.each_ref();
-            let both = RefCell::new(surface);
-            wanted.write_with(
-                |layout, target| both.borrow_mut().build(detail, depths, layout, target),
-                || both.borrow_mut().count(detail, depths),
-            )
-        }
-    })
+            let needs = wanted.needs();
+            let depths = [fine.depths(detail.fine(), &needs)?, coarse.depths(detail.coarse(), &needs)?];
+            wanted.write_with(|target| match target {
+                Some(target) => surface.build(detail, depths.each_ref(), &wanted.layout, target),
+                None => surface.count(detail, depths.each_ref()),
+            })
+        })
+    }
 }
 
 /// Saves all that the next frame depends on, as frz_shallow_save does, in real time (frz_shallow_detail). The box of small cells is part of

@@ -1,25 +1,21 @@
 //! Shallow liquid in cells of two sizes: small ones near what matters.
 
-use crate::capi::ffi::guard::{Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{HandleType, change, clear, destroy, read, required};
-use crate::capi::ffi::views::{Sized32, fill, frz_view};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::frz_mesh;
-use crate::capi::runtime::context::{creates, enter_light, frz_context};
-use crate::capi::shallow::flow_points::{Attached, frz_shallow_flow};
-use crate::capi::shallow::flowing::{self, Flowing};
+use crate::capi::runtime::context::{creates, frz_context};
+use crate::capi::shallow::calls::{answers, changes, informs};
+use crate::capi::shallow::flow_points::frz_shallow_flow;
 use crate::capi::shallow::ground::Terrain;
 use crate::capi::shallow::liquid::frz_shallow_report;
-use crate::capi::shallow::params::{domain, frz_shallow_domain, frz_shallow_params, params};
+use crate::capi::shallow::lists::{check_index, numbers};
+use crate::capi::shallow::params::{frz_shallow_domain, frz_shallow_params};
 use crate::capi::shallow::sources::frz_shallow_balance;
+use crate::capi::shallow::surface::prepared::Shown;
+use crate::capi::shallow::surroundings::{Setup, Surroundings};
 use crate::context::Context;
-use crate::error::Result;
-use crate::shallow::scalars::MOST;
-use crate::shallow::sources::FlowPoint;
-use crate::shallow::terrain::Solids;
-use crate::shallow::terrain::shapes::Shape;
+use crate::shallow::Detail;
 use crate::shallow::two_level::cells_around;
 use crate::shallow::two_level::surface::Surface;
-use crate::shallow::{Balance, Detail, Params, Report};
 
 /// Shallow liquid in cells of two sizes: those of its domain in a box that may move, around an instrument or a player, and cells of twice
 /// the length everywhere else, where a frame takes a quarter of the time. No liquid is lost between them.
@@ -33,19 +29,13 @@ pub struct frz_shallow_detail {
 /// The value of a handle.
 pub(in crate::capi) struct DetailHandle {
     pub detail: Detail,
-    /// What it flows over.
-    pub terrain: Terrain,
-    /// The host's flow points, in its order.
-    pub flows: Vec<Attached>,
-    /// The bodies of the last call.
-    pub shapes: Vec<Shape>,
+    /// What it flows over, and what is set in it.
+    pub around: Surroundings,
     /// Builds surfaces; whether it has room for the current columns.
     pub surface: Surface,
     pub is_reserved: bool,
-    /// Mean velocities of all column indices of both sizes (m/s), if a surface needs them.
-    pub velocities: [Vec<[f32; 2]>; 2],
-    /// Concentrations of scalars by column index of both sizes, if a surface needs them.
-    pub concentrations: [[Vec<f32>; MOST]; 2],
+    /// What surfaces show of the flow in cells of both sizes.
+    pub shown: [Shown; 2],
 }
 
 impl HandleType for frz_shallow_detail {
@@ -54,72 +44,20 @@ impl HandleType for frz_shallow_detail {
     const TAG: u32 = 0x6672_7a0c;
 }
 
-impl Flowing for DetailHandle {
-    fn terrain(&self) -> &Terrain {
-        &self.terrain
-    }
-
-    fn flows(&self) -> &[Attached] {
-        &self.flows
-    }
-
-    fn set_flows(&mut self, flows: Vec<Attached>, points: &[FlowPoint]) -> Result<()> {
-        self.detail.set_flows(points, |at| format!("flow {at}"))?;
-        self.flows = flows;
-        Ok(())
-    }
-
-    fn moved(&self, flow: usize) -> f64 {
-        self.detail.moved(flow)
-    }
-
-    fn pour_at(&mut self, at: [f64; 3], radius: f64, volume: f64) -> Result<f64> {
-        self.detail.pour_at(at, radius, volume)
-    }
-
-    fn fill(&mut self, height: f64) {
-        self.detail.fill(height);
-    }
-}
-
 impl DetailHandle {
     /// Dry ground, with a box of small cells.
     ///
     /// # Safety
     /// The pointer must be NULL or point to four numbers.
-    unsafe fn new(
-        ctx: &Context,
-        params: Params,
-        terrain: Terrain,
-        solids: &Solids,
-        near: *const f64,
-    ) -> Outcome<Self> {
+    unsafe fn new(ctx: &Context, setup: Setup, near: *const f64) -> Outcome<Self> {
         // SAFETY: guaranteed by the caller.
-        let near = cells_around(&solids.grid, unsafe { bounds(near) }?)?;
-        let detail = ctx.phase("columns", || Detail::new(ctx, solids, params, near))?;
+        let near = cells_around(&setup.solids.grid, unsafe { numbers(near, "near") }?)?;
+        let detail = ctx.phase("columns", || Detail::new(ctx, &setup.solids, setup.params, near))?;
         let mut surface = Surface::default();
         surface.reserve(&detail);
-        Ok(Self {
-            detail,
-            terrain,
-            flows: Vec::new(),
-            shapes: Vec::new(),
-            surface,
-            is_reserved: true,
-            velocities: Default::default(),
-            concentrations: Default::default(),
-        })
+        let around = Surroundings::new(setup.terrain);
+        Ok(Self { detail, around, surface, is_reserved: true, shown: Default::default() })
     }
-}
-
-/// A host's box.
-///
-/// # Safety
-/// The pointer must be NULL or point to four numbers.
-unsafe fn bounds(near: *const f64) -> Outcome<[f64; 4]> {
-    let near = required(near.cast_mut(), "near")?;
-    // SAFETY: guaranteed by the caller.
-    Ok(unsafe { near.cast::<[f64; 4]>().read_unaligned() })
 }
 
 /// Creates a liquid in cells of two sizes on a mesh, as frz_shallow_create does, initially dry.
@@ -144,11 +82,8 @@ pub unsafe extern "C" fn frz_shallow_detail_create(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
-            let params = self::params(params)?;
-            let (grid, heights) = self::domain(ctx, domain)?;
-            let mesh = read(mesh)?;
-            let (terrain, solids) = Terrain::of_mesh(ctx, &mesh.triangles, grid, heights)?;
-            DetailHandle::new(ctx, params, terrain, &solids, near)
+            let terrain = |grid, range| Terrain::of_mesh(ctx, &read(mesh)?.triangles, grid, range);
+            DetailHandle::new(ctx, Setup::new(ctx, params, domain, terrain)?, near)
         })
     }
 }
@@ -174,11 +109,8 @@ pub unsafe extern "C" fn frz_shallow_detail_create_heights(
     // SAFETY: the pointers are NULL or valid.
     unsafe {
         creates(context, out, |ctx| {
-            let params = self::params(params)?;
-            let (grid, range) = self::domain(ctx, domain)?;
-            let tops = heights.in_place::<f32>("heights")?;
-            let (terrain, solids) = Terrain::of_heights(tops, grid, range)?;
-            DetailHandle::new(ctx, params, terrain, &solids, near)
+            let terrain = |grid, range| Terrain::of_heights(heights.in_place::<f32>("heights")?, grid, range);
+            DetailHandle::new(ctx, Setup::new(ctx, params, domain, terrain)?, near)
         })
     }
 }
@@ -204,14 +136,8 @@ pub unsafe extern "C" fn frz_shallow_detail_set_params(
     detail: *mut frz_shallow_detail,
     params: *const frz_shallow_params,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut spread = change(detail)?;
-            required(params.cast_mut(), frz_shallow_params::NAME)?;
-            Ok(spread.detail.set_params(self::params(params)?)?)
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe { Ok(change(detail)?.detail.set_params(given(params)?.params()?)?) })
 }
 
 /// Moves the box of small cells. The liquid keeps its volume and fluxes, and a level surface stays level. If the box covers the same cells
@@ -225,16 +151,12 @@ pub unsafe extern "C" fn frz_shallow_detail_set_near(
     detail: *mut frz_shallow_detail,
     near: *const f64,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut spread = change(detail)?;
-            let cells = cells_around(&spread.detail.fine().columns().grid, bounds(near)?)?;
-            if cells != *spread.detail.near() {
-                spread.is_reserved = false;
-            }
-            Ok(spread.detail.set_near(cells)?)
-        }
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        let DetailHandle { detail, is_reserved, .. } = &mut *change(detail)?;
+        let cells = cells_around(&detail.fine().columns().grid, numbers(near, "near")?)?;
+        *is_reserved &= cells == *detail.near();
+        Ok(detail.set_near(cells)?)
     })
 }
 
@@ -248,18 +170,14 @@ pub unsafe extern "C" fn frz_shallow_detail_get_near(
     detail: *const frz_shallow_detail,
     near: *mut f64,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let near = near.cast::<[f64; 4]>();
-            clear(near);
-            let near = required(near, "near")?;
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        answer(near.cast::<[f64; 4]>(), "near", || {
             let spread = read(detail)?;
             let ([x, z], grid) = (spread.detail.near(), spread.detail.fine().columns().grid);
             let at = |axis: usize, cell: usize| grid.origin[axis] + cell as f64 * grid.cell;
-            near.write_unaligned([at(0, x.start), at(1, z.start), at(0, x.end), at(1, z.end)]);
-            Ok(())
-        }
+            Ok([at(0, x.start), at(1, z.start), at(0, x.end), at(1, z.end)])
+        })
     })
 }
 
@@ -276,17 +194,12 @@ pub unsafe extern "C" fn frz_shallow_detail_step(
     dt: f64,
     report: *mut frz_shallow_report,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            if !report.is_null() {
-                fill(report, None, frz_shallow_report::of(&Report::default(), 0.0))?;
-            }
-            let call = enter_light(context)?;
-            let done = change(detail)?.detail.step(call.ctx(), dt)?;
-            if report.is_null() { Ok(()) } else { fill(report, None, frz_shallow_report::of(&done, dt)) }
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    unsafe {
+        changes(context, detail, report, |ctx, spread| {
+            Ok(frz_shallow_report::of(spread.detail.step(ctx, dt)?, dt))
+        })
+    }
 }
 
 /// Sets sources, drains and absorbers, as frz_shallow_set_flows does. Each acts on cells of the size at its centre.
@@ -302,7 +215,10 @@ pub unsafe extern "C" fn frz_shallow_detail_set_flows(
     count: usize,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    guard(|| unsafe { flowing::set_flows(detail, flows, count) })
+    guard(|| unsafe {
+        let DetailHandle { detail, around, .. } = &mut *change(detail)?;
+        around.set_flows(flows, count, |points| detail.set_flows(points, |at| format!("flow {at}")))
+    })
 }
 
 /// Changes the rate of a flow point: a valve. The volume that it has moved stays.
@@ -334,7 +250,12 @@ pub unsafe extern "C" fn frz_shallow_detail_flow_moved(
     volume: *mut f64,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    guard(|| unsafe { flowing::moved(detail, flow, volume) })
+    guard(|| unsafe {
+        answer(volume, "volume", || {
+            let liquid = read(detail)?;
+            Ok(liquid.detail.moved(check_index("flow", flow, liquid.around.flows.len())?))
+        })
+    })
 }
 
 /// Pours a volume at a position, as frz_shallow_pour does, into cells of the size at that position.
@@ -354,7 +275,14 @@ pub unsafe extern "C" fn frz_shallow_detail_pour(
     poured: *mut f64,
 ) -> frz_status {
     // SAFETY: the pointers are NULL or valid.
-    guard(|| unsafe { flowing::pour(detail, at, radius, volume, poured) })
+    guard(|| unsafe {
+        answers(poured, || {
+            let mut liquid = change(detail)?;
+            let at = numbers(at, "at")?;
+            finite("volume", volume)?;
+            Ok(liquid.detail.pour_at(at, radius, volume)?)
+        })
+    })
 }
 
 /// Fills all columns up to a height, as frz_shallow_fill does.
@@ -365,7 +293,12 @@ pub unsafe extern "C" fn frz_shallow_detail_pour(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_detail_fill(detail: *mut frz_shallow_detail, height: f64) -> frz_status {
     // SAFETY: the liquid is NULL or alive.
-    guard(|| unsafe { flowing::fill_up(detail, height) })
+    guard(|| unsafe {
+        let mut liquid = change(detail)?;
+        finite("height", height)?;
+        liquid.detail.fill(height);
+        Ok(())
+    })
 }
 
 /// Reports where all liquid is, and where it came from. Less than a cell's share of four units waits for the rest of a unit of large cells:
@@ -379,11 +312,6 @@ pub unsafe extern "C" fn frz_shallow_detail_get_balance(
     detail: *const frz_shallow_detail,
     balance: *mut frz_shallow_balance,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            fill(balance, None, Balance::default().into())?;
-            fill(balance, None, read(detail)?.detail.balance().into())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    unsafe { informs(balance, || Ok(read(detail)?.detail.balance())) }
 }

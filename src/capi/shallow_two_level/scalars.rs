@@ -1,13 +1,12 @@
 //! Scalars of shallow liquid in cells of two sizes.
 
 use super::liquid::frz_shallow_detail;
-use crate::capi::ffi::guard::{frz_status, guard};
-use crate::capi::ffi::handle::{change, read};
-use crate::capi::ffi::views::{fill, frz_view};
+use crate::capi::ffi::*;
+use crate::capi::shallow::calls::informs;
+use crate::capi::shallow::lists::check_index;
 use crate::capi::shallow::scalars::{
-    check_scalar, frz_shallow_scalar, frz_shallow_scalar_balance, of_scalars, read_scalars,
+    frz_shallow_scalar, frz_shallow_scalar_balance, read_scalars, with_concentrations,
 };
-use crate::shallow::ScalarBalance;
 
 /// Sets the scalars that the liquid carries, as frz_shallow_set_scalars does. None of them thickens it.
 ///
@@ -21,14 +20,8 @@ pub unsafe extern "C" fn frz_shallow_detail_set_scalars(
     scalars: *const frz_shallow_scalar,
     count: usize,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            let mut spread = change(detail)?;
-            let given = read_scalars(scalars, count)?;
-            Ok(spread.detail.set_scalars(&given)?)
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe { Ok(change(detail)?.detail.set_scalars(&read_scalars(scalars, count)?)?) })
 }
 
 /// Sets the concentrations of scalars in liquid that frz_shallow_detail_pour and _fill add from now on; initially 0.
@@ -41,13 +34,10 @@ pub unsafe extern "C" fn frz_shallow_detail_set_poured(
     detail: *mut frz_shallow_detail,
     concentrations: frz_view,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the liquid is NULL or alive; the view is valid.
-        unsafe {
-            let mut spread = change(detail)?;
-            let given = of_scalars(spread.detail.scalars().len(), &concentrations)?;
-            Ok(spread.detail.set_poured(&given[..concentrations.count])?)
-        }
+    // SAFETY: the liquid is NULL or alive; the view is valid.
+    guard(|| unsafe {
+        let detail = &mut change(detail)?.detail;
+        with_concentrations(detail.scalars().len(), &concentrations, |given| detail.set_poured(given))
     })
 }
 
@@ -63,13 +53,10 @@ pub unsafe extern "C" fn frz_shallow_detail_set_sourced(
     flow: usize,
     concentrations: frz_view,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the liquid is NULL or alive; the view is valid.
-        unsafe {
-            let mut spread = change(detail)?;
-            let given = of_scalars(spread.detail.scalars().len(), &concentrations)?;
-            Ok(spread.detail.set_sourced(flow, &given[..concentrations.count])?)
-        }
+    // SAFETY: the liquid is NULL or alive; the view is valid.
+    guard(|| unsafe {
+        let detail = &mut change(detail)?.detail;
+        with_concentrations(detail.scalars().len(), &concentrations, |given| detail.set_sourced(flow, given))
     })
 }
 
@@ -85,13 +72,13 @@ pub unsafe extern "C" fn frz_shallow_detail_get_scalar_balance(
     scalar: u32,
     balance: *mut frz_shallow_scalar_balance,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            fill(balance, None, ScalarBalance::default().into())?;
-            let spread = read(detail)?;
-            let scalar = check_scalar(spread.detail.fine(), scalar)?;
-            fill(balance, None, spread.detail.scalar_balance(scalar)?.into())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    unsafe {
+        informs(balance, || {
+            let detail = &read(detail)?.detail;
+            let sum =
+                detail.scalar_balance(check_index("scalar", scalar as usize, detail.scalars().len())?)?;
+            Ok(frz_shallow_scalar_balance::of(sum))
+        })
+    }
 }

@@ -1,6 +1,5 @@
 //! Parameters of a tracker, in C.
 
-use crate::capi::ffi::fields::fields_of;
 use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::surface::{Params, Weighting};

@@ -2,13 +2,11 @@
 
 use super::frz_shallow_size;
 use super::prepared::Ledged;
-use crate::capi::ffi::guard::{frz_status, guard};
-use crate::capi::ffi::handle::change;
-use crate::capi::ffi::views::fill;
-use crate::capi::runtime::context::{enter_light, frz_context};
+use crate::capi::ffi::*;
+use crate::capi::runtime::context::frz_context;
+use crate::capi::shallow::calls::changes;
 use crate::capi::shallow::ground::Terrain;
 use crate::capi::shallow::spill::{ShallowHandle, frz_shallow};
-use crate::shallow::surface::Counts;
 
 /// Finds the ledges, where the ground ends over nothing, as at the edges of shelves and of holes, for surfaces with FRZ_SHALLOW_SKIRTED.
 /// With the mesh that the liquid was created with, the edge is located between the centres of cells; on other ground the surface extends by
@@ -25,25 +23,19 @@ pub unsafe extern "C" fn frz_shallow_find_ledges(
     shallow: *mut frz_shallow,
     size: *mut frz_shallow_size,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            if !size.is_null() {
-                fill(size, None, Counts::default().into())?;
-            }
-            let _call = enter_light(context)?;
-            let mut spill = change(shallow)?;
-            let ShallowHandle { shallow, terrain, ledged: Ledged { ledges, silhouette, is_current }, .. } =
-                &mut *spill;
+    // SAFETY: the pointers are NULL or valid.
+    unsafe {
+        changes(context, shallow, size, |_, spill| {
+            let ShallowHandle { shallow, around, ledged: Ledged { ledges, silhouette, is_current }, .. } =
+                spill;
             let columns = shallow.columns();
             *is_current = false;
-            match terrain {
+            match &around.terrain {
                 Terrain::Mesh(mesh) => silhouette.fit(ledges, columns, &mesh.positions, &mesh.triangles)?,
                 _ => ledges.find(columns),
             }
             *is_current = true;
-            let most = ledges.bound();
-            if size.is_null() { Ok(()) } else { fill(size, None, most.into()) }
-        }
-    })
+            Ok(ledges.bound())
+        })
+    }
 }

@@ -1,11 +1,10 @@
 //! Minimum heights of shallow liquid: how far its films are raised so that the ground's mesh does not show through them.
 
 use super::prepared::Lifted;
-use crate::capi::ffi::guard::{Failure, frz_status, guard};
-use crate::capi::ffi::handle::change;
-use crate::capi::ffi::views::{Sized32, fill, sized};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{enter_light, frz_context};
+use crate::capi::shallow::calls::reports;
 use crate::capi::shallow::ground::{Terrain, cells_in};
 use crate::capi::shallow::spill::{ShallowHandle, frz_shallow};
 use crate::shallow::surface::heights::minimum_heights::{Distance, Fitted};
@@ -28,14 +27,11 @@ pub struct frz_shallow_distance {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_distance {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_distance";
-}
 
-impl frz_shallow_distance {
     fn defaults() -> Self {
         let Distance { least, margin, rim } = Distance::default();
-        Self { struct_size: 0, flags: 0, least, margin, rim }
+        Self { least, margin, rim, ..Self::zeroed() }
     }
 }
 
@@ -57,21 +53,10 @@ pub struct frz_shallow_fitted {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_fitted {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_fitted";
 }
 
-impl From<Fitted> for frz_shallow_fitted {
-    fn from(fitted: Fitted) -> Self {
-        Self {
-            struct_size: 0,
-            reserved: 0,
-            upward: fitted.upward as u64,
-            discarded: fitted.discarded as u64,
-            capped: fitted.capped as u64,
-        }
-    }
-}
+fields_of!(Fitted => frz_shallow_fitted { upward, discarded, capped });
 
 /// Finds the minimum heights of all columns, or of those that have changed, from the mesh that the liquid was created with, in real time
 /// (frz_shallow), for surfaces with FRZ_SHALLOW_LIFTED. They change what is shown, not the flow. It visits all triangles once. Call it
@@ -91,23 +76,16 @@ pub unsafe extern "C" fn frz_shallow_find_lifts(
     bounds: *const f64,
     fitted: *mut frz_shallow_fitted,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            if !fitted.is_null() {
-                fill(fitted, None, Fitted::default().into())?;
-            }
-            let distance = match distance.is_null() {
-                true => frz_shallow_distance::defaults(),
-                false => sized(distance, frz_shallow_distance::defaults())?,
-            };
-            no_flags(distance.flags, 0)?;
-            let frz_shallow_distance { least, margin, rim, .. } = distance;
+    // SAFETY: the pointers are NULL or valid.
+    guard(|| unsafe {
+        reports(fitted, || {
+            let frz_shallow_distance { flags, least, margin, rim, .. } = given_or_defaults(distance)?;
+            no_flags(flags, 0)?;
             let _call = enter_light(context)?;
-            let mut spill = change(shallow)?;
-            let ShallowHandle { shallow, terrain, lifted: Lifted { lifts, is_current }, .. } = &mut *spill;
+            let ShallowHandle { shallow, around, lifted: Lifted { lifts, is_current }, .. } =
+                &mut *change(shallow)?;
             let cells = cells_in(&shallow.columns().grid, bounds)?;
-            let Terrain::Mesh(mesh) = terrain else {
+            let Terrain::Mesh(mesh) = &around.terrain else {
                 return Err(Failure::argument(
                     "the liquid was not made with a mesh: it needs no minimum heights",
                 ));
@@ -121,7 +99,7 @@ pub unsafe extern "C" fn frz_shallow_find_lifts(
                 lifts.update(columns, positions, triangles, distance, cells)?
             };
             *is_current = true;
-            if fitted.is_null() { Ok(()) } else { fill(fitted, None, found.into()) }
-        }
+            Ok(found)
+        })
     })
 }

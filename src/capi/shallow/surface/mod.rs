@@ -4,12 +4,10 @@ pub mod ledges;
 pub mod minimum_heights;
 pub(in crate::capi) mod prepared;
 
-use std::cell::RefCell;
-
+use self::prepared::{Needs, wanted_lifts};
+use super::calls::informs;
 use super::spill::{ShallowHandle, frz_shallow};
-use crate::capi::ffi::guard::{Failure, Outcome, frz_status, guard};
-use crate::capi::ffi::handle::{change, read};
-use crate::capi::ffi::views::{Sized32, fill, frz_span, sized};
+use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{enter_light, frz_context};
 use crate::shallow::columns::Columns;
@@ -57,21 +55,14 @@ unsafe impl Sized32 for frz_shallow_layout {
     const SIZES: &'static [usize] =
         &[std::mem::offset_of!(frz_shallow_layout, fade_depth), size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_layout";
+
+    fn defaults() -> Self {
+        let Layout { scale, least_depth, opaque_depth, fade_depth, .. } = Layout::default();
+        Self { scale, least_depth, opaque_depth, fade_depth, ..Self::zeroed() }
+    }
 }
 
 impl frz_shallow_layout {
-    fn defaults() -> Self {
-        let defaults = Layout::default();
-        Self {
-            struct_size: 0,
-            flags: 0,
-            scale: defaults.scale,
-            least_depth: defaults.least_depth,
-            opaque_depth: defaults.opaque_depth,
-            fade_depth: defaults.fade_depth,
-        }
-    }
-
     /// The library's own layout, of which some flags may be set.
     fn layout(&self) -> Outcome<Layout> {
         no_flags(
@@ -126,8 +117,6 @@ unsafe impl Sized32 for frz_shallow_target {
     const NAME: &'static str = "frz_shallow_target";
 }
 
-pub(in crate::capi) const NO_SPAN: frz_span = frz_span { data: std::ptr::null_mut(), count: 0, stride: 0 };
-
 /// A buffer: its name, the bytes of an element, and whether there is one for each vertex.
 pub(in crate::capi) type Buffer<'a> = (&'static str, &'a frz_span, usize, bool);
 
@@ -141,16 +130,16 @@ pub(in crate::capi) fn check_buffers(buffers: &[Buffer<'_>], index_bits: u32) ->
         let [first, end] = ends(span, *bytes);
         for (other, before, bytes, _) in &buffers[..at] {
             let [other_first, other_end] = ends(before, *bytes);
-            if first < other_end && other_first < end && !span.data.is_null() && !before.data.is_null() {
-                return Err(Failure::argument(format!("{name} and {other} overlap")));
-            }
+            let overlap = first < other_end && other_first < end;
+            refuse(overlap && !span.data.is_null() && !before.data.is_null(), || {
+                format!("{name} and {other} overlap")
+            })?;
         }
     }
     let has_indices = buffers.iter().any(|(name, span, ..)| *name == "indices" && !span.data.is_null());
-    if !has_indices || [16, 32].contains(&index_bits) {
-        return Ok(());
-    }
-    Err(Failure::argument(format!("index_bits = {index_bits} is not 16 or 32")))
+    refuse(has_indices && ![16, 32].contains(&index_bits), || {
+        format!("index_bits = {index_bits} is not 16 or 32")
+    })
 }
 
 /// Indices of a size that [`check_buffers`] has let pass.
@@ -179,20 +168,6 @@ pub(in crate::capi) fn check_room(buffers: &[Buffer<'_>], counts: &Counts) -> Ou
 }
 
 impl frz_shallow_target {
-    const NONE: Self = Self {
-        struct_size: 0,
-        index_bits: 0,
-        positions: NO_SPAN,
-        normals: NO_SPAN,
-        depths: NO_SPAN,
-        opacities: NO_SPAN,
-        velocities: NO_SPAN,
-        layers: NO_SPAN,
-        columns: NO_SPAN,
-        indices: NO_SPAN,
-        scalars: [NO_SPAN; MOST],
-    };
-
     /// The buffers.
     fn buffers(&self) -> [Buffer<'_>; 12] {
         let [a, b, c, d] = &self.scalars;
@@ -258,71 +233,83 @@ pub struct frz_shallow_size {
 
 // SAFETY: numbers.
 unsafe impl Sized32 for frz_shallow_size {
-    const SIZES: &'static [usize] = &[size_of::<Self>()];
     const NAME: &'static str = "frz_shallow_size";
 }
 
-impl From<Counts> for frz_shallow_size {
-    fn from(counts: Counts) -> Self {
-        Self { struct_size: 0, reserved: 0, vertices: counts.vertices as u64, indices: counts.indices as u64 }
-    }
+fields_of!(Counts => frz_shallow_size { vertices, indices });
+
+/// What a mesh is made from, and the host's buffers that it is written to.
+pub(in crate::capi) struct Wanted<T> {
+    /// How it is written.
+    pub(in crate::capi) layout: Layout,
+    flags: u32,
+    pub(in crate::capi) given: T,
+    size: *mut frz_shallow_size,
 }
 
-/// The library's own layout from a host's, with its flags; the defaults for NULL.
+/// An interface function that writes a mesh of an object in real time: `write` receives the layout, the buffers and the size that are
+/// `wanted`.
 ///
 /// # Safety
-/// As [`sized`].
-pub(in crate::capi) unsafe fn layout(pointer: *const frz_shallow_layout) -> Outcome<(Layout, u32)> {
-    if pointer.is_null() {
-        return Ok((Layout::default(), 0));
-    }
+/// The pointers must be NULL or valid, and so must be the spans.
+pub(in crate::capi) unsafe fn writes<N: HandleType, T: Sized32>(
+    context: *mut frz_context,
+    object: *mut N,
+    (layout, target, size): (*const frz_shallow_layout, *const T, *mut frz_shallow_size),
+    write: impl FnOnce(&mut N::Value, &Wanted<T>) -> Outcome,
+) -> frz_status {
     // SAFETY: guaranteed by the caller.
-    let given = unsafe { sized(pointer, frz_shallow_layout::defaults()) }?;
-    Ok((given.layout()?, given.flags))
+    guard(|| unsafe {
+        let wanted = Wanted::new(layout, target, size)?;
+        let _call = enter_light(context)?;
+        write(&mut *change(object)?, &wanted)
+    })
 }
 
-/// What a surface is made from and into.
-pub(in crate::capi) struct Wanted {
-    layout: Layout,
-    given: frz_shallow_target,
-    size: *mut frz_shallow_size,
-    /// Whether minimum heights are requested.
-    pub(in crate::capi) is_lifted: bool,
-    /// Whether the surface comes down at ledges.
-    pub(in crate::capi) is_skirted: bool,
-}
-
-impl Wanted {
+impl<T: Sized32> Wanted<T> {
     /// The request of a host.
     ///
     /// # Safety
     /// The pointers must be NULL or valid.
-    pub(in crate::capi) unsafe fn new(
+    unsafe fn new(
         layout: *const frz_shallow_layout,
-        target: *const frz_shallow_target,
+        target: *const T,
         size: *mut frz_shallow_size,
     ) -> Outcome<Self> {
         // SAFETY: guaranteed by the caller.
         unsafe {
             if !size.is_null() {
-                fill(size, None, Counts::default().into())?;
+                fill(size, None, frz_shallow_size::zeroed())?;
             }
-            let (layout, flags) = self::layout(layout)?;
-            let given = sized(target, frz_shallow_target::NONE)?;
-            let has = |flag: u32| flags & flag != 0;
-            let (is_lifted, is_skirted) = (has(FRZ_SHALLOW_LIFTED), has(FRZ_SHALLOW_SKIRTED));
-            Ok(Self { layout, given, size, is_lifted, is_skirted })
+            let layout = given_or_defaults(layout)?;
+            let flags = layout.flags;
+            Ok(Self { layout: layout.layout()?, flags, given: given(target)?, size })
         }
     }
 
-    /// Whether velocities are requested.
-    pub(in crate::capi) fn velocities(&self) -> bool {
-        !self.given.velocities.data.is_null()
+    /// Whether a flag of the layout is set.
+    pub(in crate::capi) fn has(&self, flag: u32) -> bool {
+        self.flags & flag != 0
     }
 
-    /// Whether the concentrations of a scalar are requested.
-    pub(in crate::capi) fn scalar(&self, scalar: usize) -> bool {
-        !self.given.scalars[scalar].data.is_null()
+    /// Writes the size of the mesh, unless the host does not want to know.
+    ///
+    /// # Safety
+    /// The pointers must still be NULL or valid.
+    pub(in crate::capi) unsafe fn tell(&self, counts: Counts) -> Outcome {
+        // SAFETY: guaranteed by the caller.
+        if self.size.is_null() { Ok(()) } else { unsafe { fill(self.size, None, counts.into()) } }
+    }
+}
+
+impl Wanted<frz_shallow_target> {
+    /// What the surface shows of the flow.
+    pub(in crate::capi) fn needs(&self) -> Needs {
+        let is_given = |span: &frz_span| !span.data.is_null();
+        Needs {
+            velocities: is_given(&self.given.velocities),
+            scalars: self.given.scalars.each_ref().map(is_given),
+        }
     }
 
     /// Writes the surface and its size.
@@ -335,43 +322,38 @@ impl Wanted {
         columns: &Columns,
         depths: &Depths<'_>,
     ) -> Outcome {
-        let surface = RefCell::new(surface);
         // SAFETY: guaranteed by the caller.
         unsafe {
-            self.write_with(
-                |layout, target| surface.borrow_mut().build(columns, depths, layout, target),
-                || surface.borrow_mut().count(columns, depths),
-            )
+            self.write_with(|target| match target {
+                Some(target) => surface.build(columns, depths, &self.layout, target),
+                None => surface.count(columns, depths),
+            })
         }
     }
 
-    /// Writes a surface and its size, given functions that build and count it.
+    /// Writes a surface and its size; `make` builds it, or only counts it if there is no target.
     ///
     /// # Safety
     /// As [`Wanted::write`].
     pub(in crate::capi) unsafe fn write_with(
         &self,
-        build: impl FnOnce(&Layout, &mut Target<'_>) -> crate::Result<Counts>,
-        count: impl FnOnce() -> crate::Result<Counts>,
+        mut make: impl FnMut(Option<&mut Target<'_>>) -> crate::Result<Counts>,
     ) -> Outcome {
         // SAFETY: guaranteed by the caller.
         let mut target = unsafe { self.given.target() }?;
-        let built = build(&self.layout, &mut target);
         // Too small a buffer is detected afterwards, so that a surface that fits is traversed once.
-        let (counts, fits) = match built {
+        let (counts, fits) = match make(Some(&mut target)) {
             Ok(counts) => (counts, Ok(())),
             Err(error) => {
-                let counts = count()?;
+                let counts = make(None)?;
                 match check_room(&self.given.buffers(), &counts) {
                     Ok(()) => return Err(error.into()),
                     short => (counts, short),
                 }
             }
         };
-        if !self.size.is_null() {
-            // SAFETY: guaranteed by the caller.
-            unsafe { fill(self.size, None, counts.into()) }?;
-        }
+        // SAFETY: guaranteed by the caller.
+        unsafe { self.tell(counts) }?;
         fits
     }
 }
@@ -385,7 +367,7 @@ impl Wanted {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn frz_shallow_layout_init(layout: *mut frz_shallow_layout, size: usize) -> frz_status {
     // SAFETY: the layout is NULL or has `size` bytes.
-    guard(|| unsafe { fill(layout, Some(size), frz_shallow_layout::defaults()) })
+    guard(|| unsafe { fill(layout, Some(size), Sized32::defaults()) })
 }
 
 /// Reports the maximum size of the surface of any liquid on this ground, so that buffers can be allocated once. It holds until the ground
@@ -400,13 +382,8 @@ pub unsafe extern "C" fn frz_shallow_surface_bound(
     shallow: *const frz_shallow,
     size: *mut frz_shallow_size,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid.
-        unsafe {
-            fill(size, None, Counts::default().into())?;
-            fill(size, None, bound(read(shallow)?.shallow.columns()).into())
-        }
-    })
+    // SAFETY: the pointers are NULL or valid.
+    unsafe { informs(size, || Ok(bound(read(shallow)?.shallow.columns()))) }
 }
 
 /// Writes the liquid's surface as triangles, in real time (frz_shallow): the wet columns and the dry ones around them. It ends at the
@@ -427,38 +404,15 @@ pub unsafe extern "C" fn frz_shallow_surface(
     target: *const frz_shallow_target,
     size: *mut frz_shallow_size,
 ) -> frz_status {
-    guard(|| {
-        // SAFETY: the pointers are NULL or valid, and so are the spans.
-        unsafe {
-            let wanted = Wanted::new(layout, target, size)?;
-            let _call = enter_light(context)?;
-            let mut spill = change(shallow)?;
-            let ShallowHandle { shallow, surface, velocities, concentrations, lifted, ledged, .. } =
-                &mut *spill;
-            let (least, sunk) = if wanted.is_lifted { lifted.current()? } else { Default::default() };
-            let ledges = ledged.wanted(wanted.is_skirted, "since the ground or a body moved")?;
-            for (scalar, numbers) in concentrations.iter_mut().enumerate() {
-                let len = if wanted.scalar(scalar) { shallow.columns().len() } else { 0 };
-                numbers.resize(len, 0.0);
-                if len > 0 {
-                    shallow.concentrations(scalar, numbers)?;
-                }
-            }
-            if wanted.velocities() {
-                velocities.resize(shallow.columns().len(), [0.0; 2]);
-                shallow.velocities(velocities)?;
-            }
-            let velocity: &[[f32; 2]] = if wanted.velocities() { velocities } else { &[] };
-            let depths = Depths {
-                depth: shallow.depths(),
-                velocity,
-                active: Some(shallow.active()),
-                least,
-                sunk,
-                carried: concentrations.each_ref().map(|numbers| &numbers[..]),
-                ledges,
-            };
+    // SAFETY: the pointers are NULL or valid, and so are the spans.
+    unsafe {
+        writes(context, shallow, (layout, target, size), |spill, wanted| {
+            let ShallowHandle { shallow, surface, shown, lifted, ledged, .. } = spill;
+            let since = "since the ground or a body moved";
+            let (least, sunk) = wanted_lifts(wanted.has(FRZ_SHALLOW_LIFTED), lifted.known(), since)?;
+            let ledges = ledged.wanted(wanted.has(FRZ_SHALLOW_SKIRTED), since)?;
+            let depths = Depths { least, sunk, ledges, ..shown.depths(shallow, &wanted.needs())? };
             wanted.write(surface, shallow.columns(), &depths)
-        }
-    })
+        })
+    }
 }

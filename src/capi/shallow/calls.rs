@@ -1,0 +1,70 @@
+//! Shapes of calls: what they change, and what they report.
+
+use crate::capi::ffi::*;
+use crate::capi::runtime::context::{enter_light, frz_context};
+use crate::context::Context;
+
+/// An interface function that changes an object in real time, and reports what it did unless `report` is NULL.
+///
+/// # Safety
+/// The pointers must be NULL or valid.
+pub(in crate::capi) unsafe fn changes<N: HandleType, T: Sized32, R: Into<T>>(
+    context: *mut frz_context,
+    object: *mut N,
+    report: *mut T,
+    work: impl FnOnce(&Context, &mut N::Value) -> Outcome<R>,
+) -> frz_status {
+    // SAFETY: guaranteed by the caller.
+    guard(|| unsafe {
+        reports(report, || {
+            let call = enter_light(context)?;
+            work(call.ctx(), &mut *change(object)?)
+        })
+    })
+}
+
+/// An interface function that fills a struct with what is known of an object; all zeroes after a failure.
+///
+/// # Safety
+/// The pointer must be NULL or valid.
+pub(in crate::capi) unsafe fn informs<T: Sized32, R: Into<T>>(
+    info: *mut T,
+    work: impl FnOnce() -> Outcome<R>,
+) -> frz_status {
+    // SAFETY: guaranteed by the caller.
+    guard(|| unsafe { reports(required(info, T::NAME)?, work) })
+}
+
+/// Runs the work of a call that returns a number, which is written to the host unless the pointer is NULL; 0 after a failure.
+///
+/// # Safety
+/// `out` must be NULL or point to memory for a number.
+pub(in crate::capi) unsafe fn answers(out: *mut f64, work: impl FnOnce() -> Outcome<f64>) -> Outcome {
+    let tell = |number: f64| {
+        if !out.is_null() {
+            // SAFETY: guaranteed by the caller.
+            unsafe { out.write_unaligned(number) };
+        }
+    };
+    tell(0.0);
+    tell(work()?);
+    Ok(())
+}
+
+/// Runs the work of a call that returns a report, which is written to the host unless the pointer is NULL; all zeroes after a failure.
+///
+/// # Safety
+/// As [`fill`], without a size.
+pub(in crate::capi) unsafe fn reports<T: Sized32, R: Into<T>>(
+    report: *mut T,
+    work: impl FnOnce() -> Outcome<R>,
+) -> Outcome {
+    if report.is_null() {
+        return work().map(drop);
+    }
+    // SAFETY: guaranteed by the caller.
+    unsafe {
+        fill(report, None, T::zeroed())?;
+        fill(report, None, work()?.into())
+    }
+}
