@@ -20,26 +20,20 @@ fn text(path: &Path) -> String {
     fs::read_to_string(path).unwrap().split("#[cfg(test)]").next().unwrap_or_default().to_string()
 }
 
-/// Names of keys that are declared with a default.
-fn declared(files: &[PathBuf]) -> BTreeSet<String> {
-    let mut names = BTreeSet::new();
-    let has_keys = |path: &&PathBuf| {
-        path.ends_with("keys.rs") || path.parent().is_some_and(|folder| folder.ends_with("keys"))
-    };
-    for path in files.iter().filter(has_keys) {
-        // `key(STEP, "grains", "rest", Flag, or("true"))`, with `OBJECT` for a table that all systems share.
-        for key in text(path).split("key(").skip(1).filter(|key| key.contains(", or(")) {
-            let table = usize::from(!key.split('"').next().unwrap_or_default().contains("OBJECT"));
-            names.extend(key.split('"').skip(1).step_by(2).nth(table).map(String::from));
-        }
-    }
-    names
+/// Names of keys that have a default, by the reference of all keys, which another test compares with their declarations.
+fn declared() -> BTreeSet<String> {
+    let reference = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/scene.md");
+    let text = fs::read_to_string(reference).unwrap();
+    let rows = text.lines().filter(|line| line.starts_with("| `"));
+    let cells = rows.map(|row| row.split(" | ").map(str::trim).collect::<Vec<_>>());
+    let with_default = cells.filter(|cells| cells.len() > 3 && cells[2].starts_with('`'));
+    with_default.map(|cells| cells[0].trim_matches(['|', ' ', '`']).to_string()).collect()
 }
 
-/// Names of keys whose value is replaced where there is none: `number("name").unwrap_or(1.0)`, in one statement or field.
+/// Names of keys whose value is replaced where there is none: `find("name").unwrap_or(1.0)`, in one statement or field.
 fn replaced(text: &str) -> Vec<String> {
     let mut names = Vec::new();
-    for call in ["find(\"", "number(\"", "value(\"", "flag(\"", "whole(\"", "text(\"", "name, \""] {
+    for call in ["find(\"", "number(\"", "value(\"", "text(\"", "name, \""] {
         for rest in text.split(call).skip(1) {
             let Some((name, rest)) = rest.split_once("\")") else { continue };
             let end = rest.find([';', ',']).unwrap_or(rest.len());
@@ -55,7 +49,7 @@ fn replaced(text: &str) -> Vec<String> {
 fn a_default_is_declared_once() {
     let mut files = Vec::new();
     sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/scene"), &mut files);
-    let declared = declared(&files);
+    let declared = declared();
     for name in ["opaque_depth", "friction", "falls_height", "thickens_from", "turbulence", "fps", "kept"] {
         assert!(declared.contains(name), "{name} is not among {declared:?}");
     }
@@ -67,5 +61,5 @@ fn a_default_is_declared_once() {
     let second: Vec<String> = files.iter().flat_map(second).collect();
     assert!(second.is_empty(), "second defaults; TableValues::get has the declared one: {second:#?}");
     // What this looks for.
-    assert_eq!(replaced("opaque_depth: number(\"opaque_depth\").unwrap_or(0.01),"), ["opaque_depth"]);
+    assert_eq!(replaced("opaque_depth: find(\"opaque_depth\").unwrap_or(0.01),"), ["opaque_depth"]);
 }
