@@ -249,6 +249,9 @@ pub(in crate::capi) fn within(name: &str, value: f64, range: RangeInclusive<f64>
     })
 }
 
+/// The numbers of an enum of the interface, and what they mean.
+pub(in crate::capi) type Meanings<T, const N: usize> = [(u32, T); N];
+
 /// Maps a number of a host's enum to its value.
 pub(in crate::capi) fn meaning<T: Copy>(
     name: &str,

@@ -40,31 +40,10 @@ pub(in crate::capi) unsafe fn informs<T: Sized32, R: Into<T>>(
 /// # Safety
 /// `out` must be NULL or point to memory for a number.
 pub(in crate::capi) unsafe fn answers(out: *mut f64, work: impl FnOnce() -> Outcome<f64>) -> Outcome {
-    let tell = |number: f64| {
-        if !out.is_null() {
-            // SAFETY: guaranteed by the caller.
-            unsafe { out.write_unaligned(number) };
-        }
-    };
-    tell(0.0);
-    tell(work()?);
-    Ok(())
-}
-
-/// Runs the work of a call that returns a report, which is written to the host unless the pointer is NULL; all zeroes after a failure.
-///
-/// # Safety
-/// As [`fill`], without a size.
-pub(in crate::capi) unsafe fn reports<T: Sized32, R: Into<T>>(
-    report: *mut T,
-    work: impl FnOnce() -> Outcome<R>,
-) -> Outcome {
-    if report.is_null() {
-        return work().map(drop);
-    }
     // SAFETY: guaranteed by the caller.
     unsafe {
-        fill(report, None, T::zeroed())?;
-        fill(report, None, work()?.into())
+        write_some(out, 0.0);
+        write_some(out, work()?);
     }
+    Ok(())
 }

@@ -25,11 +25,11 @@ pub enum frz_shallow_flow_kind {
 
 use frz_shallow_flow_kind::*;
 
-const KINDS: [(u32, frz_shallow_flow_kind); 4] = [
-    (FRZ_SHALLOW_SOURCE as u32, FRZ_SHALLOW_SOURCE),
-    (FRZ_SHALLOW_DRAIN as u32, FRZ_SHALLOW_DRAIN),
-    (FRZ_SHALLOW_ABSORBER as u32, FRZ_SHALLOW_ABSORBER),
-    (FRZ_SHALLOW_ORIFICE as u32, FRZ_SHALLOW_ORIFICE),
+const KINDS: Meanings<fn(&frz_shallow_flow) -> Kind, 4> = [
+    (FRZ_SHALLOW_SOURCE as u32, |_| Kind::Source),
+    (FRZ_SHALLOW_DRAIN as u32, |_| Kind::Drain),
+    (FRZ_SHALLOW_ABSORBER as u32, |given| Kind::Absorber(given.capacity)),
+    (FRZ_SHALLOW_ORIFICE as u32, |given| Kind::Orifice(given.opening)),
 ];
 
 /// A flow point, where liquid enters or leaves. Zero it, then set struct_size.
@@ -80,12 +80,7 @@ impl Attached {
     /// A flow point of a host.
     pub fn of(given: &frz_shallow_flow, terrain: &Terrain) -> Outcome<Self> {
         no_flags(given.flags, FRZ_SHALLOW_ON_TRIANGLE)?;
-        let kind = match meaning("kind", "frz_shallow_flow_kind", given.kind, &KINDS)? {
-            FRZ_SHALLOW_SOURCE => Kind::Source,
-            FRZ_SHALLOW_DRAIN => Kind::Drain,
-            FRZ_SHALLOW_ABSORBER => Kind::Absorber(given.capacity),
-            FRZ_SHALLOW_ORIFICE => Kind::Orifice(given.opening),
-        };
+        let kind = meaning("kind", "frz_shallow_flow_kind", given.kind, &KINDS)?(given);
         let is_attached = given.flags & FRZ_SHALLOW_ON_TRIANGLE != 0;
         let on = is_attached.then_some((given.triangle, given.shares));
         if let Some((_, shares)) = &on {

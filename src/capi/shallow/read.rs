@@ -1,10 +1,12 @@
 //! Shallow liquid as numbers: its columns, at points, in boxes.
 
+use std::ffi::c_void;
+
 use super::calls::informs;
 use super::lists::numbers;
 use super::spill::frz_shallow;
 use crate::capi::ffi::*;
-use crate::shallow::View;
+use crate::shallow::{Shallow, View};
 
 /// Layer of a volume: all layers.
 pub const FRZ_SHALLOW_ALL_LAYERS: u32 = 0xffff_ffff;
@@ -93,12 +95,12 @@ const ARRAYS: [(u32, frz_shallow_array); 8] = [
     (7, FRZ_SHALLOW_VELOCITY),
 ];
 
-const LENT: [(u32, frz_shallow_lent); 5] = [
-    (0, FRZ_SHALLOW_LENT_DEPTH),
-    (1, FRZ_SHALLOW_LENT_BASE),
-    (2, FRZ_SHALLOW_LENT_CEILING),
-    (3, FRZ_SHALLOW_LENT_EAST),
-    (4, FRZ_SHALLOW_LENT_SOUTH),
+const LENT: Meanings<fn(&Shallow) -> *const c_void, 5> = [
+    (FRZ_SHALLOW_LENT_DEPTH as u32, |shallow| shallow.depths().as_ptr().cast()),
+    (FRZ_SHALLOW_LENT_BASE as u32, |shallow| shallow.columns().bases().as_ptr().cast()),
+    (FRZ_SHALLOW_LENT_CEILING as u32, |shallow| shallow.columns().ceilings().as_ptr().cast()),
+    (FRZ_SHALLOW_LENT_EAST as u32, |shallow| shallow.fluxes()[0].as_ptr().cast()),
+    (FRZ_SHALLOW_LENT_SOUTH as u32, |shallow| shallow.fluxes()[1].as_ptr().cast()),
 ];
 
 /// Reports the properties of a liquid: the element counts for frz_shallow_read, and its dimensions.
@@ -221,17 +223,9 @@ pub unsafe extern "C" fn frz_shallow_lend(
     // SAFETY: the pointers are NULL or valid.
     guard(|| unsafe {
         answer(out, "out", || {
-            let array = meaning("array", "frz_shallow_lent", array, &LENT)?;
+            let data = meaning("array", "frz_shallow_lent", array, &LENT)?;
             let shallow = &read(shallow)?.shallow;
-            let (columns, [east, south]) = (shallow.columns(), shallow.fluxes());
-            let data = match array {
-                FRZ_SHALLOW_LENT_DEPTH => shallow.depths().as_ptr().cast(),
-                FRZ_SHALLOW_LENT_BASE => columns.bases().as_ptr().cast(),
-                FRZ_SHALLOW_LENT_CEILING => columns.ceilings().as_ptr().cast(),
-                FRZ_SHALLOW_LENT_EAST => east.as_ptr().cast(),
-                FRZ_SHALLOW_LENT_SOUTH => south.as_ptr().cast(),
-            };
-            Ok(frz_view { data, count: columns.len(), stride: 4 })
+            Ok(frz_view { data: data(shallow), count: shallow.columns().len(), stride: 4 })
         })
     })
 }

@@ -30,10 +30,11 @@ pub enum frz_shallow_law {
 
 use frz_shallow_law::*;
 
-const LAWS: [(u32, frz_shallow_law); 3] = [
-    (FRZ_SHALLOW_DYE as u32, FRZ_SHALLOW_DYE),
-    (FRZ_SHALLOW_DECAYS as u32, FRZ_SHALLOW_DECAYS),
-    (FRZ_SHALLOW_AGES as u32, FRZ_SHALLOW_AGES),
+/// The laws, which may have a half-life.
+const LAWS: Meanings<fn(f64) -> Law, 3> = [
+    (FRZ_SHALLOW_DYE as u32, |_| Law::Dye),
+    (FRZ_SHALLOW_DECAYS as u32, Law::Decays),
+    (FRZ_SHALLOW_AGES as u32, |_| Law::Ages),
 ];
 
 /// A scalar that the liquid carries. Zero it, then set struct_size.
@@ -62,11 +63,7 @@ impl frz_shallow_scalar {
     /// # Safety
     /// The name must be NULL or a zero-terminated text.
     unsafe fn scalar(&self) -> Outcome<Scalar> {
-        let law = match meaning("law", "frz_shallow_law", self.law, &LAWS)? {
-            FRZ_SHALLOW_DYE => Law::Dye,
-            FRZ_SHALLOW_DECAYS => Law::Decays(self.half_life),
-            FRZ_SHALLOW_AGES => Law::Ages,
-        };
+        let law = meaning("law", "frz_shallow_law", self.law, &LAWS)?(self.half_life);
         // SAFETY: guaranteed by the caller.
         let name = unsafe { required_text(self.name, "name") }?.to_string();
         let scalar = Scalar { name, law, range: self.range };

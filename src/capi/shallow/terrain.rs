@@ -113,10 +113,18 @@ pub enum frz_shallow_shape {
 
 use frz_shallow_shape::*;
 
-const SHAPES: [(u32, frz_shallow_shape); 3] = [
-    (FRZ_SHALLOW_SPHERE as u32, FRZ_SHALLOW_SPHERE),
-    (FRZ_SHALLOW_CAPSULE as u32, FRZ_SHALLOW_CAPSULE),
-    (FRZ_SHALLOW_BOX as u32, FRZ_SHALLOW_BOX),
+const SHAPES: Meanings<fn(&frz_shallow_body) -> Shape, 3> = [
+    (FRZ_SHALLOW_SPHERE as u32, |body| Shape::Sphere { centre: body.at.into(), radius: body.radius }),
+    (FRZ_SHALLOW_CAPSULE as u32, |body| Shape::Capsule {
+        ends: [body.at.into(), body.end.into()],
+        radius: body.radius,
+    }),
+    (FRZ_SHALLOW_BOX as u32, |body| {
+        let is_turned = body.axes.as_flattened().iter().any(|number| *number != 0.0);
+        let world = [DVec3::x(), DVec3::y(), DVec3::z()];
+        let axes = if is_turned { body.axes.map(DVec3::from) } else { world };
+        Shape::Cuboid { centre: body.at.into(), axes, half: body.half }
+    }),
 ];
 
 /// A solid that moves over the ground: a tool, a finger. Zero it, then set struct_size.
@@ -146,17 +154,7 @@ unsafe impl Sized32 for frz_shallow_body {
 
 impl frz_shallow_body {
     pub(in crate::capi) fn shape(self) -> Outcome<Shape> {
-        let at = DVec3::from(self.at);
-        let shape = match meaning("shape", "frz_shallow_shape", self.shape, &SHAPES)? {
-            FRZ_SHALLOW_SPHERE => Shape::Sphere { centre: at, radius: self.radius },
-            FRZ_SHALLOW_CAPSULE => Shape::Capsule { ends: [at, self.end.into()], radius: self.radius },
-            FRZ_SHALLOW_BOX => {
-                let own = self.axes.map(DVec3::from);
-                let is_turned = self.axes.as_flattened().iter().any(|number| *number != 0.0);
-                let axes = if is_turned { own } else { [DVec3::x(), DVec3::y(), DVec3::z()] };
-                Shape::Cuboid { centre: at, axes, half: self.half }
-            }
-        };
+        let shape = meaning("shape", "frz_shallow_shape", self.shape, &SHAPES)?(&self);
         shape.validate()?;
         Ok(shape)
     }

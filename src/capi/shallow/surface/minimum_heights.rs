@@ -4,7 +4,6 @@ use super::prepared::Lifted;
 use crate::capi::ffi::*;
 use crate::capi::mesh::triangles::no_flags;
 use crate::capi::runtime::context::{enter_light, frz_context};
-use crate::capi::shallow::calls::reports;
 use crate::capi::shallow::ground::{Terrain, cells_in};
 use crate::capi::shallow::spill::{ShallowHandle, frz_shallow};
 use crate::shallow::surface::heights::minimum_heights::{Distance, Fitted};
