@@ -1,8 +1,8 @@
-//! Arrays of handles from a host.
+//! Arrays from a host: of handles, of structs, and of as many numbers as there are things.
 
-use super::guard::Outcome;
-use super::handle::{HandleType, Reading, read};
-use super::views::frz_view;
+use super::guard::{Failure, Outcome, refuse};
+use super::handle::{HandleType, Reading, read, required};
+use super::views::{Plain, Sized32, check_size, frz_span, frz_view, sized};
 
 /// The handles behind a host's array of pointers, to read.
 ///
@@ -17,4 +17,104 @@ pub(in crate::capi) unsafe fn read_each<'a, N: HandleType>(
     let pointers = unsafe { frz_view::packed(list, count).elements::<*const N>(name) }?;
     // SAFETY: as above.
     pointers.iter().map(|&pointer| unsafe { read(pointer) }).collect()
+}
+
+/// Replaces a list by the structs of a host's array, converted, all of one version; `nouns` name one and all of them in an error. Fields
+/// that the host's header does not have are 0. Nothing but the list is allocated, except on failure.
+///
+/// # Safety
+/// `list` must be NULL or point to `count` structs.
+pub(in crate::capi) unsafe fn read_list<T: Sized32, U>(
+    list: *const T,
+    count: usize,
+    nouns: [&str; 2],
+    into: &mut Vec<U>,
+    convert: impl Fn(T) -> Outcome<U>,
+) -> Outcome {
+    let [noun, all] = nouns;
+    into.clear();
+    let named =
+        |at: usize, failure: Failure| Failure { text: format!("{noun} {at}: {}", failure.text), ..failure };
+    // SAFETY: guaranteed by the caller.
+    let stride = unsafe { stride_of(list, count, all, |failure| named(0, failure)) }?;
+    for at in 0..count {
+        // SAFETY: as above.
+        let one = unsafe { sized(list.byte_add(at * stride), T::zeroed()) };
+        into.push(one.and_then(&convert).map_err(|failure| named(at, failure))?);
+    }
+    Ok(())
+}
+
+/// The size (bytes) of the structs of a host's array, from each to the next; 0 if there are none. `first` tells of a failure of the first.
+///
+/// # Safety
+/// `list` must be NULL or point to `count` structs.
+pub(in crate::capi) unsafe fn stride_of<T: Sized32>(
+    list: *const T,
+    count: usize,
+    all: &str,
+    first: impl FnOnce(Failure) -> Failure,
+) -> Outcome<usize> {
+    if count == 0 {
+        return Ok(0);
+    }
+    refuse(list.is_null(), || format!("{all}: the data is NULL, but the count is {count}"))?;
+    // SAFETY: guaranteed by the caller: at least the size of one is there.
+    let stride = unsafe { list.cast::<u32>().read_unaligned() } as usize;
+    // Checked before use.
+    check_size::<T>(stride).map_err(first)?;
+    let sizes = frz_view { data: list.cast(), count, stride };
+    // SAFETY: as above; the sizes must be equal for the structs to be contiguous.
+    let is_other = unsafe { sizes.in_place::<u32>(all) }?.any(|size| size as usize != stride);
+    refuse(is_other, || format!("{all}: their struct_size differs"))?;
+    Ok(stride)
+}
+
+/// The elements of a view, one for each of `count` things; an error says that `there_are` so many, in the words before and after the count.
+///
+/// # Safety
+/// The view must describe memory that can be read, for `'a`.
+pub(in crate::capi) unsafe fn one_for_each<'a, T: Plain>(
+    view: &frz_view,
+    name: &str,
+    count: usize,
+    [there_are, things]: [&str; 2],
+) -> Outcome<impl ExactSizeIterator<Item = T> + Clone + use<'a, T>> {
+    // SAFETY: guaranteed by the caller.
+    let given = unsafe { view.in_place::<T>(name) }?;
+    let len = given.len();
+    refuse(len != count, || format!("{name}: {len} elements, but {there_are} {count} {things}"))?;
+    Ok(given)
+}
+
+/// Writes a list, or only the number of its elements if there is no memory for them.
+///
+/// # Safety
+/// The span must describe memory that can be written, and `count` must be NULL or valid.
+pub(in crate::capi) unsafe fn list<T: Plain>(
+    elements: impl ExactSizeIterator<Item = T>,
+    dst: &frz_span,
+    count: *mut usize,
+) -> Outcome {
+    // SAFETY: guaranteed by the caller.
+    unsafe {
+        required(count, "count")?.write_unaligned(elements.len());
+        if dst.data.is_null() { Ok(()) } else { dst.put("dst", elements) }
+    }
+}
+
+/// The numbers that a host's pointer points to.
+///
+/// # Safety
+/// The pointer must be NULL or point to `N` numbers.
+pub(in crate::capi) unsafe fn numbers<const N: usize>(first: *const f64, name: &str) -> Outcome<[f64; N]> {
+    let first = required(first.cast_mut(), name)?;
+    // SAFETY: guaranteed by the caller.
+    Ok(unsafe { first.cast::<[f64; N]>().read_unaligned() })
+}
+
+/// An index of one of `count` things that were set; `name` is that of the argument.
+pub(in crate::capi) fn check_index(name: &str, index: usize, count: usize) -> Outcome<usize> {
+    refuse(index >= count, || format!("{name} = {index} is none of the {count} that were set"))?;
+    Ok(index)
 }

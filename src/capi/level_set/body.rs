@@ -254,20 +254,14 @@ unsafe fn arrived(list: *const frz_body, count: usize, dt: f64) -> Outcome<Vec<A
     if count == 0 {
         return Ok(Vec::new());
     }
-    let first = required(list.cast_mut(), "bodies")?.cast_const();
-    // SAFETY: guaranteed by the caller: at least the size of a body is there.
-    let stride = unsafe { first.cast::<u32>().read_unaligned() } as usize;
-    // Checked before use: it is the stride of the bodies.
-    check_size::<frz_body>(stride).map_err(|failure| named(0, failure))?;
-    let room = frz_view { data: first.cast(), count, stride };
-    // SAFETY: as above; the sizes must be equal for the bodies to be contiguous.
-    let sizes = unsafe { room.elements::<u32>("bodies") }?;
-    refuse(sizes.iter().any(|&size| size as usize != stride), || "bodies: their struct_size differs")?;
+    required(list.cast_mut(), "bodies")?;
+    // SAFETY: guaranteed by the caller.
+    let stride = unsafe { stride_of(list, count, "bodies", |failure| named(0, failure)) }?;
     let mut out: Vec<Arrived> = Vec::with_capacity(count);
     let mut ids = HashSet::with_capacity(count);
     for at in 0..count {
         // SAFETY: guaranteed by the caller.
-        let body = unsafe { one(first.byte_add(at * stride), dt) }.map_err(|failure| named(at, failure))?;
+        let body = unsafe { one(list.byte_add(at * stride), dt) }.map_err(|failure| named(at, failure))?;
         refuse(!ids.insert(body.id), || format!("body {at}: another one has the id {} too", body.id))?;
         out.push(body);
     }

@@ -1,7 +1,6 @@
 //! Shallow liquid in the air: its drops, and their mesh.
 
 use super::calls::informs;
-use super::lists::list;
 use super::snapshot::frz_shallow_snapshot;
 use super::spill::frz_shallow;
 use super::surface::{

@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use super::lists::one_for_each;
 use crate::capi::ffi::*;
 use crate::context::Context;
 use crate::error::Result;

@@ -2,7 +2,6 @@
 
 use super::calls::changes;
 use super::ground::Terrain;
-use super::lists::list;
 use super::params::{frz_shallow_domain, frz_shallow_params};
 use super::spill::{ShallowHandle, frz_shallow};
 use super::surroundings::Setup;

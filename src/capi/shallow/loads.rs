@@ -1,6 +1,5 @@
 //! Loads of shallow liquid on the bodies in it.
 
-use super::lists::{one_for_each, stride_of};
 use super::spill::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::*;
 use crate::shallow::Load;

@@ -31,5 +31,4 @@ pub mod snapshot;
 
 pub(in crate::capi) mod calls;
 pub(in crate::capi) mod ground;
-pub(in crate::capi) mod lists;
 pub(in crate::capi) mod surroundings;

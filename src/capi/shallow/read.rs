@@ -3,7 +3,6 @@
 use std::ffi::c_void;
 
 use super::calls::informs;
-use super::lists::numbers;
 use super::spill::frz_shallow;
 use crate::capi::ffi::*;
 use crate::shallow::{Shallow, View};

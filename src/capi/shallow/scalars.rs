@@ -3,7 +3,6 @@
 use std::ffi::c_char;
 
 use super::calls::informs;
-use super::lists::{check_index, one_for_each, read_list};
 use super::read::Requested;
 use super::spill::frz_shallow;
 use crate::capi::ffi::*;

@@ -2,7 +2,6 @@
 
 use super::calls::{answers, informs};
 use super::flow_points::frz_shallow_flow;
-use super::lists::{check_index, numbers, one_for_each};
 use super::spill::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::*;
 use crate::shallow::Balance;

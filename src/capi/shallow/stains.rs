@@ -3,7 +3,6 @@
 use std::ffi::c_void;
 
 use super::calls::answers;
-use super::lists::one_for_each;
 use super::params::FRZ_SHALLOW_NO_SCALAR;
 use super::spill::frz_shallow;
 use crate::capi::ffi::saved::{restores, write_bytes};

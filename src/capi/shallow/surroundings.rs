@@ -2,7 +2,6 @@
 
 use super::flow_points::{Attached, frz_shallow_flow};
 use super::ground::Terrain;
-use super::lists::read_list;
 use super::params::{domain, frz_shallow_domain, frz_shallow_params, params};
 use crate::capi::ffi::*;
 use crate::context::Context;

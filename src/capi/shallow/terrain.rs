@@ -2,7 +2,6 @@
 
 use super::calls::changes;
 use super::ground::{cells_in, read_heights};
-use super::lists::read_list;
 use super::spill::{ShallowHandle, frz_shallow};
 use crate::capi::ffi::*;
 use crate::capi::runtime::context::frz_context;

@@ -8,7 +8,6 @@ use crate::capi::ffi::*;
 use crate::capi::runtime::context::frz_context;
 use crate::capi::shallow::calls::{changes, informs};
 use crate::capi::shallow::ground::{all_cells, read_heights};
-use crate::capi::shallow::lists::read_list;
 use crate::capi::shallow::surface::{
     FRZ_SHALLOW_LIFTED, FRZ_SHALLOW_SKIRTED, frz_shallow_layout, frz_shallow_size, frz_shallow_target, writes,
 };

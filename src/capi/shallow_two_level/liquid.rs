@@ -7,7 +7,6 @@ use crate::capi::shallow::calls::{answers, changes, informs};
 use crate::capi::shallow::flow_points::frz_shallow_flow;
 use crate::capi::shallow::ground::Terrain;
 use crate::capi::shallow::liquid::frz_shallow_report;
-use crate::capi::shallow::lists::{check_index, numbers};
 use crate::capi::shallow::params::{frz_shallow_domain, frz_shallow_params};
 use crate::capi::shallow::sources::frz_shallow_balance;
 use crate::capi::shallow::surface::prepared::Shown;

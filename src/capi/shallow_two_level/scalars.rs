@@ -3,7 +3,6 @@
 use super::liquid::frz_shallow_detail;
 use crate::capi::ffi::*;
 use crate::capi::shallow::calls::informs;
-use crate::capi::shallow::lists::check_index;
 use crate::capi::shallow::scalars::{
     frz_shallow_scalar, frz_shallow_scalar_balance, read_scalars, with_concentrations,
 };
